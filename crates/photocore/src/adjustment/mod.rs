@@ -1,0 +1,1 @@
+//! Least squares: iteration, weights, convergence, statistics. Knows no photograph.

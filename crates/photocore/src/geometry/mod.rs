@@ -1,0 +1,1 @@
+//! Pure functions of photogrammetric geometry with their partial derivatives.

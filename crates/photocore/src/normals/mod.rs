@@ -1,0 +1,1 @@
+//! Block normal equations: formed, reduced, ordered, factored, solved, selectively inverted.

@@ -1,0 +1,1 @@
+"""Photogrammetric least-squares adjustment with the covariance of every result."""
