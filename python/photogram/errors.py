@@ -1,0 +1,55 @@
+"""What goes wrong: a small tree of exceptions under :class:`PhotogramError`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from photogram.messages import locate
+
+__all__ = ["AdjustmentError", "InputError", "PhotogramError", "RankError"]
+
+
+class PhotogramError(Exception):
+    """Base of every exception that photogram raises on purpose."""
+
+
+class InputError(PhotogramError, ValueError):
+    """Input that cannot be used: a file, a record of it, or an array.
+
+    Parameters
+    ----------
+    message
+        What is wrong, in a sentence.
+    file, record, text
+        The file, the number of the record in it (from 1) and the record itself, as far as they apply.
+    """
+
+    def __init__(
+        self, message: str, *, file: Path | None = None, record: int | None = None, text: str | None = None
+    ) -> None:
+        super().__init__(locate(message, file, record, text))
+        self.message = message
+        self.file = file
+        self.record = record
+        self.text = text
+
+
+class AdjustmentError(PhotogramError):
+    """The adjustment could not be carried out."""
+
+
+class RankError(AdjustmentError):
+    """The observations do not determine all unknowns; the message names the photos and points concerned.
+
+    Parameters
+    ----------
+    message
+        What is undetermined, in a sentence.
+    photos, points
+        Identifiers of the photos and points concerned.
+    """
+
+    def __init__(self, message: str, photos: list[str], points: list[str]) -> None:
+        super().__init__(message)
+        self.photos = photos
+        self.points = points

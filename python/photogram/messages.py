@@ -1,0 +1,38 @@
+"""Remarks on the input that do not stop the run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["Message"]
+
+
+def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
+    """Put the place (file, record number, record text) before and after a message."""
+    place = ", ".join(
+        part for part in (str(file) if file else "", f"record {record}" if record else "") if part
+    )
+    head = f"{place}: {message}" if place else message
+    return head if text is None else f"{head}\n    |{text}|"
+
+
+@dataclass(frozen=True)
+class Message:
+    """A remark on the input that does not stop the run.
+
+    Attributes
+    ----------
+    text
+        The remark, in a sentence.
+    file, record, record_text
+        The file, the number of the record in it (from 1) and the record itself, as far as they apply.
+    """
+
+    text: str
+    file: Path | None = None
+    record: int | None = None
+    record_text: str | None = None
+
+    def __str__(self) -> str:
+        return locate(self.text, self.file, self.record, self.record_text)
