@@ -1,0 +1,119 @@
+//! The selected inverse: the blocks of the inverse inside the pattern of the factor (Takahashi et al. 1973).
+
+use std::sync::Arc;
+
+use faer::reborrow::ReborrowMut;
+use faer::{Mat, MatMut};
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::dense::invert_front;
+use super::factor::Factor;
+use super::floors::Floors;
+use super::panels::Panels;
+use super::symbolic::Symbolic;
+
+/// The blocks of N^-1 inside the pattern of the factor: every kept block's own, and those of every two kept blocks that
+/// share a local block.
+#[derive(Debug)]
+pub struct SelectedInverse {
+    panels: Panels,
+}
+
+impl SelectedInverse {
+    /// Block (row, column) of the inverse, row by row; None outside the pattern. Kept blocks are counted as in the layout, the
+    /// border is the block after the last.
+    pub fn block(&self, row: usize, column: usize) -> Option<Vec<f64>> {
+        let symbolic = &*self.panels.symbolic;
+        let columns = symbolic.dim(symbolic.position(column));
+        let mut values = vec![0.0; symbolic.dim(symbolic.position(row)) * columns];
+        self.panels.for_block(row, column, |i, j, value| values[i * columns + j] = value).then_some(values)
+    }
+
+    /// Writes block (row, column) into a larger matrix, row by row with the given stride.
+    pub(crate) fn write_block(&self, row: usize, column: usize, target: &mut [f64], stride: usize) {
+        self.panels.for_block(row, column, |i, j, value| target[i * stride + j] = value);
+    }
+}
+
+impl Factor {
+    /// Replaces the factor by the selected inverse of the reduced normal equations.
+    pub fn into_selected_inverse(self, pool: &ThreadPool) -> SelectedInverse {
+        let mut panels = self.panels;
+        let symbolic = Arc::clone(&panels.symbolic);
+        pool.install(|| invert_panels(&symbolic, &mut panels.values));
+        panels.scale(&self.scale);
+        SelectedInverse { panels }
+    }
+}
+
+/// The inverse over the rows of one front (own blocks, then coupled blocks), full square.
+type Front = Arc<Mat<f64>>;
+
+fn invert_panels(symbolic: &Symbolic, values: &mut [f64]) {
+    let floors = Floors::new(symbolic);
+    // The front of its parent for each supernode still to be done; a front lives until the last child has taken it.
+    let mut above: Vec<Option<Front>> = vec![None; symbolic.supernode_count()];
+    for &index in floors.top.iter().rev() {
+        let panel = &mut values[symbolic.supernodes()[index].panel.clone()];
+        invert_supernode(symbolic, index, panel, &mut above, 0);
+    }
+    floors.divide(symbolic, values, &mut above).into_par_iter().for_each(|mut subtree| {
+        let first = subtree.supernodes.start;
+        for index in subtree.supernodes.clone().rev() {
+            let (panel, above) = subtree.parts(symbolic, index);
+            invert_supernode(symbolic, index, panel, above, first);
+        }
+    });
+}
+
+/// Inverts one panel, given the front of its parent in `above[index - first]`, and hands its own front to its children.
+fn invert_supernode(
+    symbolic: &Symbolic,
+    index: usize,
+    panel: &mut [f64],
+    above: &mut [Option<Front>],
+    first: usize,
+) {
+    let s = &symbolic.supernodes()[index];
+    let mut front = Mat::<f64>::zeros(s.height(), s.height());
+    if let Some(parent) = above[index - first].take() {
+        take_coupled_rows(&parent, &symbolic.rows_in_parent(index), front.as_mut(), s.width);
+    }
+    let mut panel = MatMut::from_column_major_slice_mut(panel, s.height(), s.width);
+    let below = front.as_ref().submatrix(s.width, s.width, s.below(), s.below());
+    invert_front(panel.rb_mut(), below);
+    if s.children.is_empty() {
+        return;
+    }
+    for j in 0..s.width {
+        for i in j..s.height() {
+            front[(i, j)] = panel[(i, j)];
+            front[(j, i)] = panel[(i, j)];
+        }
+    }
+    let front = Arc::new(front);
+    for &child in &s.children {
+        above[child - first] = Some(Arc::clone(&front));
+    }
+}
+
+/// Copies the inverse over the coupled rows of a supernode from the front of its parent.
+fn take_coupled_rows(
+    parent: &Mat<f64>,
+    runs: &[(usize, usize, usize)],
+    mut front: MatMut<'_, f64>,
+    width: usize,
+) {
+    for &(to_column, from_column, columns) in runs {
+        for k in 0..columns {
+            let source = parent.col(from_column + k);
+            let mut target = front.rb_mut().col_mut(width + to_column + k);
+            for &(to_row, from_row, rows) in runs {
+                for i in 0..rows {
+                    target[width + to_row + i] = source[from_row + i];
+                }
+            }
+        }
+    }
+}

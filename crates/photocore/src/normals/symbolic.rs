@@ -1,0 +1,392 @@
+//! The order of elimination and the pattern of the factor.
+
+use std::ops::Range;
+
+use super::layout::Layout;
+use super::ordering::{Graph, Ordering};
+
+/// The order of elimination and the pattern of the factor of the reduced normal equations.
+///
+/// Blocks are counted by *position*, their place in the order of elimination. The border, when there is one, is a block
+/// like the others that is eliminated last and coupled to all. Blocks of nearly the same pattern are eliminated together,
+/// as one supernode whose columns form one dense panel.
+#[derive(Debug, Clone)]
+pub struct Symbolic {
+    ordering: Ordering,
+    position_of: Vec<usize>,
+    block_at: Vec<usize>,
+    offset: Vec<usize>,
+    supernode_of: Vec<usize>,
+    supernodes: Vec<Supernode>,
+    values: usize,
+}
+
+/// Adjacent blocks that are eliminated together, with the blocks below that they are coupled to.
+#[derive(Debug, Clone)]
+pub(crate) struct Supernode {
+    /// Positions of its blocks.
+    pub blocks: Range<usize>,
+    /// Positions of the coupled blocks below, ascending.
+    pub rows: Vec<usize>,
+    /// Row of the panel at which each of `rows` starts; one more at the end, the height.
+    pub row_offset: Vec<usize>,
+    /// Columns of the panel.
+    pub width: usize,
+    /// Supernode of the first of `rows`.
+    pub parent: Option<usize>,
+    /// Supernodes whose parent this is.
+    pub children: Vec<usize>,
+    /// Where the panel, column by column, stands among the values.
+    pub panel: Range<usize>,
+}
+
+impl Supernode {
+    /// Rows of the panel: those of its own blocks, then those of the coupled blocks.
+    pub fn height(&self) -> usize {
+        self.row_offset[self.rows.len()]
+    }
+
+    /// Rows below its own blocks.
+    pub fn below(&self) -> usize {
+        self.height() - self.width
+    }
+
+    /// Multiply-adds of its part of the factorisation.
+    fn operations(&self) -> f64 {
+        let (w, r) = (self.width as f64, self.below() as f64);
+        w * w * w / 6.0 + w * w * r / 2.0 + w * r * r / 2.0
+    }
+}
+
+/// Predicted multiply-adds.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Operations {
+    /// Reduction of the local blocks, each time the normal equations are formed.
+    pub reduction: f64,
+    /// One factorisation of the reduced normal equations.
+    pub factor: f64,
+    /// One selected inversion.
+    pub inverse: f64,
+}
+
+impl Symbolic {
+    /// Orders the kept blocks of a layout and finds the pattern of the factor.
+    pub fn new(layout: &Layout, ordering: Ordering) -> Self {
+        let graph = Graph::new(layout);
+        let mut best: Option<Self> = None;
+        for &candidate in ordering.candidates() {
+            let symbolic = Self::with_order(layout, &graph, candidate);
+            if best.as_ref().is_none_or(|b| symbolic.factor_operations() < b.factor_operations()) {
+                best = Some(symbolic);
+            }
+        }
+        best.unwrap_or_else(|| Self::with_order(layout, &graph, Ordering::Input))
+    }
+
+    fn with_order(layout: &Layout, graph: &Graph, ordering: Ordering) -> Self {
+        let order = ordering.order(graph);
+        let order = postorder(graph, &order);
+        let border = layout.border_dim() > 0;
+        let mut block_at = order;
+        let mut dims: Vec<usize> = block_at.iter().map(|&block| layout.kept_dim(block)).collect();
+        if border {
+            block_at.push(layout.kept());
+            dims.push(layout.border_dim());
+        }
+        let mut position_of = vec![0; block_at.len()];
+        for (position, &block) in block_at.iter().enumerate() {
+            position_of[block] = position;
+        }
+        let mut offset = vec![0];
+        for dim in &dims {
+            offset.push(offset[offset.len() - 1] + dim);
+        }
+        let columns = column_patterns(graph, &block_at, &position_of, border);
+        let mut symbolic = Self {
+            ordering,
+            position_of,
+            block_at,
+            offset,
+            supernode_of: Vec::new(),
+            supernodes: Vec::new(),
+            values: 0,
+        };
+        symbolic.gather_supernodes(columns, border);
+        symbolic
+    }
+
+    /// Turns column patterns into supernodes with their panels.
+    fn gather_supernodes(&mut self, columns: Vec<Vec<usize>>, border: bool) {
+        self.supernode_of = vec![0; columns.len()];
+        for (blocks, rows) in merge_columns(columns, &self.offset, border) {
+            let width = self.offset[blocks.end] - self.offset[blocks.start];
+            let mut row_offset = vec![width];
+            for &row in &rows {
+                row_offset.push(row_offset[row_offset.len() - 1] + self.dim(row));
+            }
+            let size = width * row_offset[rows.len()];
+            let index = self.supernodes.len();
+            self.supernode_of[blocks.clone()].fill(index);
+            self.supernodes.push(Supernode {
+                blocks,
+                rows,
+                row_offset,
+                width,
+                parent: None,
+                children: Vec::new(),
+                panel: self.values..self.values + size,
+            });
+            self.values += size;
+        }
+        for index in 0..self.supernodes.len() {
+            if let Some(&first) = self.supernodes[index].rows.first() {
+                let parent = self.supernode_of[first];
+                self.supernodes[index].parent = Some(parent);
+                self.supernodes[parent].children.push(index);
+            }
+        }
+    }
+
+    /// The ordering in force (never [`Ordering::Auto`]).
+    pub fn ordering(&self) -> Ordering {
+        self.ordering
+    }
+
+    /// Number of blocks in the order of elimination, the border counted.
+    pub fn blocks(&self) -> usize {
+        self.block_at.len()
+    }
+
+    /// Number of unknowns in the reduced normal equations.
+    pub fn unknowns(&self) -> usize {
+        self.offset[self.blocks()]
+    }
+
+    /// Number of values in the panels of the factor.
+    pub fn values(&self) -> usize {
+        self.values
+    }
+
+    /// Number of supernodes.
+    pub fn supernode_count(&self) -> usize {
+        self.supernodes.len()
+    }
+
+    /// Predicted multiply-adds of each phase.
+    pub fn operations(&self, layout: &Layout) -> Operations {
+        let reduction = (0..layout.locals())
+            .map(|local| {
+                let width: usize = layout.groups_of(local).map(|g| layout.kept_dim(layout.kept_of(g))).sum();
+                (width * (width + 6) / 2 * layout.local_dim()) as f64
+            })
+            .sum();
+        let inverse = self.supernodes.iter().map(|s| {
+            let (w, r) = (s.width as f64, s.below() as f64);
+            r * r * w + 1.5 * r * w * w + w * w * w / 2.0
+        });
+        Operations { reduction, factor: self.factor_operations(), inverse: inverse.sum() }
+    }
+
+    fn factor_operations(&self) -> f64 {
+        self.supernodes.iter().map(Supernode::operations).sum()
+    }
+
+    /// Multiply-adds of the factorisation of each supernode with all below it in the tree.
+    pub(crate) fn subtree_operations(&self) -> Vec<f64> {
+        let mut work: Vec<f64> = self.supernodes.iter().map(Supernode::operations).collect();
+        for (index, supernode) in self.supernodes.iter().enumerate() {
+            if let Some(parent) = supernode.parent {
+                work[parent] += work[index];
+            }
+        }
+        work
+    }
+
+    pub(crate) fn supernodes(&self) -> &[Supernode] {
+        &self.supernodes
+    }
+
+    /// Place of a kept block (the border is the block after the last) in the order of elimination.
+    pub(crate) fn position(&self, block: usize) -> usize {
+        self.position_of[block]
+    }
+
+    /// The kept block at a position.
+    pub(crate) fn block(&self, position: usize) -> usize {
+        self.block_at[position]
+    }
+
+    pub(crate) fn dim(&self, position: usize) -> usize {
+        self.offset[position + 1] - self.offset[position]
+    }
+
+    /// Where the unknowns of a position stand in the order of elimination.
+    pub(crate) fn range(&self, position: usize) -> Range<usize> {
+        self.offset[position]..self.offset[position + 1]
+    }
+
+    /// Where the unknowns of a position stand in the vector of unknowns.
+    pub(crate) fn unknowns_at(&self, layout: &Layout, position: usize) -> Range<usize> {
+        let block = self.block_at[position];
+        if block < layout.kept() { layout.kept_range(block) } else { layout.border_range() }
+    }
+
+    pub(crate) fn supernode_of(&self, position: usize) -> usize {
+        self.supernode_of[position]
+    }
+
+    /// First unknown of a supernode in the order of elimination.
+    pub(crate) fn first_unknown(&self, supernode: usize) -> usize {
+        self.offset[self.supernodes[supernode].blocks.start]
+    }
+
+    /// Row of the panel of `supernode` at which the block at `position` starts, if it is in its pattern.
+    pub(crate) fn panel_row(&self, supernode: usize, position: usize) -> Option<usize> {
+        let s = &self.supernodes[supernode];
+        if s.blocks.contains(&position) {
+            return Some(self.offset[position] - self.offset[s.blocks.start]);
+        }
+        s.rows.binary_search(&position).ok().map(|index| s.row_offset[index])
+    }
+
+    /// Where the coupled rows of a supernode stand in the front of its parent (own blocks, then coupled blocks):
+    /// `(row in this front below the panel's own blocks, row in the parent's front, how many)`.
+    pub(crate) fn rows_in_parent(&self, supernode: usize) -> Vec<(usize, usize, usize)> {
+        let s = &self.supernodes[supernode];
+        let Some(parent) = s.parent else { return Vec::new() };
+        let mut runs: Vec<(usize, usize, usize)> = Vec::with_capacity(s.rows.len());
+        for (index, &row) in s.rows.iter().enumerate() {
+            // The pattern of a column is contained in its parent's: that is what makes it the parent.
+            let Some(to) = self.panel_row(parent, row) else { continue };
+            let (from, count) = (s.row_offset[index] - s.width, self.dim(row));
+            match runs.last_mut() {
+                Some(last) if last.0 + last.2 == from && last.1 + last.2 == to => last.2 += count,
+                _ => runs.push((from, to, count)),
+            }
+        }
+        runs
+    }
+}
+
+/// The elimination tree of a graph in a given order (Liu 1990, algorithm 4.2): parent of each place in the order.
+fn elimination_tree(graph: &Graph, order: &[usize], place: &[usize]) -> Vec<Option<usize>> {
+    let mut parent = vec![None; order.len()];
+    let mut ancestor: Vec<Option<usize>> = vec![None; order.len()];
+    for (k, &block) in order.iter().enumerate() {
+        for other in graph.neighbours(block) {
+            let mut i = place[other];
+            while i < k {
+                let next = ancestor[i].replace(k);
+                match next {
+                    None => {
+                        parent[i] = Some(k);
+                        break;
+                    }
+                    Some(above) => i = above,
+                }
+            }
+        }
+    }
+    parent
+}
+
+/// Reorders so that every subtree of the elimination tree is contiguous; the fill stays the same.
+fn postorder(graph: &Graph, order: &[usize]) -> Vec<usize> {
+    let mut place = vec![0; order.len()];
+    for (k, &block) in order.iter().enumerate() {
+        place[block] = k;
+    }
+    let parent = elimination_tree(graph, order, &place);
+    let mut children = vec![Vec::new(); order.len()];
+    for (k, above) in parent.iter().enumerate() {
+        if let Some(above) = above {
+            children[*above].push(k);
+        }
+    }
+    let mut result = Vec::with_capacity(order.len());
+    for root in (0..order.len()).filter(|&k| parent[k].is_none()) {
+        // Depth first with an explicit stack, parents before children; the subtree is then reversed.
+        let start = result.len();
+        let mut stack = vec![root];
+        while let Some(k) = stack.pop() {
+            result.push(order[k]);
+            stack.extend(&children[k]);
+        }
+        result[start..].reverse();
+    }
+    result
+}
+
+/// The positions below the diagonal in each block column of the factor: its own neighbours and what its children leave.
+fn column_patterns(
+    graph: &Graph,
+    block_at: &[usize],
+    position_of: &[usize],
+    border: bool,
+) -> Vec<Vec<usize>> {
+    let count = block_at.len();
+    let mut columns: Vec<Vec<usize>> = Vec::with_capacity(count);
+    let mut children: Vec<Vec<usize>> = vec![Vec::new(); count];
+    let mut seen_by = vec![usize::MAX; count];
+    for position in 0..count {
+        let mut pattern = Vec::new();
+        let mut add = |row: usize| {
+            if row > position && seen_by[row] != position {
+                seen_by[row] = position;
+                pattern.push(row);
+            }
+        };
+        if border {
+            add(count - 1);
+        }
+        if !border || position < count - 1 {
+            graph.neighbours(block_at[position]).for_each(|block| add(position_of[block]));
+        }
+        for &child in &children[position] {
+            columns[child].iter().for_each(|&row| add(row));
+        }
+        pattern.sort_unstable();
+        if let Some(&parent) = pattern.first() {
+            children[parent].push(position);
+        }
+        columns.push(pattern);
+    }
+    columns
+}
+
+/// Widest panel, in unknowns: wide enough for the matrix product to run at full rate, narrow enough that the updates
+/// of one panel keep all processors busy.
+const WIDEST_PANEL: usize = 192;
+
+/// Joins each column with the next one when that is its parent and few explicit zeros come in (relaxed supernodes,
+/// Ashcraft and Grimes 1989). Returns the blocks and the coupled rows of each supernode.
+fn merge_columns(
+    columns: Vec<Vec<usize>>,
+    offset: &[usize],
+    border: bool,
+) -> Vec<(Range<usize>, Vec<usize>)> {
+    let dim = |position: usize| offset[position + 1] - offset[position];
+    let size = |rows: &[usize]| rows.iter().map(|&row| dim(row)).sum::<usize>();
+    let last = columns.len().wrapping_sub(usize::from(border));
+    let mut merged: Vec<(Range<usize>, Vec<usize>)> = Vec::new();
+    let mut filled = 0.0;
+    for (position, rows) in columns.into_iter().enumerate() {
+        let entries = |width: usize, below: usize| (width * (width + 1) / 2 + width * below) as f64;
+        let own = entries(dim(position), size(&rows));
+        if let Some((blocks, above)) = merged.last_mut() {
+            let width = offset[position + 1] - offset[blocks.start];
+            // All rows of the child but its parent stand in the parent's pattern, so the merged rows are the parent's.
+            let zeros = 1.0 - (filled + own) / entries(width, size(&rows));
+            let few = zeros < 0.05 || (width <= 48 && zeros < 0.2) || (width <= 24 && zeros < 0.4);
+            if position != last && above.first() == Some(&position) && width <= WIDEST_PANEL && few {
+                blocks.end = position + 1;
+                *above = rows;
+                filled += own;
+                continue;
+            }
+        }
+        merged.push((position..position + 1, rows));
+        filled = own;
+    }
+    merged
+}
