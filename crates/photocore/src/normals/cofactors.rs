@@ -181,7 +181,7 @@ impl Others {
     /// The row vector x Q.
     fn times(&self, x: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; self.width];
-        for (value, row) in x.iter().zip(self.inverse.chunks_exact(self.width)) {
+        for (value, row) in x.iter().zip(self.inverse.chunks_exact(self.width.max(1))) {
             product.iter_mut().zip(row).for_each(|(sum, q)| *sum += value * q);
         }
         product
