@@ -1,9 +1,13 @@
 //! The extension module `photogram._photocore`: converts arrays, releases the GIL, decides nothing.
 
+mod arrays;
+mod geometry;
+
 use pyo3::prelude::*;
 
 #[pymodule]
 fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    geometry::register(module)?;
     Ok(())
 }

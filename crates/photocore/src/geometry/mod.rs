@@ -1,1 +1,31 @@
 //! Pure functions of photogrammetric geometry with their partial derivatives.
+//!
+//! * [`vector`]: products of 3-vectors and 3x3 matrices;
+//! * [`rotation`]: omega, phi, kappa and the rotation matrix;
+//! * [`ellipsoid`]: longitude, latitude, height, geocentric coordinates, and the local vertical frame;
+//! * [`collinearity`]: the projection of a point into a photo and its linearization.
+//!
+//! Angles are radians, image coordinates millimetres, lengths the linear unit of the object space.
+
+pub mod collinearity;
+pub mod ellipsoid;
+pub mod rotation;
+pub mod vector;
+
+pub use collinearity::{ObjectSpace, Photo, Point, Projection, Ray, RotationSense};
+pub use ellipsoid::{Ellipsoid, local_vertical, local_vertical_with_partials};
+pub use rotation::{rotation, rotation_angles, rotation_with_partials};
+pub use vector::{Matrix3, Vector3};
+
+/// What geometry refuses.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum GeometryError {
+    /// Semi-axes that are not finite, or not 0 < b <= a.
+    #[error("a spheroid needs finite semi-axes with 0 < b <= a, not a = {a}, b = {b}")]
+    Semiaxes {
+        /// The semi-major axis as given.
+        a: f64,
+        /// The semi-minor axis as given.
+        b: f64,
+    },
+}

@@ -1,0 +1,117 @@
+//! The ellipsoid of revolution: geographic and geocentric coordinates, and the local vertical frame.
+//!
+//! Geographic positions are (longitude east positive, latitude, height): radians, radians, the linear unit of
+//! the semi-axes.
+
+use super::GeometryError;
+use super::vector::{Matrix3, Vector3};
+
+/// An ellipsoid of revolution, never prolate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ellipsoid {
+    a: f64,
+    b: f64,
+}
+
+impl Ellipsoid {
+    /// Clarke 1866 in metres, the default of GIANT.
+    pub const CLARKE_1866: Self = Self { a: 6_378_206.4, b: 6_356_583.8 };
+
+    /// The ellipsoid with semi-major axis `a` and semi-minor axis `b`, finite with 0 < b <= a.
+    pub fn new(a: f64, b: f64) -> Result<Self, GeometryError> {
+        if a.is_finite() && 0.0 < b && b <= a {
+            Ok(Self { a, b })
+        } else {
+            Err(GeometryError::Semiaxes { a, b })
+        }
+    }
+
+    /// The semi-major axis.
+    pub fn a(&self) -> f64 {
+        self.a
+    }
+
+    /// The semi-minor axis.
+    pub fn b(&self) -> f64 {
+        self.b
+    }
+
+    /// a^2 - b^2, free of cancellation.
+    fn focal_square(&self) -> f64 {
+        (self.a - self.b) * (self.a + self.b)
+    }
+
+    /// Geocentric X, Y, Z of a geographic position.
+    pub fn geocentric(&self, position: Vector3) -> Vector3 {
+        let [longitude, latitude, height] = position;
+        let ((sl, cl), (sp, cp)) = (longitude.sin_cos(), latitude.sin_cos());
+        let w = self.w(sp);
+        let normal = self.a / w;
+        let polar = self.b * (self.b / self.a) / w;
+        [(normal + height) * cp * cl, (normal + height) * cp * sl, (polar + height) * sp]
+    }
+
+    /// Geocentric X, Y, Z and the matrix whose columns are its partial derivatives with respect to longitude,
+    /// latitude, height.
+    ///
+    /// The columns are east, north and up, the first two multiplied by the radii (N + h) cos lat and (M + h).
+    pub fn geocentric_with_partials(&self, position: Vector3) -> (Vector3, Matrix3) {
+        let [longitude, latitude, height] = position;
+        let [east, north, up] = local_vertical(longitude, latitude);
+        let (sp, cp) = latitude.sin_cos();
+        let w = self.w(sp);
+        let parallel = (self.a / w + height) * cp;
+        let meridian = self.b * (self.b / self.a) / (w * w * w) + height;
+        let partials = std::array::from_fn(|i| [parallel * east[i], meridian * north[i], up[i]]);
+        (self.geocentric(position), partials)
+    }
+
+    /// Longitude, latitude and height of a geocentric position.
+    ///
+    /// Bowring's formula for the reduced latitude beta (Survey Review 1976), which is Newton's method for it,
+    /// repeated until nothing changes: to the rounding of the coordinates at any height above the evolute, at
+    /// the poles too (longitude 0 there). The centre of the ellipsoid, where the latitude is arbitrary, has
+    /// the latitude 0.
+    pub fn geographic(&self, xyz: Vector3) -> Vector3 {
+        const MOST_STEPS: usize = 20;
+        let [x, y, z] = xyz;
+        let axis_distance = x.hypot(y);
+        let focal = self.focal_square();
+        let mut beta = (self.a * z).atan2(self.b * axis_distance);
+        let mut latitude = beta;
+        for _ in 0..MOST_STEPS {
+            let (sb, cb) = beta.sin_cos();
+            let north = z + focal / self.b * sb.powi(3);
+            let out = axis_distance - focal / self.a * cb.powi(3);
+            latitude = north.atan2(out);
+            let next = (self.b * north).atan2(self.a * out);
+            let change = next - beta;
+            beta = next;
+            if change.abs() <= f64::EPSILON {
+                break;
+            }
+        }
+        let (sp, cp) = latitude.sin_cos();
+        let height = axis_distance * cp + z * sp - self.a * self.w(sp);
+        [y.atan2(x), latitude, height]
+    }
+
+    /// W = sqrt(1 - e^2 sin^2 lat); the radius of curvature in the prime vertical is N = a / W.
+    fn w(&self, sin_latitude: f64) -> f64 {
+        (1.0 - self.focal_square() / (self.a * self.a) * sin_latitude * sin_latitude).sqrt()
+    }
+}
+
+/// R, the rotation from geocentric axes to the local vertical frame: its rows are east, north and up.
+pub fn local_vertical(longitude: f64, latitude: f64) -> Matrix3 {
+    let ((sl, cl), (sp, cp)) = (longitude.sin_cos(), latitude.sin_cos());
+    [[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]]
+}
+
+/// R and its partial derivatives with respect to longitude and latitude.
+pub fn local_vertical_with_partials(longitude: f64, latitude: f64) -> (Matrix3, [Matrix3; 2]) {
+    let r = local_vertical(longitude, latitude);
+    let by_longitude = std::array::from_fn(|i| [-r[i][1], r[i][0], 0.0]);
+    let by_latitude = [[0.0; 3], r[2].map(|value| -value), r[1]];
+    (r, [by_longitude, by_latitude])
+}

@@ -1,0 +1,332 @@
+//! Geometry against complex-step derivatives, inverses, and figures of the GIANT sample listing.
+
+#![allow(clippy::panic, clippy::unwrap_used)]
+
+use num_complex::Complex64;
+use photocore::geometry::{
+    Ellipsoid, GeometryError, ObjectSpace, Photo, Point, RotationSense, Vector3, rotation, rotation_angles,
+};
+use proptest::prelude::*;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+type C = Complex64;
+
+const WGS84: (f64, f64) = (6_378_137.0, 6_356_752.314_245_179);
+
+fn wgs84() -> Ellipsoid {
+    Ellipsoid::new(WGS84.0, WGS84.1).unwrap()
+}
+
+/// The collinearity equations written out once more, as a chain of single rotations about axes, for complex
+/// arguments.
+mod forward {
+    use super::C;
+
+    fn about_axis(axis: usize, angle: C, v: [C; 3]) -> [C; 3] {
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut out = v;
+        out[j] = angle.cos() * v[j] + angle.sin() * v[k];
+        out[k] = -angle.sin() * v[j] + angle.cos() * v[k];
+        out
+    }
+
+    fn geocentric(a: f64, b: f64, [longitude, latitude, height]: [C; 3]) -> [C; 3] {
+        let (n, d) = (a * a, (a * a * latitude.cos().powi(2) + b * b * latitude.sin().powi(2)).sqrt());
+        let out = (n / d + height) * latitude.cos();
+        [out * longitude.cos(), out * longitude.sin(), (b * b / d + height) * latitude.sin()]
+    }
+
+    /// x, y of the nine unknowns: position, omega, phi, kappa of the photo, then the point.
+    pub fn project(spheroid: Option<(f64, f64)>, to_ground: bool, c: f64, unknowns: &[C; 9]) -> [C; 2] {
+        let [p0, p1, p2, omega, phi, kappa, q0, q1, q2] = *unknowns;
+        let mut d = match spheroid {
+            None => [q0 - p0, q1 - p1, q2 - p2],
+            Some((a, b)) => {
+                let (centre, point) = (geocentric(a, b, [p0, p1, p2]), geocentric(a, b, [q0, q1, q2]));
+                let d: [C; 3] = std::array::from_fn(|i| point[i] - centre[i]);
+                // East, north, up: turn the x axis east, then tilt the z axis to the zenith.
+                let quarter = C::new(std::f64::consts::FRAC_PI_2, 0.0);
+                about_axis(0, quarter - p1, about_axis(2, quarter + p0, d))
+            }
+        };
+        if to_ground {
+            for (axis, angle) in [(2, -kappa), (1, -phi), (0, -omega)] {
+                d = about_axis(axis, angle, d);
+            }
+        } else {
+            for (axis, angle) in [(0, omega), (1, phi), (2, kappa)] {
+                d = about_axis(axis, angle, d);
+            }
+        }
+        [c * d[0] / d[2], c * d[1] / d[2]]
+    }
+}
+
+/// A photo and an image point with its distance to the object: in rectangular space when `spheroid` is None.
+#[derive(Debug, Clone)]
+struct Case {
+    spheroid: Option<(f64, f64)>,
+    sense: RotationSense,
+    position: Vector3,
+    attitude: Vector3,
+    c: f64,
+    xy: [f64; 2],
+    distance: f64,
+}
+
+impl Case {
+    fn space(&self) -> ObjectSpace {
+        match self.spheroid {
+            None => ObjectSpace::Rectangular,
+            Some((a, b)) => ObjectSpace::Geographic(Ellipsoid::new(a, b).unwrap()),
+        }
+    }
+
+    fn photo(&self) -> Photo {
+        Photo::new(self.space(), self.sense, self.position, self.attitude, self.c)
+    }
+
+    /// Coordinates of the point seen at `xy`.
+    fn coordinates(&self) -> Vector3 {
+        let ray = self.photo().ray(self.xy);
+        let cartesian = std::array::from_fn(|i| ray.origin[i] + self.distance * ray.direction[i]);
+        match self.space() {
+            ObjectSpace::Rectangular => cartesian,
+            ObjectSpace::Geographic(ellipsoid) => ellipsoid.geographic(cartesian),
+        }
+    }
+}
+
+prop_compose! {
+    fn cases()(
+        geographic in any::<bool>(),
+        to_ground in any::<bool>(),
+        positive in any::<bool>(),
+        unit in prop::array::uniform3(-1.0..1.0f64),
+        height in 100.0..12_000.0f64,
+        attitude in (-1.2..1.2f64, -1.2..1.2f64, -PI..PI),
+        xy in prop::array::uniform2(-115.0..115.0f64),
+        distance in 100.0..12_000.0f64,
+    ) -> Case {
+        let position = if geographic {
+            [PI * unit[0], 0.99 * FRAC_PI_2 * unit[1], height]
+        } else {
+            unit.map(|value| 1e5 * value)
+        };
+        Case {
+            spheroid: geographic.then_some(WGS84),
+            sense: if to_ground { RotationSense::PhotoToGround } else { RotationSense::GroundToPhoto },
+            position,
+            attitude: attitude.into(),
+            c: if positive { -152.74 } else { 152.74 },
+            xy,
+            distance,
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn partials_agree_with_complex_steps(case in cases()) {
+        const STEP: f64 = 1e-100;
+        let coordinates = case.coordinates();
+        let projection = case.photo().linearize(&Point::new(case.space(), coordinates));
+        let mut unknowns = [C::ZERO; 9];
+        for (unknown, value) in
+            unknowns.iter_mut().zip([case.position, case.attitude, coordinates].concat())
+        {
+            *unknown = C::new(value, 0.0);
+        }
+        let to_ground = case.sense == RotationSense::PhotoToGround;
+        let derivatives: [[f64; 2]; 9] = std::array::from_fn(|k| {
+            let mut stepped = unknowns;
+            stepped[k].im = STEP;
+            forward::project(case.spheroid, to_ground, case.c, &stepped).map(|value| value.im / STEP)
+        });
+        // Longitude and latitude in units of length, so that all columns of a group weigh alike in the norm.
+        let radius = case.spheroid.map_or(1.0, |(a, _)| a);
+        let unit = [radius, radius, 1.0];
+        for i in 0..2 {
+            let photo = projection.photo[i];
+            let (position, attitude) = ([photo[0], photo[1], photo[2]], [photo[3], photo[4], photo[5]]);
+            let groups = [position, attitude, projection.point[i]];
+            for (group, analytic) in groups.iter().enumerate() {
+                let unit = if group == 1 { [1.0; 3] } else { unit };
+                let numeric: Vector3 = std::array::from_fn(|k| derivatives[3 * group + k][i] / unit[k]);
+                let norm = numeric.iter().map(|value| value * value).sum::<f64>().sqrt();
+                for k in 0..3 {
+                    let difference = (analytic[k] / unit[k] - numeric[k]).abs();
+                    prop_assert!(difference <= 1e-10 * norm, "{i} {group} {k}: {difference:e} of {norm:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_ray_leads_back_to_its_image(case in cases()) {
+        let point = Point::new(case.space(), case.coordinates());
+        let projection = case.photo().linearize(&point);
+        let (projected, direction) = (case.photo().project(&point), case.photo().ray(case.xy).direction);
+        prop_assert!((direction.iter().map(|v| v * v).sum::<f64>() - 1.0).abs() < 1e-14);
+        for i in 0..2 {
+            // A rounding of 1e-9 m of the geocentric coordinates, seen from the distance of the point.
+            let tolerance = 1e-10 + 4.0 * 152.74 * 5e-9 / case.distance;
+            prop_assert!((projected[i] - case.xy[i]).abs() < tolerance);
+            prop_assert_eq!(projected[i].to_bits(), projection.xy[i].to_bits());
+        }
+    }
+
+    #[test]
+    fn angles_come_back_from_the_matrix(
+        omega in -PI..PI, phi in -FRAC_PI_2..FRAC_PI_2, kappa in -PI..PI, close in 0.0..1.0f64,
+    ) {
+        let angles = [omega, phi * (1.0 - close.powi(8)), kappa];
+        let m = rotation(angles);
+        let back = rotation_angles(&m);
+        // omega and kappa lose digits as phi nears a right angle, the matrix does not.
+        let loss = 1e-14 / angles[1].cos();
+        for k in 0..3 {
+            prop_assert!((angles[k] - back[k]).sin().abs() < loss);
+        }
+        prop_assert!(largest_difference(&m, &rotation(back)) < 4e-15);
+    }
+
+    #[test]
+    fn geographic_positions_come_back(
+        longitude in -PI..PI,
+        latitude in -FRAC_PI_2..FRAC_PI_2,
+        near in 0.0..1.0f64,
+        height in -1e5..5e7f64,
+        low in any::<bool>(),
+    ) {
+        // Half of the cases crowd towards a pole.
+        let pole = FRAC_PI_2.copysign(latitude);
+        let latitude = if near < 0.5 { pole * (1.0 - near.powi(20)) } else { latitude };
+        let height = if low { height / 5e4 } else { height };
+        let ellipsoid = wgs84();
+        let xyz = ellipsoid.geocentric([longitude, latitude, height]);
+        let back = ellipsoid.geographic(xyz);
+        // Four roundings of a geocentric coordinate are all that may be lost: 4e-9 m near the ground.
+        let tolerance = 1e-9f64.max(4.0 * f64::EPSILON * (WGS84.0 + height));
+        let again = ellipsoid.geocentric(back);
+        for k in 0..3 {
+            prop_assert!((xyz[k] - again[k]).abs() <= tolerance, "{xyz:?} {again:?}");
+        }
+        prop_assert!((back[2] - height).abs() <= tolerance, "{height} {}", back[2]);
+        prop_assert!((back[1] - latitude).abs() * (WGS84.0 + height) <= tolerance, "{latitude} {}", back[1]);
+    }
+}
+
+fn largest_difference(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> f64 {
+    (0..9).map(|k| (a[k / 3][k % 3] - b[k / 3][k % 3]).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn rotations_with_a_right_angled_phi_still_give_the_matrix() {
+    for phi in [FRAC_PI_2, -FRAC_PI_2] {
+        for (omega, kappa) in [(0.3, 1.0), (-2.0, 0.5), (3.0, -3.0)] {
+            let m = rotation([omega, phi, kappa]);
+            let back = rotation_angles(&m);
+            assert!((back[1] - phi).abs() < 1e-7);
+            assert!(largest_difference(&m, &rotation(back)) < 1e-15);
+        }
+    }
+}
+
+#[test]
+fn positive_omega_lifts_the_left_wing() {
+    // Image axis y turns towards z: the object vector +z appears on +y.
+    let m = rotation([0.1, 0.0, 0.0]);
+    assert!(m[1][2] > 0.0 && m[0] == [1.0, 0.0, 0.0]);
+    assert!(rotation([0.0, 0.1, 0.0])[2][0] > 0.0);
+    assert!(rotation([0.0, 0.0, 0.1])[0][1] > 0.0);
+}
+
+#[test]
+fn poles_axis_and_centre_are_finite() {
+    let ellipsoid = wgs84();
+    let (a, b) = WGS84;
+    assert_eq!(ellipsoid.geographic([a + 10.0, 0.0, 0.0]), [0.0, 0.0, 10.0]);
+    for sign in [1.0, -1.0] {
+        let [_, latitude, height] = ellipsoid.geographic([0.0, 0.0, sign * (b + 100.0)]);
+        assert!((latitude - sign * FRAC_PI_2).abs() < 1e-15 && (height - 100.0).abs() < 2e-9);
+    }
+    for xyz in [[0.0; 3], [1e-3, 0.0, 0.0], [0.0, 1.0, 1e-9], [1e4, 1e4, -1e4], [1e-300, 0.0, 1.0]] {
+        assert!(ellipsoid.geographic(xyz).iter().all(|value| value.is_finite()), "{xyz:?}");
+    }
+}
+
+#[test]
+fn spheroids_are_checked() {
+    for (a, b) in
+        [(1.0, 2.0), (1.0, 0.0), (1.0, -1.0), (f64::INFINITY, 1.0), (f64::NAN, 1.0), (1.0, f64::NAN)]
+    {
+        assert!(matches!(Ellipsoid::new(a, b), Err(GeometryError::Semiaxes { .. })), "{a} {b}");
+    }
+    assert!(Ellipsoid::new(1.0, 1.0).is_ok());
+}
+
+fn dms(degrees: f64, minutes: f64, seconds: f64) -> f64 {
+    (degrees.abs() + minutes / 60.0 + seconds / 3600.0).copysign(degrees).to_radians()
+}
+
+/// Adjusted stations of the GIANT sample (pages 30 and 41): longitude, latitude, height, omega, phi, kappa
+/// photo-to-ground.
+fn sample_photo(frame: &str) -> Photo {
+    let (position, attitude) = match frame {
+        "SH9960" => (
+            [dms(-94.0, 59.0, 4.7584), dms(29.0, 39.0, 17.7712), 4556.0633],
+            [dms(-0.0, 41.0, 24.3710), dms(-0.0, 10.0, 17.9138), dms(236.0, 45.0, 7.6484)],
+        ),
+        "SH9961" => (
+            [dms(-95.0, 0.0, 5.2715), dms(29.0, 40.0, 34.3562), 4555.3282],
+            [dms(0.0, 28.0, 23.6767), dms(-0.0, 19.0, 39.0393), dms(238.0, 42.0, 43.8987)],
+        ),
+        "SH9962" => (
+            [dms(-95.0, 0.0, 59.4571), dms(29.0, 41.0, 40.8605), 4553.1973],
+            [dms(0.0, 15.0, 18.4795), dms(0.0, 9.0, 20.8849), dms(236.0, 41.0, 42.8541)],
+        ),
+        other => panic!("{other} is not in the sample"),
+    };
+    let space = ObjectSpace::Geographic(Ellipsoid::CLARKE_1866);
+    Photo::new(space, RotationSense::PhotoToGround, position, attitude, -152.740)
+}
+
+/// Adjusted points of the GIANT sample (page 34).
+fn sample_point(name: &str) -> Point {
+    let coordinates = match name {
+        "126!" => [dms(-94.0, 59.0, 38.7142), dms(29.0, 39.0, 54.7204), 3.374],
+        "SH960801" => [dms(-95.0, 0.0, 21.0798), dms(29.0, 39.0, 29.2370), 1.8029],
+        "SH960202" => [dms(-94.0, 58.0, 34.9651), dms(29.0, 41.0, 15.9415), 0.0005],
+        other => panic!("{other} is not in the sample"),
+    };
+    Point::new(ObjectSpace::Geographic(Ellipsoid::CLARKE_1866), coordinates)
+}
+
+#[test]
+fn the_giant_sample_projects_as_computed() {
+    for (frame, point, x, y) in [
+        ("SH9960", "126!", 49.2050, 2.8573),
+        ("SH9961", "126!", -46.4852, 2.0476),
+        ("SH9960", "SH960801", 47.9577, 49.0819),
+        ("SH9961", "SH960801", -49.2251, 48.4082),
+        ("SH9960", "SH960202", 88.5056, -91.9543),
+        ("SH9962", "SH960202", -93.3361, -93.9861),
+    ] {
+        let [px, py] = sample_photo(frame).project(&sample_point(point));
+        assert!((px - x).abs() < 1e-3 && (py - y).abs() < 1e-3, "{frame} {point}: {px} {py}");
+    }
+}
+
+#[test]
+fn both_senses_of_the_angles_are_transposes() {
+    let to_ground = [-0.690103056f64, -0.171642722, 236.752124556].map(f64::to_radians);
+    let to_photo = [-0.521909344f64, 0.483031176, 123.249041752];
+    let m = rotation(to_ground);
+    let transposed = std::array::from_fn(|i| std::array::from_fn(|j| m[j][i]));
+    for (angle, expected) in rotation_angles(&transposed).into_iter().zip(to_photo) {
+        assert!((angle.to_degrees() - expected).abs() < 1e-8);
+    }
+}

@@ -1,0 +1,55 @@
+//! Rows of NumPy arrays: shapes are checked here, and what is wrong is said with the name of the argument.
+
+use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// The rows of an (n, N) array.
+pub fn rows<const N: usize>(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<[f64; N]>> {
+    match array.shape() {
+        [_, columns] if *columns == N => Ok(chunks(values(array))),
+        shape => Err(wrong_shape(name, &format!("(n, {N})"), shape)),
+    }
+}
+
+/// The matrices of an (n, N, N) array.
+pub fn matrices<const N: usize>(
+    name: &str,
+    array: &PyReadonlyArrayDyn<'_, f64>,
+) -> PyResult<Vec<[[f64; N]; N]>> {
+    match array.shape() {
+        [_, rows, columns] if [*rows, *columns] == [N, N] => Ok(chunks(chunks(values(array)))),
+        shape => Err(wrong_shape(name, &format!("(n, {N}, {N})"), shape)),
+    }
+}
+
+/// The numbers of an (n,) array.
+pub fn numbers(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<f64>> {
+    match array.shape() {
+        [_] => Ok(values(array)),
+        shape => Err(wrong_shape(name, "(n,)", shape)),
+    }
+}
+
+/// Refuses arrays whose lengths differ from the first one's.
+pub fn check_lengths(first: (&str, usize), others: &[(&str, usize)]) -> PyResult<()> {
+    match others.iter().find(|(_, length)| *length != first.1) {
+        None => Ok(()),
+        Some((name, length)) => {
+            Err(PyValueError::new_err(format!("{name} has {length} rows, but {} has {}", first.0, first.1)))
+        }
+    }
+}
+
+fn values(array: &PyReadonlyArrayDyn<'_, f64>) -> Vec<f64> {
+    array.as_array().iter().copied().collect()
+}
+
+fn chunks<T: Copy, const N: usize>(values: Vec<T>) -> Vec<[T; N]> {
+    values.as_chunks().0.to_vec()
+}
+
+fn wrong_shape(name: &str, expected: &str, shape: &[usize]) -> PyErr {
+    let shape = shape.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    PyValueError::new_err(format!("{name} has the shape ({shape}), not {expected}"))
+}

@@ -1,0 +1,104 @@
+//! The geometry functions, row by row over arrays; their documentation is in `_photocore.pyi`.
+
+use crate::arrays::{check_lengths, matrices, numbers, rows};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
+use photocore::geometry::{
+    self, Ellipsoid, GeometryError, ObjectSpace, Photo, Point, RotationSense, Vector3,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Adds the functions to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(rotation_matrix, module)?)?;
+    module.add_function(wrap_pyfunction!(rotation_angles, module)?)?;
+    module.add_function(wrap_pyfunction!(geographic_to_geocentric, module)?)?;
+    module.add_function(wrap_pyfunction!(geocentric_to_geographic, module)?)?;
+    module.add_function(wrap_pyfunction!(project, module)?)
+}
+
+#[pyfunction]
+fn rotation_matrix<'py>(
+    py: Python<'py>,
+    angles: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let angles = rows("angles", &angles)?;
+    let count = angles.len();
+    let matrices: Vec<_> = py.detach(|| angles.into_iter().map(geometry::rotation).collect());
+    PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, 3, 3])
+}
+
+#[pyfunction]
+fn rotation_angles<'py>(
+    py: Python<'py>,
+    matrices: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let matrices = self::matrices("matrices", &matrices)?;
+    table(py, py.detach(|| matrices.iter().map(geometry::rotation_angles).collect()))
+}
+
+#[pyfunction]
+fn geographic_to_geocentric<'py>(
+    py: Python<'py>,
+    positions: PyReadonlyArrayDyn<'py, f64>,
+    a: f64,
+    b: f64,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (positions, ellipsoid) = (rows("positions", &positions)?, ellipsoid((a, b))?);
+    table(py, py.detach(|| positions.into_iter().map(|position| ellipsoid.geocentric(position)).collect()))
+}
+
+#[pyfunction]
+fn geocentric_to_geographic<'py>(
+    py: Python<'py>,
+    xyz: PyReadonlyArrayDyn<'py, f64>,
+    a: f64,
+    b: f64,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (xyz, ellipsoid) = (rows("xyz", &xyz)?, ellipsoid((a, b))?);
+    table(py, py.detach(|| xyz.into_iter().map(|position| ellipsoid.geographic(position)).collect()))
+}
+
+#[pyfunction]
+#[pyo3(signature = (points, positions, attitudes, principal_distances, *, spheroid, photo_to_ground))]
+fn project<'py>(
+    py: Python<'py>,
+    points: PyReadonlyArrayDyn<'py, f64>,
+    positions: PyReadonlyArrayDyn<'py, f64>,
+    attitudes: PyReadonlyArrayDyn<'py, f64>,
+    principal_distances: PyReadonlyArrayDyn<'py, f64>,
+    spheroid: Option<(f64, f64)>,
+    photo_to_ground: bool,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let points: Vec<Vector3> = rows("points", &points)?;
+    let positions: Vec<Vector3> = rows("positions", &positions)?;
+    let attitudes: Vec<Vector3> = rows("attitudes", &attitudes)?;
+    let principal_distances = numbers("principal_distances", &principal_distances)?;
+    check_lengths(
+        ("points", points.len()),
+        &[
+            ("positions", positions.len()),
+            ("attitudes", attitudes.len()),
+            ("principal_distances", principal_distances.len()),
+        ],
+    )?;
+    let space = match spheroid {
+        None => ObjectSpace::Rectangular,
+        Some(axes) => ObjectSpace::Geographic(ellipsoid(axes)?),
+    };
+    let sense = if photo_to_ground { RotationSense::PhotoToGround } else { RotationSense::GroundToPhoto };
+    let image = |i: usize| {
+        let photo = Photo::new(space, sense, positions[i], attitudes[i], principal_distances[i]);
+        photo.project(&Point::new(space, points[i]))
+    };
+    table(py, py.detach(|| (0..points.len()).map(image).collect()))
+}
+
+fn ellipsoid((a, b): (f64, f64)) -> PyResult<Ellipsoid> {
+    Ellipsoid::new(a, b).map_err(|error: GeometryError| PyValueError::new_err(error.to_string()))
+}
+
+fn table<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let count = rows.len();
+    PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
+}

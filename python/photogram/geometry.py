@@ -1,0 +1,155 @@
+"""Geometry: rotations, geographic and geocentric coordinates, projection into photos.
+
+Angles are radians, image coordinates millimetres, lengths the linear unit of the object space. Rotation,
+frames and collinearity follow the GIANT Program User's Guide (Elassal and Malhotra, NOAA 1987).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram import _photocore
+from photogram.errors import InputError
+
+__all__ = [
+    "Spheroid",
+    "geocentric_to_geographic",
+    "geographic_to_geocentric",
+    "project",
+    "rotation_angles",
+    "rotation_matrix",
+]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Spheroid:
+    """An ellipsoid of revolution. Its linear unit is that of the heights.
+
+    Parameters
+    ----------
+    a, b
+        Semi-major and semi-minor axis.
+
+    Raises
+    ------
+    InputError
+        Unless both are finite and 0 < b <= a.
+    """
+
+    a: float
+    b: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.a) and 0 < self.b <= self.a):
+            raise InputError(
+                f"a spheroid needs finite semi-axes with 0 < b <= a, not a = {self.a}, b = {self.b}"
+            )
+
+    @classmethod
+    def clarke_1866(cls) -> Spheroid:
+        """Clarke 1866 in metres, the default of GIANT."""
+        return cls(6378206.4, 6356583.8)
+
+    @classmethod
+    def wgs84(cls) -> Spheroid:
+        """WGS 84 in metres."""
+        return cls(6378137.0, 6356752.314245179)
+
+
+def rotation_matrix(angles: ArrayLike) -> Floats:
+    """Rotation matrices M = M_kappa M_phi M_omega, (n, 3, 3), of (n, 3) omega, phi, kappa in radians.
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    """
+    return _photocore.rotation_matrix(_floats(angles))
+
+
+def rotation_angles(matrices: ArrayLike) -> Floats:
+    """Angles omega, phi, kappa in radians, (n, 3), of (n, 3, 3) rotation matrices; phi lies in [-pi/2, pi/2].
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    """
+    return _photocore.rotation_angles(_floats(matrices))
+
+
+def geographic_to_geocentric(positions: ArrayLike, spheroid: Spheroid) -> Floats:
+    """Geocentric X, Y, Z, (n, 3), of (n, 3) longitude (rad, east positive), latitude (rad), height.
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    """
+    return _photocore.geographic_to_geocentric(_floats(positions), spheroid.a, spheroid.b)
+
+
+def geocentric_to_geographic(xyz: ArrayLike, spheroid: Spheroid) -> Floats:
+    """Longitude (rad), latitude (rad) and height, (n, 3), of (n, 3) geocentric X, Y, Z.
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    """
+    return _photocore.geocentric_to_geographic(_floats(xyz), spheroid.a, spheroid.b)
+
+
+def project(
+    points: ArrayLike,
+    positions: ArrayLike,
+    attitudes: ArrayLike,
+    principal_distances: ArrayLike,
+    *,
+    spheroid: Spheroid | None = None,
+    photo_to_ground: bool = False,
+) -> Floats:
+    """Project points into photos, row by row: point i into the photo of row i.
+
+    Parameters
+    ----------
+    points, positions
+        (n, 3) object points and projection centres: X, Y, Z, or longitude (rad), latitude (rad), height when
+        a spheroid is given.
+    attitudes
+        (n, 3) omega, phi, kappa in radians; with a spheroid relative to the local vertical frame of each
+        station.
+    principal_distances
+        (n,) in millimetres: negative for the positive (diapositive) plane, positive for the negative plane.
+    spheroid
+        None for rectangular space.
+    photo_to_ground
+        The sense of the angles; False is ground-to-photo.
+
+    Returns
+    -------
+    (n, 2) x, y in millimetres; not finite for a point in the plane of the projection centre.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, or different numbers of rows.
+    """
+    return _photocore.project(
+        _floats(points),
+        _floats(positions),
+        _floats(attitudes),
+        _floats(principal_distances),
+        spheroid=None if spheroid is None else (spheroid.a, spheroid.b),
+        photo_to_ground=photo_to_ground,
+    )
+
+
+def _floats(values: ArrayLike) -> Floats:
+    return np.asarray(values, dtype=np.float64)
