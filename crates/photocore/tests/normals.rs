@@ -19,9 +19,8 @@ struct Dense {
 }
 
 impl Equations for Dense {
-    fn write(&self, group: usize, rows: &mut GroupRows<'_>) {
+    fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let layout = &self.layout;
-        let local = (0..layout.locals()).find(|&i| layout.groups_of(i).contains(&group)).unwrap();
         let border_start = layout.border_range().start;
         let border = layout.border_of(group);
         let places: [(&mut [f64], Range<usize>); 3] = [

@@ -30,6 +30,16 @@ pub enum RotationSense {
     PhotoToGround,
 }
 
+impl ObjectSpace {
+    /// The coordinates of a cartesian position.
+    pub fn coordinates(self, position: Vector3) -> Vector3 {
+        match self {
+            ObjectSpace::Rectangular => position,
+            ObjectSpace::Geographic(ellipsoid) => ellipsoid.geographic(position),
+        }
+    }
+}
+
 /// A point: its cartesian position and the partials of that with respect to the three unknown coordinates.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
@@ -49,6 +59,12 @@ impl Point {
     #[inline]
     pub fn position(&self) -> Vector3 {
         self.position
+    }
+
+    /// Partials of the cartesian position with respect to the three coordinates, as columns.
+    #[inline]
+    pub fn partials(&self) -> &Matrix3 {
+        &self.partials
     }
 }
 

@@ -49,3 +49,13 @@ pub fn product(a: &Matrix3, b: &Matrix3) -> Matrix3 {
 pub fn transposed(a: &Matrix3) -> Matrix3 {
     std::array::from_fn(|i| [a[0][i], a[1][i], a[2][i]])
 }
+
+/// x of A x = b by Cramer's rule; None when the determinant is below `tolerance` times its largest possible value.
+pub fn solve(matrix: &Matrix3, b: &Vector3, tolerance: f64) -> Option<Vector3> {
+    let [p, q, r] = transposed(matrix);
+    let (qr, rp, pq) = (cross(&q, &r), cross(&r, &p), cross(&p, &q));
+    let determinant = dot(&p, &qr);
+    let largest = (dot(&p, &p) * dot(&q, &q) * dot(&r, &r)).sqrt();
+    let regular = determinant.abs() > tolerance * largest;
+    regular.then(|| [&qr, &rp, &pq].map(|minor| dot(b, minor) / determinant))
+}

@@ -9,8 +9,8 @@ use super::symbolic::Symbolic;
 ///
 /// The equations are `A x = l` with unit weight (each row divided by the standard deviation of its observation).
 pub trait Equations: Sync {
-    /// Writes the equations of one group; `rows` is zero on entry.
-    fn write(&self, group: usize, rows: &mut GroupRows<'_>);
+    /// Writes the equations of one group of a local block; `rows` is zero on entry.
+    fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>);
 }
 
 /// The rows of one group of equations, to be filled in. Matrices are row by row.
@@ -138,8 +138,16 @@ impl Elimination {
             }
             let range = layout.border_of(group);
             let (border_first, border_width) = (range.start, range.len());
-            let local = constant * l;
-            self.groups.push(GroupPlace { group, constant, local, kept, border, border_first, border_width });
+            let own = constant * l;
+            self.groups.push(GroupPlace {
+                group,
+                constant,
+                local: own,
+                kept,
+                border,
+                border_first,
+                border_width,
+            });
             constant += rows;
             kept += rows * dim;
             border += rows * border_width;
@@ -158,6 +166,7 @@ impl Elimination {
         for slot in &self.slots {
             for place in &self.groups[slot.first..slot.end] {
                 equations.write(
+                    local,
                     place.group,
                     &mut GroupRows {
                         constant: &mut self.constants[place.constant..][..rows],

@@ -1,1 +1,3 @@
 //! The photogrammetric models.
+
+pub mod block;

@@ -1,0 +1,424 @@
+//! Iteration to the least-squares solution.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use rayon::ThreadPool;
+use thiserror::Error;
+
+use super::problem::{Linearized, Model, Problem};
+use super::statistics::Counts;
+use crate::normals::{Cofactors, Factor, Normals, Operations, Ordering, Prior};
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Criterion {
+    /// When no unknown changes by more than this fraction of its standard deviation (a priori unit weight). Steps that
+    /// raise the sum of squares are damped (Levenberg-Marquardt).
+    Fraction(f64),
+    /// When the weighted sum of squares changes by less than this percentage from one iteration to the next, as in the
+    /// 1987 program (GIANT guide, section 6); no damping.
+    Percent(f64),
+}
+
+/// How to adjust.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// When to stop.
+    pub criterion: Criterion,
+    /// Iterations at the most.
+    pub max_iterations: usize,
+    /// Whether to compute cofactors and redundancy numbers.
+    pub covariance: bool,
+}
+
+/// How an adjustment ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// The criterion was met.
+    Converged,
+    /// The iterations ran out.
+    NotConverged,
+    /// The sum of squares rose, and no shorter step lowered it.
+    Diverged,
+}
+
+/// One iteration.
+#[derive(Debug, Clone, Copy)]
+pub struct Iteration {
+    /// From 1.
+    pub number: usize,
+    /// Weighted sum of squares after its corrections.
+    pub sum_of_squares: f64,
+    /// No unknown changed by more than this multiple of its standard deviation (a priori unit weight).
+    pub largest_change: f64,
+    /// Damping of its step; 0 for a Gauss-Newton step.
+    pub damping: f64,
+}
+
+/// What the adjustment is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Forming the normal equations.
+    Form,
+    /// Factoring them.
+    Factor,
+    /// Solving them.
+    Solve,
+    /// Inverting them.
+    Invert,
+    /// Computing cofactors and redundancy numbers.
+    Cofactors,
+}
+
+/// What is told while the adjustment runs.
+#[derive(Debug, Clone, Copy)]
+pub enum Event {
+    /// A phase has come so far: `done` of `total` local blocks.
+    Progress {
+        /// The phase.
+        phase: Phase,
+        /// Local blocks done.
+        done: usize,
+        /// Local blocks in all.
+        total: usize,
+    },
+    /// An iteration is over.
+    Iteration(Iteration),
+}
+
+/// Time spent in each phase, in seconds, over all iterations.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Seconds {
+    /// Forming, with the reduction of local blocks.
+    pub form: f64,
+    /// Factoring.
+    pub factor: f64,
+    /// Solving.
+    pub solve: f64,
+    /// Inverting.
+    pub invert: f64,
+    /// Cofactors and redundancy numbers.
+    pub cofactors: f64,
+}
+
+/// The adjusted unknowns and how good they are.
+#[derive(Debug)]
+pub struct Adjustment {
+    /// How it ended.
+    pub status: Status,
+    /// Weighted sum of squares at the initial values.
+    pub initial_sum_of_squares: f64,
+    /// Every iteration.
+    pub iterations: Vec<Iteration>,
+    /// Adjusted unknowns, in the order of the layout.
+    pub unknowns: Vec<f64>,
+    /// Observed minus computed, in the order of groups and rows, in the units of the observations.
+    pub residuals: Vec<f64>,
+    /// Cofactors (a priori unit weight), when asked for.
+    pub cofactors: Option<Cofactors>,
+    /// Redundancy number of each observation, when asked for.
+    pub redundancy: Option<Vec<f64>>,
+    /// Redundancy number of each unknown as an observation of itself (zero unless weighted), when asked for.
+    pub prior_redundancy: Option<Vec<f64>>,
+    /// Counts for the degrees of freedom.
+    pub counts: Counts,
+    /// Predicted multiply-adds of each phase, once.
+    pub operations: Operations,
+    /// Formations and factorisations carried out.
+    pub formations: usize,
+    /// Time by phase.
+    pub seconds: Seconds,
+    /// The ordering in force.
+    pub ordering: Ordering,
+}
+
+/// Why there is no adjustment.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum AdjustError {
+    /// Local blocks that their observations do not determine.
+    #[error("{} local blocks are not determined by their observations", .0.len())]
+    UndeterminedLocals(Vec<usize>),
+    /// Combinations of kept unknowns that the observations do not determine: for each the kept blocks it moves (the
+    /// border is the block after the last).
+    #[error("{} combinations of unknowns are not determined by the observations", .0.len())]
+    Undetermined(Vec<Vec<usize>>),
+    /// The initial values give observations that are not finite.
+    #[error("the initial values give computed observations that are not finite")]
+    NotFinite,
+    /// The caller asked to stop.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Adjusts a problem by least squares.
+///
+/// `watch` is called on the calling thread with what is going on; when it breaks, the adjustment stops.
+///
+/// # Errors
+/// Unknowns that are not determined, observations that cannot be computed, or an interruption.
+pub fn adjust<M: Model>(
+    problem: &Problem<M>,
+    options: &Options,
+    pool: &ThreadPool,
+    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+) -> Result<Adjustment, AdjustError> {
+    let mut run =
+        Run { problem, options, pool, watch, seconds: Seconds::default(), formations: 0, iterations: vec![] };
+    let start = run.form(problem.initial.clone(), 0.0)?;
+    if !start.sum_of_squares.is_finite() {
+        return Err(AdjustError::NotFinite);
+    }
+    let initial_sum_of_squares = start.sum_of_squares;
+    let end = match options.criterion {
+        Criterion::Fraction(fraction) => run.strictly(start, fraction)?,
+        Criterion::Percent(percent) => run.as_published(start, percent)?,
+    };
+    run.finish(end, initial_sum_of_squares)
+}
+
+/// The problem linearized at some values, and its normal equations.
+struct State<'a, M: Model> {
+    unknowns: Vec<f64>,
+    equations: Linearized<'a, M>,
+    prior: Prior,
+    normals: Normals,
+    damping: f64,
+    sum_of_squares: f64,
+}
+
+/// Normal equations solved.
+struct Solved<'a, M: Model> {
+    unknowns: Vec<f64>,
+    equations: Linearized<'a, M>,
+    prior: Prior,
+    factor: Factor,
+    step: Vec<f64>,
+    change: f64,
+}
+
+/// Where the iterations ended: the cofactors hold at the values of the last state; its step is the last to be applied.
+struct End<'a, M: Model> {
+    status: Status,
+    state: Solved<'a, M>,
+    last: Option<Iteration>,
+}
+
+struct Run<'a, 'w, M: Model> {
+    problem: &'a Problem<M>,
+    options: &'a Options,
+    pool: &'a ThreadPool,
+    watch: &'w mut dyn FnMut(Event) -> ControlFlow<()>,
+    seconds: Seconds,
+    formations: usize,
+    iterations: Vec<Iteration>,
+}
+
+/// A step is accepted when the sum of squares does not rise by more than its own rounding error.
+const ROUNDING: f64 = 1e-12;
+/// First damping after a step that failed; it falls by ten after a success, and below [`LEAST_DAMPING`] to zero.
+const FIRST_DAMPING: f64 = 1e-3;
+const LEAST_DAMPING: f64 = 1e-5;
+/// With this damping a step follows the gradient; if that does not lower the sum of squares, nothing will.
+const MOST_DAMPING: f64 = 1e9;
+
+impl<'a, M: Model> Run<'a, '_, M> {
+    /// Gauss-Newton with step control until the corrections are a small fraction of the standard deviations.
+    ///
+    /// With dx the step and N the normal matrix, dx_i^2 <= q_ii dx^T N dx (Cauchy-Schwarz), and dx^T N dx is the predicted
+    /// decrease of the sum of squares: its root bounds every correction in standard deviations, without an inverse.
+    fn strictly(&mut self, start: State<'a, M>, fraction: f64) -> Result<End<'a, M>, AdjustError> {
+        let mut state = start;
+        let mut best = state.sum_of_squares;
+        let mut number = 0;
+        loop {
+            number += 1;
+            let (unknowns, damping) = (state.unknowns.clone(), state.damping);
+            let solved = self.solve(state)?;
+            let converged = damping == 0.0 && solved.change <= fraction;
+            if converged {
+                let iteration =
+                    Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
+                return Ok(End { status: Status::Converged, state: solved, last: Some(iteration) });
+            }
+            let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
+            let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
+            let next = self.form(trial, relaxed)?;
+            // A sum of squares that is not a number is a failure too.
+            if next.sum_of_squares <= best * (1.0 + ROUNDING) {
+                best = next.sum_of_squares;
+                let iteration =
+                    Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
+                self.tell(iteration)?;
+                state = next;
+            } else {
+                state = self.form(unknowns, (10.0 * damping).max(FIRST_DAMPING))?;
+            }
+            let diverged = state.damping > MOST_DAMPING;
+            if diverged || number >= self.options.max_iterations {
+                let status = if diverged { Status::Diverged } else { Status::NotConverged };
+                return self.stay(state, status);
+            }
+        }
+    }
+
+    /// The iteration of the 1987 program: full steps until the sum of squares changes by less than `percent`.
+    fn as_published(&mut self, start: State<'a, M>, percent: f64) -> Result<End<'a, M>, AdjustError> {
+        let mut state = start;
+        let mut previous: Option<f64> = None;
+        let mut status = Status::NotConverged;
+        for number in 1..=self.options.max_iterations {
+            let unknowns = state.unknowns.clone();
+            let solved = self.solve(state)?;
+            let values = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
+            state = self.form(values, 0.0)?;
+            if !state.sum_of_squares.is_finite() {
+                state = self.form(unknowns, 0.0)?;
+                status = Status::Diverged;
+                break;
+            }
+            let sum_of_squares = state.sum_of_squares;
+            self.tell(Iteration { number, sum_of_squares, largest_change: solved.change, damping: 0.0 })?;
+            let change = previous.map(|before| (sum_of_squares - before) / before * 100.0);
+            status = match change {
+                Some(change) if change.abs() < percent => Status::Converged,
+                Some(change) if change >= percent => Status::Diverged,
+                _ => Status::NotConverged,
+            };
+            if status != Status::NotConverged {
+                break;
+            }
+            previous = Some(sum_of_squares);
+        }
+        self.stay(state, status)
+    }
+
+    /// Ends at the values reached, without a further step.
+    fn stay(&mut self, state: State<'a, M>, status: Status) -> Result<End<'a, M>, AdjustError> {
+        let state = if state.damping == 0.0 { state } else { self.form(state.unknowns, 0.0)? };
+        let step = vec![0.0; state.unknowns.len()];
+        let factor = self.factor(state.normals)?;
+        let (unknowns, equations, prior) = (state.unknowns, state.equations, state.prior);
+        let state = Solved { unknowns, equations, prior, factor, step, change: 0.0 };
+        Ok(End { status, state, last: None })
+    }
+
+    fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
+        let start = Instant::now();
+        let equations = Linearized::new(self.problem, &unknowns);
+        let prior = self.problem.prior_equations(&unknowns);
+        let total = self.problem.layout().locals();
+        let mut between = between(&mut *self.watch, Phase::Form, total);
+        let formed = self.problem.system.form(self.pool, &equations, &prior, damping, &mut between);
+        let ControlFlow::Continue(normals) = formed else { return Err(AdjustError::Interrupted) };
+        let sum_of_squares = normals.sum_of_squares + self.problem.prior_sum_of_squares(&unknowns);
+        self.seconds.form += start.elapsed().as_secs_f64();
+        self.formations += 1;
+        Ok(State { unknowns, equations, prior, normals, damping, sum_of_squares })
+    }
+
+    fn factor(&mut self, normals: Normals) -> Result<Factor, AdjustError> {
+        let start = Instant::now();
+        self.enter(Phase::Factor)?;
+        if !normals.deficient_locals.is_empty() {
+            return Err(AdjustError::UndeterminedLocals(normals.deficient_locals));
+        }
+        let factor = normals.factor(self.pool).map_err(|found| AdjustError::Undetermined(found.blocks()))?;
+        self.seconds.factor += start.elapsed().as_secs_f64();
+        Ok(factor)
+    }
+
+    fn solve(&mut self, state: State<'a, M>) -> Result<Solved<'a, M>, AdjustError> {
+        let local_decrease = state.normals.local_decrease;
+        let factor = self.factor(state.normals)?;
+        let start = Instant::now();
+        let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
+        let system = &self.problem.system;
+        let solved =
+            system.solve(self.pool, &factor, &state.equations, &state.prior, state.damping, &mut between);
+        let ControlFlow::Continue(solution) = solved else { return Err(AdjustError::Interrupted) };
+        self.seconds.solve += start.elapsed().as_secs_f64();
+        Ok(Solved {
+            unknowns: state.unknowns,
+            equations: state.equations,
+            prior: state.prior,
+            factor,
+            step: solution.values,
+            change: (local_decrease + solution.decrease).sqrt(),
+        })
+    }
+
+    fn finish(mut self, end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
+        let problem = self.problem;
+        let Solved { mut unknowns, equations, prior, factor, step, .. } = end.state;
+        unknowns.iter_mut().zip(&step).for_each(|(x, dx)| *x += dx);
+        let residuals = problem.residuals(self.pool, &unknowns);
+        if let Some(last) = end.last {
+            let sum_of_squares = problem.sum_of_squares(&residuals) + problem.prior_sum_of_squares(&unknowns);
+            self.tell(Iteration { sum_of_squares, ..last })?;
+        }
+        let cofactors =
+            if self.options.covariance { Some(self.cofactors(factor, &equations, &prior)?) } else { None };
+        let redundancy =
+            |cofactors: &Cofactors| cofactors.equations.iter().map(|share| 1.0 - share).collect();
+        Ok(Adjustment {
+            status: end.status,
+            initial_sum_of_squares,
+            iterations: self.iterations,
+            unknowns,
+            residuals,
+            redundancy: cofactors.as_ref().map(redundancy),
+            prior_redundancy: cofactors.as_ref().map(|cofactors| problem.prior_redundancy(cofactors)),
+            cofactors,
+            counts: problem.counts(),
+            operations: problem.system.symbolic().operations(problem.layout()),
+            formations: self.formations,
+            seconds: self.seconds,
+            ordering: problem.system.symbolic().ordering(),
+        })
+    }
+
+    fn cofactors(
+        &mut self,
+        factor: Factor,
+        equations: &Linearized<'a, M>,
+        prior: &Prior,
+    ) -> Result<Cofactors, AdjustError> {
+        let start = Instant::now();
+        self.enter(Phase::Invert)?;
+        let inverse = factor.into_selected_inverse(self.pool);
+        self.seconds.invert = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let mut between = between(&mut *self.watch, Phase::Cofactors, self.problem.layout().locals());
+        let found = self.problem.system.cofactors(self.pool, &inverse, equations, prior, &mut between);
+        let ControlFlow::Continue(mut cofactors) = found else { return Err(AdjustError::Interrupted) };
+        self.problem.clear_fixed(&mut cofactors);
+        self.seconds.cofactors = start.elapsed().as_secs_f64();
+        Ok(cofactors)
+    }
+
+    fn enter(&mut self, phase: Phase) -> Result<(), AdjustError> {
+        let total = self.problem.layout().locals();
+        stopped((self.watch)(Event::Progress { phase, done: 0, total }))
+    }
+
+    fn tell(&mut self, iteration: Iteration) -> Result<(), AdjustError> {
+        self.iterations.push(iteration);
+        stopped((self.watch)(Event::Iteration(iteration)))
+    }
+}
+
+fn stopped(flow: ControlFlow<()>) -> Result<(), AdjustError> {
+    match flow {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(AdjustError::Interrupted),
+    }
+}
+
+fn between(
+    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    phase: Phase,
+    total: usize,
+) -> impl FnMut(usize) -> ControlFlow<()> {
+    move |done| watch(Event::Progress { phase, done, total })
+}

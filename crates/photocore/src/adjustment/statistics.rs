@@ -1,0 +1,115 @@
+//! Counts, residuals and redundancy numbers.
+
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::problem::{Model, Problem};
+use crate::normals::{Cofactors, GroupRows};
+
+/// What an adjustment counts. The degrees of freedom are `observations + weighted - unknowns`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counts {
+    /// Observations proper.
+    pub observations: usize,
+    /// Unknowns that are observed themselves (a finite standard deviation, not zero).
+    pub weighted: usize,
+    /// Unknowns that are not fixed.
+    pub unknowns: usize,
+}
+
+impl<M> Problem<M> {
+    /// Counts observations and unknowns.
+    pub fn counts(&self) -> Counts {
+        Counts {
+            observations: self.observation_sd.len(),
+            weighted: (0..self.sd.len()).filter(|&unknown| self.is_weighted(unknown)).count(),
+            unknowns: self.sd.iter().filter(|&&sd| sd != 0.0).count(),
+        }
+    }
+
+    /// Redundancy number of each unknown as an observation of itself, 1 - w q; zero unless it is weighted.
+    pub(super) fn prior_redundancy(&self, cofactors: &Cofactors) -> Vec<f64> {
+        let mut redundancy = vec![0.0; self.sd.len()];
+        self.for_diagonal(cofactors, |unknown, q| {
+            if self.is_weighted(unknown) {
+                redundancy[unknown] = 1.0 - q / (self.sd[unknown] * self.sd[unknown]);
+            }
+        });
+        redundancy
+    }
+
+    /// Sets the cofactors of fixed unknowns, which stand in the normal equations with unit weight, to zero.
+    pub(super) fn clear_fixed(&self, cofactors: &mut Cofactors) {
+        let layout = self.layout();
+        let l = layout.local_dim();
+        let clear = |block: &mut [f64], first: usize, dim: usize| {
+            (0..dim).filter(|d| self.sd[first + d] == 0.0).for_each(|d| block[d * dim + d] = 0.0);
+        };
+        for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
+            clear(block, local * l, l);
+        }
+        let mut start = 0;
+        for kept in 0..layout.kept() {
+            let dim = layout.kept_dim(kept);
+            clear(&mut cofactors.kept[start..], layout.kept_range(kept).start, dim);
+            start += dim * dim;
+        }
+        clear(&mut cofactors.border, layout.border_range().start, layout.border_dim());
+    }
+
+    /// Hands out the cofactor of every unknown.
+    fn for_diagonal(&self, cofactors: &Cofactors, mut take: impl FnMut(usize, f64)) {
+        let layout = self.layout();
+        let l = layout.local_dim();
+        for unknown in layout.all_locals() {
+            take(unknown, cofactors.local[unknown / l * l * l + unknown % l * (l + 1)]);
+        }
+        let mut start = 0;
+        for kept in 0..layout.kept() {
+            let dim = layout.kept_dim(kept);
+            for (d, unknown) in layout.kept_range(kept).enumerate() {
+                take(unknown, cofactors.kept[start + d * (dim + 1)]);
+            }
+            start += dim * dim;
+        }
+        for (d, unknown) in layout.border_range().enumerate() {
+            take(unknown, cofactors.border[d * (layout.border_dim() + 1)]);
+        }
+    }
+}
+
+impl<M: Model> Problem<M> {
+    /// Observed minus computed of every observation at the given values of the unknowns.
+    pub(super) fn residuals(&self, pool: &ThreadPool, values: &[f64]) -> Vec<f64> {
+        let layout = self.layout();
+        let rows = layout.rows();
+        let prepared = self.model.prepare(values);
+        let residuals_of = |local: usize| {
+            let groups = layout.groups_of(local);
+            let mut residuals = vec![0.0; groups.len() * rows];
+            let mut local_part = vec![0.0; rows * layout.local_dim()];
+            let (mut kept, mut border) = (Vec::new(), Vec::new());
+            for (group, constant) in groups.zip(residuals.chunks_exact_mut(rows)) {
+                kept.resize(rows * layout.kept_dim(layout.kept_of(group)), 0.0);
+                border.resize(rows * layout.border_of(group).len(), 0.0);
+                let mut part =
+                    GroupRows { constant, local: &mut local_part, kept: &mut kept, border: &mut border };
+                self.model.observe(&prepared, local, group, &mut part);
+            }
+            residuals
+        };
+        let by_local: Vec<Vec<f64>> = pool
+            .install(|| (0..layout.locals()).into_par_iter().with_min_len(64).map(residuals_of).collect());
+        by_local.concat()
+    }
+
+    /// Weighted sum of squares of the given residuals.
+    pub(super) fn sum_of_squares(&self, residuals: &[f64]) -> f64 {
+        residuals.iter().zip(&self.observation_sd).map(|(residual, sd)| (residual / sd).powi(2)).sum()
+    }
+
+    /// Weighted sum of squares of observed minus computed unknowns.
+    pub(super) fn prior_sum_of_squares(&self, values: &[f64]) -> f64 {
+        values.iter().enumerate().map(|(unknown, &value)| self.prior_square(unknown, value)).sum()
+    }
+}

@@ -1,0 +1,124 @@
+//! Initial coordinates of points: the intersection of their rays from the initial photographs.
+
+use super::{Block, BlockError, PointImages};
+use crate::geometry::vector::{difference, dot, solve};
+use crate::geometry::{Photo, Point, Ray, Vector3};
+
+/// Determinant of the normal matrix, relative to its largest possible value, below which rays count as parallel
+/// (about a hundredth of a degree between two rays).
+const PARALLEL: f64 = 1e-8;
+
+impl Block {
+    /// Initial coordinates of the points that take part: held components as they are, the others where the rays meet.
+    ///
+    /// Rays from coarse photographs may be parallel or meet behind a camera; such a point starts on its first ray, as far out
+    /// as the median of the others.
+    pub(super) fn initial_coordinates(
+        &self,
+        points: &[usize],
+        images: &PointImages,
+    ) -> Result<Vec<Vector3>, BlockError> {
+        let photos: Vec<Photo> = self
+            .photos
+            .iter()
+            .map(|p| Photo::new(self.space, self.sense, p.position, p.attitude, p.principal_distance))
+            .collect();
+        let rays_of = |index: usize| -> Vec<Ray> {
+            let own = &images.order[images.start[index]..images.start[index + 1]];
+            own.iter().map(|&image| photos[self.images[image].photo].ray(self.images[image].xy)).collect()
+        };
+        let met: Vec<Option<Vector3>> = (0..points.len()).map(|index| meet(&rays_of(index))).collect();
+        let distance = median_distance(&met, rays_of);
+        let mut coordinates = Vec::with_capacity(points.len());
+        for (index, (&point, met)) in points.iter().zip(met).enumerate() {
+            let rays = rays_of(index);
+            let start = match (met, distance) {
+                (Some(position), _) => self.space.coordinates(position),
+                (None, Some(distance)) => self.space.coordinates(along(&rays[0], distance)),
+                (None, None) => self.points[point].coordinates,
+            };
+            let placed = self.hold(point, start, &rays);
+            if placed.iter().any(|value| !value.is_finite()) {
+                return Err(BlockError::NoIntersection(point));
+            }
+            coordinates.push(placed);
+        }
+        Ok(coordinates)
+    }
+
+    /// Puts the held components in place and moves the others to where the rays then pass nearest: least squares of the distances
+    /// from the rays, linear in rectangular space and all but linear in geographic space.
+    fn hold(&self, point: usize, start: Vector3, rays: &[Ray]) -> Vector3 {
+        let point = &self.points[point];
+        let held = point.held();
+        let mut coordinates = std::array::from_fn(|k| match (held[k], start[k].is_finite()) {
+            (true, _) => point.coordinates[k],
+            (false, true) => start[k],
+            (false, false) => 0.0,
+        });
+        if held == [false; 3] || held == [true; 3] {
+            return coordinates;
+        }
+        for _ in 0..3 {
+            let at = Point::new(self.space, coordinates);
+            let column = |k: usize| -> Vector3 { std::array::from_fn(|i| at.partials()[i][k]) };
+            let mut normal = [[0.0; 3]; 3];
+            let mut right = [0.0; 3];
+            for ray in rays {
+                let offset = across(&difference(&ray.origin, &at.position()), ray);
+                for i in (0..3).filter(|&i| !held[i]) {
+                    right[i] += dot(&column(i), &offset);
+                    for j in (0..3).filter(|&j| !held[j]) {
+                        normal[i][j] += dot(&column(i), &across(&column(j), ray));
+                    }
+                }
+            }
+            (0..3).filter(|&i| held[i]).for_each(|i| normal[i][i] = 1.0);
+            let Some(step) = solve(&normal, &right, PARALLEL) else { break };
+            (0..3).for_each(|k| coordinates[k] += step[k]);
+        }
+        coordinates
+    }
+}
+
+/// The part of a vector across a ray.
+fn across(v: &Vector3, ray: &Ray) -> Vector3 {
+    let along = dot(v, &ray.direction);
+    std::array::from_fn(|k| v[k] - along * ray.direction[k])
+}
+
+fn along(ray: &Ray, distance: f64) -> Vector3 {
+    std::array::from_fn(|k| ray.origin[k] + distance * ray.direction[k])
+}
+
+/// The position nearest to all rays, in front of every camera: sum of (I - d d^T)(P - O) = 0. None when the rays are parallel or
+/// meet behind a camera.
+fn meet(rays: &[Ray]) -> Option<Vector3> {
+    let first = rays.first()?.origin;
+    let mut normal = [[0.0; 3]; 3];
+    let mut right = [0.0; 3];
+    for ray in rays {
+        let offset = across(&difference(&ray.origin, &first), ray);
+        for i in 0..3 {
+            right[i] += offset[i];
+            for j in 0..3 {
+                normal[i][j] += f64::from(u8::from(i == j)) - ray.direction[i] * ray.direction[j];
+            }
+        }
+    }
+    let from_first = solve(&normal, &right, PARALLEL)?;
+    let position = std::array::from_fn(|k| first[k] + from_first[k]);
+    let in_front = |ray: &Ray| dot(&difference(&position, &ray.origin), &ray.direction) > 0.0;
+    rays.iter().all(in_front).then_some(position)
+}
+
+/// Median distance of the intersected points from their first photographs.
+fn median_distance(met: &[Option<Vector3>], rays_of: impl Fn(usize) -> Vec<Ray>) -> Option<f64> {
+    let distance = |(index, met): (usize, &Option<Vector3>)| {
+        let offset = difference(&(*met)?, &rays_of(index).first()?.origin);
+        Some(dot(&offset, &offset).sqrt())
+    };
+    let mut distances: Vec<f64> = met.iter().enumerate().filter_map(distance).collect();
+    distances.sort_unstable_by(f64::total_cmp);
+    distances.get(distances.len() / 2).copied()
+}

@@ -1,0 +1,240 @@
+//! Block triangulation: photographs and points adjusted together (GIANT guide, sections 4 to 9).
+//!
+//! Unknowns are the position and attitude of every photograph and the coordinates of every point, each weighted from
+//! free to fixed; observations are image coordinates. Positions are X, Y, Z or longitude, latitude, height.
+
+mod initial;
+mod model;
+mod screening;
+mod solution;
+
+use std::ops::ControlFlow;
+
+use rayon::ThreadPool;
+use thiserror::Error;
+
+use crate::adjustment::{self, AdjustError, Event, Problem};
+use crate::geometry::{ObjectSpace, RotationSense, Vector3};
+use crate::normals::{Layout, LayoutError, Ordering, System};
+
+use model::CentralPerspective;
+pub use screening::{Dropped, Reason};
+pub use solution::{AdjustedImage, AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+
+/// A photograph as it is known beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct Photo {
+    /// Initial (and, where weighted, observed) position in the coordinates of the object space.
+    pub position: Vector3,
+    /// Initial (and, where weighted, observed) omega, phi, kappa in radians.
+    pub attitude: Vector3,
+    /// Standard deviations of the position: infinite free, zero fixed.
+    pub position_sd: Vector3,
+    /// Standard deviations of the attitude in radians: infinite free, zero fixed.
+    pub attitude_sd: Vector3,
+    /// Signed principal distance in millimetres: negative for the positive plane.
+    pub principal_distance: f64,
+}
+
+/// A point as it is known beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    /// Coordinates in the object space; NaN where unknown.
+    pub coordinates: Vector3,
+    /// Standard deviations: finite for held components of control (zero fixed), infinite for all others.
+    pub sd: Vector3,
+}
+
+impl Point {
+    /// Which components are held.
+    pub fn held(&self) -> [bool; 3] {
+        self.sd.map(f64::is_finite)
+    }
+}
+
+/// An image point.
+#[derive(Debug, Clone, Copy)]
+pub struct Image {
+    /// Index of its photograph.
+    pub photo: usize,
+    /// Index of its point.
+    pub point: usize,
+    /// Image coordinates in millimetres.
+    pub xy: [f64; 2],
+    /// Their standard deviations in millimetres.
+    pub sd: [f64; 2],
+}
+
+/// A block of photographs.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// Coordinates of positions and points.
+    pub space: ObjectSpace,
+    /// Sense of the attitude angles.
+    pub sense: RotationSense,
+    /// Its photographs.
+    pub photos: Vec<Photo>,
+    /// Its points.
+    pub points: Vec<Point>,
+    /// Its image points.
+    pub images: Vec<Image>,
+}
+
+/// What the variance of unit weight is based on (GIANT guide, Appendix E).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum UnitVariance {
+    /// Cameras completely free: image coordinates and ground control count, weights of the cameras do not.
+    Free,
+    /// Cameras constrained: every weighted quantity counts.
+    #[default]
+    Constrained,
+    /// Set to one.
+    Unity,
+}
+
+/// How to adjust a block.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// When to stop, and what to compute.
+    pub adjustment: adjustment::Options,
+    /// How to order the photographs.
+    pub ordering: Ordering,
+    /// What the variance of unit weight is based on.
+    pub unit_variance: UnitVariance,
+}
+
+/// Why a block cannot be adjusted. Photographs and points are indices into the block.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum BlockError {
+    /// An image names a photograph or point that is not there.
+    #[error("image {0} names a photo or point that is not in the block")]
+    Index(usize),
+    /// Nothing to adjust.
+    #[error("no point is left to adjust: none is on two photos")]
+    Empty,
+    /// The rays of a point do not say where it is.
+    #[error("the rays of point {0} do not intersect, so that it has no initial position")]
+    NoIntersection(usize),
+    /// Points whose image points do not determine them.
+    #[error("{} points are not determined by their image points", .0.len())]
+    UndeterminedPoints(Vec<usize>),
+    /// Photographs whose position and attitude the observations do not determine; one list for each undetermined
+    /// combination.
+    #[error("{} combinations of the photos' positions and attitudes are not determined", .0.len())]
+    UndeterminedPhotos(Vec<Vec<usize>>),
+    /// The initial values put a point into the plane of a projection centre, so that its image is not finite.
+    #[error("the initial values give image coordinates that are not finite")]
+    NotFinite,
+    /// The caller asked to stop.
+    #[error("interrupted")]
+    Interrupted,
+    /// More than can be numbered.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+}
+
+impl Block {
+    /// Adjusts the block by least squares.
+    ///
+    /// Points that their image points cannot determine are left out first (see [`Dropped`]); the others start from the
+    /// intersection of their rays. `watch` is called on the calling thread; when it breaks, the adjustment stops.
+    ///
+    /// # Errors
+    /// A block that contradicts itself, has nothing to adjust, or leaves unknowns undetermined; an interruption.
+    pub fn adjust(
+        &self,
+        options: &Options,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solution, BlockError> {
+        let counts = (self.photos.len(), self.points.len());
+        if let Some(bad) =
+            self.images.iter().position(|image| image.photo >= counts.0 || image.point >= counts.1)
+        {
+            return Err(BlockError::Index(bad));
+        }
+        let Screened { points, images, dropped } = self.screen();
+        if points.is_empty() {
+            return Err(BlockError::Empty);
+        }
+        let coordinates = self.initial_coordinates(&points, &images)?;
+        let origin = self.origin();
+        let problem = self.problem(options, &points, &images, &coordinates, origin)?;
+        let adjusted =
+            adjustment::adjust(&problem, &options.adjustment, pool, watch).map_err(|error| match error {
+                AdjustError::UndeterminedLocals(locals) => {
+                    BlockError::UndeterminedPoints(locals.into_iter().map(|local| points[local]).collect())
+                }
+                AdjustError::Undetermined(combinations) => BlockError::UndeterminedPhotos(combinations),
+                AdjustError::NotFinite => BlockError::NotFinite,
+                AdjustError::Interrupted => BlockError::Interrupted,
+            })?;
+        Ok(Solution::new(self, options, &problem, adjusted, &points, origin, dropped))
+    }
+
+    /// A point near the photographs: coordinates are counted from it while the block is adjusted, so that no digits are lost
+    /// in large ones. Geographic coordinates stay as they are; differences are formed in geocentric space.
+    fn origin(&self) -> Vector3 {
+        match self.space {
+            ObjectSpace::Rectangular => {
+                let count = self.photos.len().max(1) as f64;
+                std::array::from_fn(|k| {
+                    self.photos.iter().map(|photo| photo.position[k] / count).sum::<f64>().round()
+                })
+            }
+            ObjectSpace::Geographic(_) => [0.0; 3],
+        }
+    }
+
+    /// The least-squares problem: points are local blocks of three, photographs kept blocks of six.
+    fn problem(
+        &self,
+        options: &Options,
+        points: &[usize],
+        images: &PointImages,
+        coordinates: &[Vector3],
+        origin: Vector3,
+    ) -> Result<Problem<CentralPerspective>, BlockError> {
+        let photo_of = images.order.iter().map(|&image| self.images[image].photo as u32).collect();
+        let layout = Layout::new(2, 3, &vec![6; self.photos.len()], images.start.clone(), photo_of)?;
+        let (mut initial, mut prior, mut sd) = (Vec::new(), Vec::new(), Vec::new());
+        for (&point, start) in points.iter().zip(coordinates) {
+            for k in 0..3 {
+                initial.push(start[k] - origin[k]);
+                prior.push(self.points[point].coordinates[k] - origin[k]);
+                sd.push(self.points[point].sd[k]);
+            }
+        }
+        for photo in &self.photos {
+            let values = (0..3).map(|k| photo.position[k] - origin[k]).chain(photo.attitude);
+            initial.extend(values.clone());
+            prior.extend(values);
+            sd.extend(photo.position_sd.into_iter().chain(photo.attitude_sd));
+        }
+        let own: Vec<Image> = images.order.iter().map(|&image| self.images[image]).collect();
+        let observation_sd = own.iter().flat_map(|image| image.sd).collect();
+        let model = CentralPerspective {
+            space: self.space,
+            sense: self.sense,
+            principal_distances: self.photos.iter().map(|photo| photo.principal_distance).collect(),
+            points: points.len(),
+            images: own,
+            order: images.order.clone(),
+        };
+        let system = System::new(layout, options.ordering);
+        Ok(Problem { model, system, observation_sd, initial, prior, sd })
+    }
+}
+
+/// The points that take part, and what was left out.
+struct Screened {
+    points: Vec<usize>,
+    images: PointImages,
+    dropped: Vec<Dropped>,
+}
+
+/// The images of the points that take part, point by point: those of the i-th are `order[start[i]..start[i + 1]]`.
+struct PointImages {
+    start: Vec<usize>,
+    order: Vec<usize>,
+}

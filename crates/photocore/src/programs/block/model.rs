@@ -1,0 +1,52 @@
+//! The observation equations of a block.
+
+use super::Image;
+use crate::adjustment::Model;
+use crate::geometry::{ObjectSpace, Photo, Point, RotationSense};
+use crate::normals::GroupRows;
+
+/// Central perspective images: the collinearity equations.
+#[derive(Debug)]
+pub struct CentralPerspective {
+    pub space: ObjectSpace,
+    pub sense: RotationSense,
+    /// Of each photograph, in millimetres.
+    pub principal_distances: Vec<f64>,
+    /// Number of points, the local blocks.
+    pub points: usize,
+    /// The images, point by point: the groups of observations.
+    pub images: Vec<Image>,
+    /// Index of each of them in the block.
+    pub order: Vec<usize>,
+}
+
+/// Photographs and points at given values of the unknowns.
+#[derive(Debug)]
+pub struct Stations {
+    photos: Vec<Photo>,
+    points: Vec<Point>,
+}
+
+impl Model for CentralPerspective {
+    type Prepared = Stations;
+
+    fn prepare(&self, unknowns: &[f64]) -> Stations {
+        let (points, photos) = unknowns.split_at(3 * self.points);
+        let points = points.as_chunks().0.iter().map(|&coordinates| Point::new(self.space, coordinates));
+        let photos = photos.as_chunks().0.iter().zip(&self.principal_distances);
+        let photos = photos.map(|(&[x, y, z, omega, phi, kappa], &principal_distance)| {
+            Photo::new(self.space, self.sense, [x, y, z], [omega, phi, kappa], principal_distance)
+        });
+        Stations { photos: photos.collect(), points: points.collect() }
+    }
+
+    fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let image = &self.images[group];
+        let projection = stations.photos[image.photo].linearize(&stations.points[local]);
+        for row in 0..2 {
+            rows.constant[row] = image.xy[row] - projection.xy[row];
+            rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
+            rows.kept[6 * row..][..6].copy_from_slice(&projection.photo[row]);
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Which points take part in the adjustment.
+
+use super::{Block, PointImages, Screened};
+
+/// A point that was left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dropped {
+    /// Index of the point.
+    pub point: usize,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// Why a point was left out (GIANT guide, sections 6 and 11).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// It has no image.
+    NotPhotographed,
+    /// A pass point on one photograph only.
+    PassPointOnOnePhoto,
+    /// A control point on one photograph only, with more than one component not held.
+    ControlPointOnOnePhoto,
+}
+
+impl Reason {
+    /// The name under which results know it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Reason::NotPhotographed => "not photographed",
+            Reason::PassPointOnOnePhoto => "pass point on one photo",
+            Reason::ControlPointOnOnePhoto => "control point on one photo",
+        }
+    }
+}
+
+impl Block {
+    /// Leaves out points that their images and held components cannot determine.
+    ///
+    /// A point on one photograph stays when at most one of its components is not held: then there are at least four equations for
+    /// three unknowns (specification, open point 21).
+    pub(super) fn screen(&self) -> Screened {
+        let mut images_of = vec![Vec::new(); self.points.len()];
+        for (index, image) in self.images.iter().enumerate() {
+            images_of[image.point].push(index);
+        }
+        let (mut points, mut dropped) = (Vec::new(), Vec::new());
+        let mut images = PointImages { start: vec![0], order: Vec::with_capacity(self.images.len()) };
+        for (point, own) in images_of.into_iter().enumerate() {
+            let first_photo = own.first().map(|&image| self.images[image].photo);
+            let one_photo = own.iter().all(|&image| Some(self.images[image].photo) == first_photo);
+            let held = self.points[point].held().into_iter().filter(|&held| held).count();
+            let reason = match (first_photo, held) {
+                (None, _) => Some(Reason::NotPhotographed),
+                (_, 0) if one_photo => Some(Reason::PassPointOnOnePhoto),
+                (_, 1) if one_photo => Some(Reason::ControlPointOnOnePhoto),
+                _ => None,
+            };
+            if let Some(reason) = reason {
+                dropped.push(Dropped { point, reason });
+            } else {
+                points.push(point);
+                images.order.extend(own);
+                images.start.push(images.order.len());
+            }
+        }
+        Screened { points, images, dropped }
+    }
+}

@@ -1,0 +1,194 @@
+//! The adjusted block.
+
+use super::model::CentralPerspective;
+use super::{Block, Dropped, Options, UnitVariance};
+use crate::adjustment::{Adjustment, Problem};
+use crate::geometry::Vector3;
+
+/// An adjusted photograph.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustedPhoto {
+    /// Position in the coordinates of the object space.
+    pub position: Vector3,
+    /// Omega, phi, kappa in radians.
+    pub attitude: Vector3,
+    /// Cofactors of position and attitude (a priori unit weight); NaN when not asked for.
+    pub cofactors: [[f64; 6]; 6],
+    /// Redundancy numbers of its six unknowns as observations of themselves; zero unless weighted.
+    pub redundancy: [f64; 6],
+}
+
+/// An adjusted point.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustedPoint {
+    /// Coordinates in the object space.
+    pub coordinates: Vector3,
+    /// Cofactors (a priori unit weight); NaN when not asked for.
+    pub cofactors: [[f64; 3]; 3],
+    /// Redundancy numbers of its components as observations of themselves; zero unless weighted.
+    pub redundancy: [f64; 3],
+    /// Number of images.
+    pub rays: usize,
+}
+
+/// An image point after the adjustment.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustedImage {
+    /// Observed minus computed, in millimetres.
+    pub residual: [f64; 2],
+    /// Redundancy numbers; NaN when not asked for.
+    pub redundancy: [f64; 2],
+    /// Residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w); NaN when not asked
+    /// for, and where the redundancy is zero.
+    pub standardized: [f64; 2],
+}
+
+/// Weighted sums of squares.
+#[derive(Debug, Clone, Copy)]
+pub struct SumsOfSquares {
+    /// Of the weighted positions and attitudes of the photographs.
+    pub camera: f64,
+    /// Of the held components of control.
+    pub ground: f64,
+    /// Of the image coordinates.
+    pub plates: f64,
+}
+
+impl SumsOfSquares {
+    /// All together.
+    pub fn total(&self) -> f64 {
+        self.camera + self.ground + self.plates
+    }
+}
+
+/// An adjusted block, photograph by photograph, point by point, image by image, as in the input.
+#[derive(Debug)]
+pub struct Solution {
+    /// The photographs.
+    pub photos: Vec<AdjustedPhoto>,
+    /// The points; None for those that were left out.
+    pub points: Vec<Option<AdjustedPoint>>,
+    /// The images; None for those of points that were left out.
+    pub images: Vec<Option<AdjustedImage>>,
+    /// The points that were left out.
+    pub dropped: Vec<Dropped>,
+    /// Weighted sums of squares.
+    pub sums_of_squares: SumsOfSquares,
+    /// Degrees of freedom of the chosen unit variance; not positive where there is no redundancy.
+    pub degrees_of_freedom: i64,
+    /// Variance of unit weight; None where there are no degrees of freedom.
+    pub variance_of_unit_weight: Option<f64>,
+    /// Status, iterations, counts, operations and times.
+    pub adjustment: Adjustment,
+}
+
+impl Solution {
+    /// Puts the pieces of an adjustment back into the order of the block. `points` are those that took part.
+    pub(super) fn new(
+        block: &Block,
+        options: &Options,
+        problem: &Problem<CentralPerspective>,
+        mut adjustment: Adjustment,
+        points: &[usize],
+        origin: Vector3,
+        dropped: Vec<Dropped>,
+    ) -> Self {
+        let unknowns = std::mem::take(&mut adjustment.unknowns);
+        let (point_part, photo_part) = unknowns.split_at(3 * points.len());
+        let (sums_of_squares, degrees_of_freedom) =
+            statistics(options.unit_variance, problem, &adjustment, &unknowns);
+        let variance_of_unit_weight = match options.unit_variance {
+            UnitVariance::Unity => Some(1.0),
+            _ if degrees_of_freedom <= 0 => None,
+            UnitVariance::Free => {
+                Some((sums_of_squares.ground + sums_of_squares.plates) / degrees_of_freedom as f64)
+            }
+            UnitVariance::Constrained => Some(sums_of_squares.total() / degrees_of_freedom as f64),
+        };
+        let cofactors = adjustment.cofactors.take();
+        let prior_redundancy = adjustment.prior_redundancy.take();
+        let redundancy_of = |unknown: usize| prior_redundancy.as_ref().map_or(f64::NAN, |all| all[unknown]);
+        let photos = photo_part.as_chunks::<6>().0.iter().enumerate().map(|(photo, values)| AdjustedPhoto {
+            position: std::array::from_fn(|k| values[k] + origin[k]),
+            attitude: std::array::from_fn(|k| values[3 + k]),
+            cofactors: square(cofactors.as_ref().map(|all| &all.kept[36 * photo..])),
+            redundancy: std::array::from_fn(|k| redundancy_of(3 * points.len() + 6 * photo + k)),
+        });
+        let mut adjusted_points = vec![None; block.points.len()];
+        let layout = problem.layout();
+        for (local, (&point, values)) in points.iter().zip(point_part.as_chunks::<3>().0).enumerate() {
+            adjusted_points[point] = Some(AdjustedPoint {
+                coordinates: std::array::from_fn(|k| values[k] + origin[k]),
+                cofactors: square(cofactors.as_ref().map(|all| &all.local[9 * local..])),
+                redundancy: std::array::from_fn(|k| redundancy_of(3 * local + k)),
+                rays: layout.groups_of(local).len(),
+            });
+        }
+        Self {
+            photos: photos.collect(),
+            points: adjusted_points,
+            images: images(block, problem, &mut adjustment),
+            dropped,
+            sums_of_squares,
+            degrees_of_freedom,
+            variance_of_unit_weight,
+            adjustment,
+        }
+    }
+}
+
+fn square<const N: usize>(values: Option<&[f64]>) -> [[f64; N]; N] {
+    std::array::from_fn(|i| std::array::from_fn(|j| values.map_or(f64::NAN, |values| values[N * i + j])))
+}
+
+/// Sums of squares by group, and degrees of freedom (GIANT guide, Appendix E): observations are the image coordinates, the
+/// held components of control and, with constrained cameras, the weighted ones of the photographs.
+fn statistics(
+    unit_variance: UnitVariance,
+    problem: &Problem<CentralPerspective>,
+    adjustment: &Adjustment,
+    unknowns: &[f64],
+) -> (SumsOfSquares, i64) {
+    let layout = problem.layout();
+    let squares = |range: std::ops::Range<usize>| range.map(|i| problem.prior_square(i, unknowns[i])).sum();
+    let residuals = adjustment.residuals.iter().zip(&problem.observation_sd);
+    let sums = SumsOfSquares {
+        camera: squares(layout.all_kept()),
+        ground: squares(layout.all_locals()),
+        plates: residuals.map(|(residual, sd)| (residual / sd).powi(2)).sum(),
+    };
+    let counts = adjustment.counts;
+    let weighted_cameras = layout.all_kept().filter(|&unknown| problem.is_weighted(unknown)).count();
+    let weighted = match unit_variance {
+        UnitVariance::Constrained => counts.weighted,
+        UnitVariance::Free | UnitVariance::Unity => counts.weighted - weighted_cameras,
+    };
+    (sums, (counts.observations + weighted) as i64 - counts.unknowns as i64)
+}
+
+/// Residuals and test values, image by image as in the block.
+fn images(
+    block: &Block,
+    problem: &Problem<CentralPerspective>,
+    adjustment: &mut Adjustment,
+) -> Vec<Option<AdjustedImage>> {
+    let residuals = std::mem::take(&mut adjustment.residuals);
+    let redundancy = adjustment.redundancy.take();
+    let mut images = vec![None; block.images.len()];
+    for (group, &image) in problem.model.order.iter().enumerate() {
+        let residual = [residuals[2 * group], residuals[2 * group + 1]];
+        let redundancy: [f64; 2] =
+            std::array::from_fn(|row| redundancy.as_ref().map_or(f64::NAN, |all| all[2 * group + row]));
+        let sd = block.images[image].sd;
+        let standardized = std::array::from_fn(|row| {
+            // What rounding leaves of a redundancy of zero would make a test value of noise.
+            if redundancy[row] > 1e-10 {
+                residual[row] / (sd[row] * redundancy[row].sqrt())
+            } else {
+                f64::NAN
+            }
+        });
+        images[image] = Some(AdjustedImage { residual, redundancy, standardized });
+    }
+    images
+}
