@@ -1,0 +1,19 @@
+"""The files of GIANT (Elassal and Malhotra, NOAA 1987): COMMON, CAMERAS, IMAGES, FRAMES and GROUND."""
+
+from photogram.giant.cameras import Camera
+from photogram.giant.common import Common
+from photogram.giant.frames import Frame
+from photogram.giant.ground import GroundPoint
+from photogram.giant.images import ImageFrame
+from photogram.giant.project import Project, read_project, write_project
+
+__all__ = [
+    "Camera",
+    "Common",
+    "Frame",
+    "GroundPoint",
+    "ImageFrame",
+    "Project",
+    "read_project",
+    "write_project",
+]

@@ -1,0 +1,203 @@
+"""From the five files to a block: the rules of the GIANT guide that hold between files."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram.block import Block
+from photogram.errors import InputError
+from photogram.giant.frames import ATTITUDE_SD, Frame
+from photogram.giant.ground import GroundPoint
+from photogram.giant.images import IMAGE_SD, ImageFrame
+from photogram.giant.records import Record
+from photogram.messages import Message
+
+if TYPE_CHECKING:
+    from photogram.geometry import Spheroid
+    from photogram.giant.common import Common
+    from photogram.giant.project import Project
+
+__all__ = ["assemble"]
+
+Floats = NDArray[np.float64]
+
+
+def assemble(project: Project) -> tuple[Block, list[Message]]:
+    """Return the block of a project, and the remarks on what was left out or deserves a look.
+
+    Photos stand in the order of FRAMES, points in the order of their first image.
+
+    Raises
+    ------
+    InputError
+        A frame without images, a camera that is not defined, or no frame at all.
+    """
+    common, messages = project.common, _unsupported(project.common)
+    photos = _photos(project, messages)
+    if not photos:
+        raise InputError("FRAMES lists no frame with images", file=project.directory)
+    frames = [frame for frame, _ in photos]
+    images = [image_frame for _, image_frame in photos]
+
+    index: dict[str, int] = {}
+    image_points = np.array([index.setdefault(name, len(index)) for each in images for name in each.points])
+    image_photos = np.repeat(np.arange(len(images)), [len(each.points) for each in images])
+    kept = _first_images(images, image_photos, image_points, messages)
+    position, sd = _control(project, index, messages)
+    return (
+        Block(
+            photo_ids=[frame.name for frame in frames],
+            photo_positions=_longitudes(np.array([frame.position for frame in frames]), common.geographic),
+            photo_attitudes=np.array([frame.attitude for frame in frames]),
+            principal_distances=_principal_distances(project, images),
+            point_ids=list(index),
+            point_positions=_longitudes(position, common.geographic),
+            image_photos=image_photos[kept],
+            image_points=image_points[kept],
+            image_xy=np.concatenate([each.xy for each in images])[kept],
+            image_sd=_or_default([each.sd for each in images], IMAGE_SD)[image_photos[kept]],
+            photo_position_sd=_or_default([frame.position_sd for frame in frames], common.default_station_sd),
+            photo_attitude_sd=_or_default([frame.attitude_sd for frame in frames], ATTITUDE_SD),
+            point_sd=sd,
+            spheroid=_spheroid(common),
+            photo_to_ground=common.photo_to_ground,
+            title=common.title,
+        ),
+        messages,
+    )
+
+
+def _error(record: Record | None, text: str) -> InputError:
+    return record.error(text) if record else InputError(text)
+
+
+def _message(record: Record | None, text: str) -> Message:
+    return record.message(text) if record else Message(text)
+
+
+def _unsupported(common: Common) -> list[Message]:
+    asked = {"air": common.air_refraction, "water": common.water_refraction}
+    return [
+        Message(f"COMMON asks for {name} refraction, which is not applied yet")
+        for name, on in asked.items()
+        if on
+    ]
+
+
+def _photos(project: Project, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:
+    """Pair FRAMES with IMAGES. Images of frames that FRAMES does not list are left out silently."""
+    listed = {frame.name for frame in project.frames}
+    measured: dict[str, ImageFrame] = {}
+    for images in project.images:
+        first = measured.setdefault(images.name, images)
+        if first is not images and images.name in listed:
+            where = f" (record {first.record.number})" if first.record else ""
+            raise _error(images.record, f"the frame {images.name!r} already has images{where}")
+    photos = []
+    for frame in project.frames:
+        if frame.name in measured and measured[frame.name].points:
+            photos.append((frame, measured[frame.name]))
+        elif project.common.intersection_only:
+            messages.append(_message(frame.record, f"the frame {frame.name!r} has no images: left out"))
+        else:
+            raise _error(
+                frame.record,
+                f"the frame {frame.name!r} has no images{_lost_header(project.images, frame.name)}",
+            )
+    return photos
+
+
+def _lost_header(images: list[ImageFrame], name: str) -> str:
+    """Say where the name of a frame stands among points: a terminator is missing before it."""
+    for frame in images:
+        if name in frame.points:
+            record = frame.point_record(frame.points.index(name))
+            where = f" (record {record.number} of {record.source.path.name})" if record else ""
+            return f", but a point of {frame.name!r} has its name{where}: is a terminator **** missing?"
+    return ""
+
+
+def _principal_distances(project: Project, images: list[ImageFrame]) -> Floats:
+    cameras = {camera.name: camera.principal_distance for camera in project.cameras}
+    for each in images:
+        if not each.principal_distance and each.camera not in cameras:
+            known = ", ".join(repr(name) for name in cameras) or "none"
+            raise _error(
+                each.record,
+                f"the frame {each.name!r} has no principal distance,"
+                f" and its camera {each.camera!r} is not in CAMERAS (there: {known})",
+            )
+    return np.array([each.principal_distance or cameras[each.camera] for each in images])
+
+
+def _first_images(
+    images: list[ImageFrame],
+    image_photos: NDArray[np.int64],
+    image_points: NDArray[np.int64],
+    messages: list[Message],
+) -> NDArray[np.int64]:
+    """Return the rows of the first image of every point on every photo, in their order."""
+    pairs = image_photos * (image_points.max() + 1) + image_points
+    kept = np.sort(np.unique(pairs, return_index=True)[1])
+    starts = np.searchsorted(image_photos, np.arange(len(images)))
+    for row in np.setdiff1d(np.arange(len(pairs)), kept).tolist():
+        frame = images[image_photos[row]]
+        at = row - starts[image_photos[row]]
+        text = f"the point {frame.points[at]} stands in the frame {frame.name} twice: the first image is kept"
+        messages.append(_message(frame.point_record(at), text))
+    return kept
+
+
+def _control(project: Project, index: dict[str, int], messages: list[Message]) -> tuple[Floats, Floats]:
+    """Return positions and standard deviations of all points: those of GROUND where it has any."""
+    position = np.full((len(index), 3), np.nan)
+    sd = np.full((len(index), 3), np.inf)
+    for point in project.ground:
+        row = index.get(point.name)
+        if row is None:
+            messages.append(
+                _message(point.record, f"control point {point.name} is not photographed: ignored")
+            )
+            continue
+        held = np.array(point.held)
+        # The field of an unheld component may hold nothing: blanks or zero are no value to compare with.
+        position[row] = np.where(held | (np.array(point.position) != 0), point.position, np.nan)
+        sd[row] = np.where(held, _or_default(point.sd, project.common.default_control_sd), np.inf)
+    if not np.isfinite(sd).any():
+        messages.append(_no_control(project.ground))
+    return position, sd
+
+
+def _no_control(ground: list[GroundPoint]) -> Message:
+    record = next((point.record for point in ground if point.record), None)
+    path = record.source.path if record else None
+    return Message(
+        "no photographed control point: the datum rests on the weights of the camera stations alone", path
+    )
+
+
+def _or_default(values: ArrayLike, default: ArrayLike) -> Floats:
+    array = np.asarray(values, dtype=np.float64)
+    return np.where(array == 0, np.asarray(default, dtype=np.float64), array)
+
+
+def _longitudes(positions: Floats, geographic: bool) -> Floats:
+    """Bring longitudes written as 0 to 360 degrees to -180 to 180, so that all files agree."""
+    if geographic:
+        longitude = positions[:, 0]
+        positions[:, 0] = np.where(
+            np.abs(longitude) > math.pi, longitude - np.copysign(2 * math.pi, longitude), longitude
+        )
+    return positions
+
+
+def _spheroid(common: Common) -> Spheroid | None:
+    if not common.geographic:
+        return None
+    from photogram.geometry import Spheroid
+
+    return Spheroid(common.semi_major, common.semi_minor)

@@ -1,0 +1,65 @@
+"""CAMERAS (unit 1): the camera systems (GIANT guide, section II.B.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from photogram.giant.fields import format_name, format_real
+from photogram.giant.records import Record, Source
+
+__all__ = ["Camera", "camera_records", "parse_cameras"]
+
+
+@dataclass
+class Camera:
+    """One camera system.
+
+    Attributes
+    ----------
+    name
+        At most 8 characters; blank is a name too, of use where there is one camera only.
+    principal_distance
+        Millimetres; negative for the positive (diapositive) plane, positive for the negative plane.
+    record
+        Where the camera was read.
+    """
+
+    name: str
+    principal_distance: float
+    record: Record | None = field(default=None, compare=False, repr=False)
+
+
+def parse_cameras(source: Source) -> list[Camera]:
+    """Read CAMERAS.
+
+    Raises
+    ------
+    InputError
+        A field that is no number, a principal distance of zero, or a name that stands there twice.
+    """
+    cameras: list[Camera] = []
+    spellings: dict[str, Record] = {}
+    for record in source.filled():
+        name = record.identification(spellings)
+        first = spellings[name]
+        if first is not record:
+            raise record.error(f"the camera {name!r} is already defined in record {first.number}")
+        principal_distance = record.real(11, 20)
+        if principal_distance == 0:
+            raise record.error(f"columns 11-20: the camera {name!r} has no principal distance")
+        cameras.append(Camera(name, principal_distance, record))
+    return cameras
+
+
+def camera_records(cameras: Iterable[Camera]) -> list[str]:
+    """Write CAMERAS.
+
+    Raises
+    ------
+    ValueError
+        A name or a principal distance does not fit its field.
+    """
+    return [
+        f"{format_name(camera.name)}  {format_real(camera.principal_distance, 10, 3)}" for camera in cameras
+    ]

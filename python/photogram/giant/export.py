@@ -1,0 +1,165 @@
+"""From a block to GIANT files: a project of a block, and the stations and points of an adjusted one."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.block import Block
+from photogram.errors import InputError
+from photogram.giant.cameras import Camera
+from photogram.giant.common import Common
+from photogram.giant.frames import Frame
+from photogram.giant.ground import CHECK_POINT, GroundPoint
+from photogram.giant.images import ImageFrame
+from photogram.messages import Message
+
+if TYPE_CHECKING:
+    from photogram.giant.project import Project
+
+__all__ = ["adjusted_frames", "adjusted_ground", "block_files"]
+
+Floats = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+
+def block_files(
+    block: Block, common: Common | None
+) -> tuple[Common, list[Camera], list[Frame], list[ImageFrame], list[GroundPoint], list[Message]]:
+    """Return the content of the five files for a block; see :meth:`Project.from_block`."""
+    common = dataclasses.replace(
+        common or Common(error_propagation=True),
+        title=block.title[:80],
+        geographic=block.geographic,
+        photo_to_ground=block.photo_to_ground,
+        strip="",
+    )
+    messages = []
+    if block.spheroid is not None:
+        common.semi_major, common.semi_minor = round(block.spheroid.a, 2), round(block.spheroid.b, 2)
+        if (common.semi_major, common.semi_minor) != (block.spheroid.a, block.spheroid.b):
+            messages.append(Message("the axes of the spheroid are rounded to the two decimals of COMMON"))
+    distances = dict.fromkeys(block.principal_distances.tolist())
+    names = {distance: f"CAMERA{number}" for number, distance in enumerate(distances, 1)}
+    cameras = [Camera(name, distance) for distance, name in names.items()]
+    frames = _frames(block)
+    images = _images(block, [names[distance] for distance in block.principal_distances.tolist()])
+    return common, cameras, frames, images, _ground(block), messages
+
+
+def _frames(block: Block) -> list[Frame]:
+    rows = zip(
+        block.photo_ids,
+        block.photo_positions,
+        _turns(block.photo_attitudes),
+        _weights("the position of photo", block.photo_ids, block.photo_position_sd),
+        _weights("the attitude of photo", block.photo_ids, block.photo_attitude_sd),
+        strict=True,
+    )
+    return [
+        Frame(name, _triple(position), _triple(attitude), _triple(position_sd), _triple(attitude_sd))
+        for name, position, attitude, position_sd, attitude_sd in rows
+    ]
+
+
+def _images(block: Block, cameras: list[str]) -> list[ImageFrame]:
+    order = np.argsort(block.image_photos, kind="stable")
+    bounds = np.searchsorted(block.image_photos[order], np.arange(len(block.photo_ids) + 1))
+    frames = []
+    for photo, name in enumerate(block.photo_ids):
+        rows = order[bounds[photo] : bounds[photo + 1]]
+        sd = np.unique(block.image_sd[rows], axis=0)
+        if len(sd) > 1:
+            raise InputError(
+                f"the images of photo {name} differ in standard deviation; IMAGES has one pair for a frame"
+            )
+        points = [block.point_ids[point] for point in block.image_points[rows].tolist()]
+        x_sd, y_sd = sd[0].tolist() if len(sd) else (0.0, 0.0)
+        frames.append(ImageFrame(name, points, block.image_xy[rows], sd=(x_sd, y_sd), camera=cameras[photo]))
+    return frames
+
+
+def _ground(block: Block) -> list[GroundPoint]:
+    held = np.isfinite(block.point_sd)
+    sd = np.where(held, _weights("point", block.point_ids, block.point_sd), 0.0)
+    codes = (~held) @ np.array([1, 2, 4])
+    return [
+        GroundPoint(
+            block.point_ids[row], _triple(block.point_positions[row]), _triple(sd[row]), int(codes[row])
+        )
+        for row in np.flatnonzero(np.isfinite(block.point_positions).any(axis=1)).tolist()
+    ]
+
+
+def _weights(what: str, names: list[str], sd: Floats) -> Floats:
+    """Return standard deviations with 0, the default of GIANT, for infinite ones; nothing can be fixed."""
+    fixed = (sd == 0).any(axis=1)
+    if fixed.any():
+        name = names[int(fixed.argmax())]
+        raise InputError(
+            f"{what} {name} is fixed (standard deviation 0); in GIANT files zero stands for the default"
+        )
+    return np.where(np.isinf(sd), 0.0, sd)
+
+
+def _turns(attitudes: Floats) -> Floats:
+    """Bring omega and phi to -180 to 180 degrees and kappa to 0 to 360, as the guide lists them."""
+    omega_phi = np.remainder(attitudes[:, :2] + math.pi, 2 * math.pi) - math.pi
+    return np.column_stack([omega_phi, np.remainder(attitudes[:, 2], 2 * math.pi)])
+
+
+def _triple(values: Floats) -> Triple:
+    first, second, third = values.tolist()
+    return first, second, third
+
+
+def adjusted_frames(project: Project, block: Block, positions: Floats, attitudes: Floats) -> list[Frame]:
+    """Return the stations for units 8 and 20: adjusted values with the standard deviations of the input.
+
+    Parameters
+    ----------
+    project, block
+        What was adjusted: `block` is `project.to_block()`.
+    positions, attitudes
+        (P, 3) adjusted values, in the units and the order of the block.
+    """
+    turned = _turns(attitudes)
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    return [
+        dataclasses.replace(
+            frame, position=_triple(positions[rows[frame.name]]), attitude=_triple(turned[rows[frame.name]])
+        )
+        if frame.name in rows
+        else frame
+        for frame in project.frames
+    ]
+
+
+def adjusted_ground(project: Project, block: Block, positions: Floats) -> list[GroundPoint]:
+    """Return the points for unit 9: every point on two or more photographs.
+
+    Control keeps its standard deviations and type code. Pass points get the type code 7, so that the file can
+    be read as GROUND without turning them into control.
+
+    Parameters
+    ----------
+    project, block
+        What was adjusted: `block` is `project.to_block()`.
+    positions
+        (n, 3) adjusted positions in the units and the order of the block; NaN for points that were not used.
+    """
+    control = {point.name: point for point in project.ground}
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    rows = np.flatnonzero((rays >= 2) & np.isfinite(positions).all(axis=1)).tolist()
+    names = [block.point_ids[row] for row in rows]
+    return [
+        dataclasses.replace(
+            control.get(name) or GroundPoint(name, (0.0, 0.0, 0.0), type_code=CHECK_POINT),
+            position=_triple(positions[row]),
+        )
+        for name, row in zip(names, rows, strict=True)
+    ]

@@ -1,0 +1,240 @@
+"""Single fields of fixed-column records: numbers, packed degrees-minutes-seconds and names, read and written.
+
+Everything here works on the characters of one field and raises ValueError; :mod:`photogram.giant.records` adds
+the file, the record and the columns. Rules: GIANT guide, section II.B.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from decimal import Decimal
+
+__all__ = [
+    "ARCSEC",
+    "format_angle",
+    "format_deviations",
+    "format_name",
+    "format_position",
+    "format_real",
+    "pack_dms",
+    "parse_angle",
+    "parse_integer",
+    "parse_name",
+    "parse_real",
+    "unpack_dms",
+]
+
+ARCSEC = math.pi / 648000.0
+"""One second of arc in radians."""
+
+_REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d{1,2}))?", re.ASCII)
+_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
+
+
+def parse_real(field: str, decimals: int) -> Decimal:
+    """Read an Fw.d field exactly.
+
+    A blank field is zero, blanks inside are ignored (FORTRAN 77, BLANK='NULL'), and without a decimal point
+    the last `decimals` digits are the fraction. NaN and infinity have no spelling.
+    """
+    digits = field.replace(" ", "")
+    if not digits:
+        return Decimal(0)
+    match = _REAL.fullmatch(digits)
+    if match is None:
+        raise ValueError(f"{field!r} is not a number")
+    mantissa, exponent = match.groups()
+    scale = int(exponent or 0) - (0 if "." in mantissa else decimals)
+    return Decimal(mantissa).scaleb(scale)
+
+
+def parse_integer(field: str) -> int:
+    """Read an Iw field; blank is zero and blanks inside are ignored."""
+    digits = field.replace(" ", "")
+    if digits and _INTEGER.fullmatch(digits) is None:
+        raise ValueError(f"{field!r} is not a whole number")
+    return int(digits or 0)
+
+
+def parse_name(field: str, strip: str = "") -> str:
+    """Read a name: left-justified, without the leading `strip` characters of COMMON column 15.
+
+    A name of nothing but that character becomes one of it, so that it does not vanish.
+    """
+    name = field.strip(" ")
+    if not strip or not name.startswith(strip):
+        return name
+    return name.lstrip(strip).lstrip(" ") or strip
+
+
+def unpack_dms(packed: Decimal) -> tuple[int, int, int, Decimal]:
+    """Split DDDMMSS.sss into sign (1 or -1), degrees, minutes and seconds, in decimal arithmetic."""
+    sign, value = (-1 if packed < 0 else 1), abs(packed)
+    degrees, rest = divmod(value, 10000)
+    minutes, seconds = divmod(rest, 100)
+    return sign, int(degrees), int(minutes), seconds
+
+
+def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
+    """Read a packed DMS field.
+
+    Returns
+    -------
+    angle, doubtful
+        Radians, and whether minutes or seconds are 60: the guide lets that pass, so it is worth a remark, not
+        a stop.
+
+    Raises
+    ------
+    ValueError
+        The field is no number, or has more than 360 degrees, 60 minutes or 60 seconds: the guide's fatal
+        ILLEGAL DMS FIELD.
+    """
+    sign, degrees, minutes, seconds = unpack_dms(parse_real(field, decimals))
+    if degrees > 360 or minutes > 60 or seconds > 60:
+        raise ValueError(
+            f"ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is"
+            f" {degrees} degrees {minutes} minutes {seconds} seconds"
+        )
+    return sign * float(3600 * degrees + 60 * minutes + seconds) * ARCSEC, minutes == 60 or seconds == 60
+
+
+def format_real(value: float, width: int, decimals: int) -> str:
+    """Write a number for an Fw.d field: explicit point, as many digits as it needs and fit, right-justified.
+
+    At least `decimals` decimals where there is room. The implied point of the format is used only where the
+    explicit one would cost a digit. NaN, an unknown value, is a blank field.
+
+    Raises
+    ------
+    ValueError
+        The number is infinite, or too large for the field.
+    """
+    if math.isnan(value):
+        return " " * width
+    if math.isinf(value):
+        raise ValueError(f"{value} has no spelling")
+    text = repr(value + 0.0)
+    if "e" in text or len(text) > width:
+        text = _rounded(value, width)
+    whole, _, fraction = text.partition(".")
+    if len(fraction) < decimals:
+        implied = f"{value:.{decimals}f}"
+        if float(implied) != float(text) and len(implied) - 1 <= width:
+            return implied.replace(".", "").rjust(width)
+    room = width - len(whole) - 1
+    if room < 0:
+        raise ValueError(f"{value} does not fit {width} columns")
+    text = f"{whole}.{fraction.rstrip('0').ljust(min(decimals, room), '0')}"
+    return (text.replace(".", "0.") if whole in ("", "-") and len(text) < width else text).rjust(width)
+
+
+def _rounded(value: float, width: int) -> str:
+    """Round to the decimals that fit; too long where not even the whole number and its point do."""
+    places, excess = width, 1
+    while excess > 0 and places > 0:
+        places = max(0, places - excess)
+        text = f"{value:#.{places}f}"
+        if abs(value) < 1 and places:
+            text = text.replace("0.", ".", 1)
+        excess = len(text) - width
+    return text
+
+
+def pack_dms(arcseconds: Decimal) -> str:
+    """Write seconds of arc as DDDMMSS.sss with the decimals they have; leading zeros are left out."""
+    whole_minutes, seconds = divmod(abs(arcseconds), 60)
+    degrees, minutes = divmod(int(whole_minutes), 60)
+    packed = 10000 * degrees + 100 * minutes + seconds
+    return f"{'-' if arcseconds < 0 else ''}{packed:f}"
+
+
+def format_angle(value: float, width: int, *, decimals: int = 4, whole_circles: bool = True) -> str:
+    """Write radians as a packed DMS field with an explicit point and as many decimals of the second as fit.
+
+    Parameters
+    ----------
+    value
+        Radians; NaN, an unknown value, is a blank field.
+    width
+        Columns of the field.
+    decimals
+        Decimals of the second to show at least, where there is room.
+    whole_circles
+        Whether a negative angle that would lose the fourth decimal may be written with 360 degrees added,
+        which spares the sign.
+
+    Raises
+    ------
+    ValueError
+        The angle is beyond 360 degrees, or too long for the field.
+    """
+    if math.isnan(value):
+        return " " * width
+    if not abs(value) <= 2 * math.pi:
+        raise ValueError(f"{value} rad is beyond 360 degrees")
+    text = _packed(value, width, decimals)
+    coarse = len(text) - 1 - text.index(".") < 4 and parse_angle(text, 0)[0] != value
+    if coarse and value < 0 and whole_circles:
+        text = _packed(value + 2 * math.pi, width, decimals)
+    return text.rjust(width)
+
+
+def _packed(value: float, width: int, decimals: int) -> str:
+    arcseconds = Decimal(repr(value / ARCSEC))
+    places, excess = width - 1, 1
+    while excess > 0 and places > 0:
+        places = max(0, places - excess)
+        whole, _, fraction = pack_dms(round(arcseconds, places)).partition(".")
+        excess = len(whole) + 1 + places - width
+    if excess > 0:
+        raise ValueError(f"{value} rad does not fit {width} columns")
+    return f"{whole}.{fraction.rstrip('0').ljust(min(decimals, places), '0')}"
+
+
+def format_name(name: str) -> str:
+    """Write a name of at most eight characters into its eight columns.
+
+    Raises
+    ------
+    ValueError
+        The name is too long, begins with the terminator `****`, or holds blanks at its ends or control
+        characters.
+    """
+    if len(name) > 8:
+        raise ValueError(f"the name {name!r} has more than 8 characters")
+    if name != name.strip(" ") or not name.isprintable() or name.startswith("****"):
+        raise ValueError(f"the name {name!r} cannot be written: it would not be read again as it is")
+    return name.ljust(8)
+
+
+def format_position(position: Iterable[float], geographic: bool) -> str:
+    """Write three coordinates (F12.3): X, Y, Z, or longitude and latitude (rad) and height."""
+    first, second, third = position
+    if not geographic:
+        return "".join(format_real(value, 12, 3) for value in (first, second, third))
+    return format_angle(first, 12) + format_angle(second, 12) + format_real(third, 12, 3)
+
+
+def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
+    """Write standard deviations, F10.3 or DMS; zero, which stands for the default, as blanks.
+
+    Raises
+    ------
+    ValueError
+        A value is negative, does not fit, or is so small that it would turn into zero.
+    """
+    fields = []
+    for value, angle in zip(values, angles, strict=True):
+        if value == 0:
+            fields.append(" " * 10)
+            continue
+        field = (
+            format_angle(value, 10, decimals=3, whole_circles=False) if angle else format_real(value, 10, 3)
+        )
+        if not value > 0 or not any(digit in field for digit in "123456789"):
+            raise ValueError(f"the standard deviation {value} cannot be written in ten columns")
+        fields.append(field)
+    return "".join(fields)

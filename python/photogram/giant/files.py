@@ -1,0 +1,77 @@
+"""Finding the files of a project, and writing files whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from photogram.errors import InputError
+
+__all__ = ["NAMES", "find_files", "present_files", "to_bytes", "write_whole"]
+
+NAMES = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")
+"""The input files; they are found in any letter case and with any one extension."""
+
+
+def present_files(directory: Path) -> dict[str, list[Path]]:
+    """Return the files in a directory that could be each of `NAMES`."""
+    found: dict[str, list[Path]] = {name: [] for name in NAMES}
+    try:
+        entries = sorted(directory.iterdir())
+    except OSError as error:
+        raise InputError(f"the directory cannot be read: {error.strerror}", file=directory) from None
+    for entry in entries:
+        name = entry.stem.upper()
+        if name in found and entry.is_file():
+            found[name].append(entry)
+    return found
+
+
+def find_files(directory: Path) -> dict[str, Path]:
+    """Find the five input files of a project.
+
+    Raises
+    ------
+    InputError
+        A file is missing, or two files could be the same one.
+    """
+    files: dict[str, Path] = {}
+    for name, candidates in present_files(directory).items():
+        if not candidates:
+            raise InputError(
+                f"{name} is missing (looked for {name}, {name.lower()}, {name}.* in any letter case)",
+                file=directory,
+            )
+        if len(candidates) > 1:
+            listed = ", ".join(candidate.name for candidate in candidates)
+            raise InputError(f"more than one file could be {name}: {listed}", file=directory)
+        files[name] = candidates[0]
+    return files
+
+
+def to_bytes(records: Iterable[str]) -> bytes:
+    """Return records as the bytes of a text file."""
+    return "".join(f"{record}\n" for record in records).encode()
+
+
+def write_whole(files: Mapping[Path, bytes]) -> None:
+    """Write files so that each is there whole or not at all.
+
+    All are written beside their places first, then moved there.
+
+    Raises
+    ------
+    OSError
+        A file cannot be written; no file has changed unless the very moving of one failed.
+    """
+    temporary = {path: path.with_name(f".{path.name}.{os.getpid()}.tmp") for path in files}
+    try:
+        for path, content in files.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary[path].write_bytes(content)
+        for path in files:
+            temporary[path].replace(path)
+    finally:
+        for path in temporary.values():
+            path.unlink(missing_ok=True)

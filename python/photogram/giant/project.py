@@ -1,0 +1,180 @@
+"""A GIANT project: five files in a directory, read, written and turned into a block."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from photogram.block import Block
+from photogram.errors import InputError
+from photogram.giant.assembly import assemble
+from photogram.giant.cameras import Camera, camera_records, parse_cameras
+from photogram.giant.common import Common, common_records, parse_common
+from photogram.giant.export import block_files
+from photogram.giant.files import NAMES, find_files, present_files, to_bytes, write_whole
+from photogram.giant.frames import Frame, frame_records, parse_frames
+from photogram.giant.ground import GroundPoint, ground_records, parse_ground
+from photogram.giant.images import ImageFrame, image_records, parse_images
+from photogram.giant.records import Source
+from photogram.messages import Message
+
+__all__ = ["Project", "read_project", "write_project"]
+
+
+@dataclass
+class Project:
+    """The content of the five files.
+
+    Attributes
+    ----------
+    common, cameras, frames, images, ground
+        The files, each with its own names and units (see their classes).
+    messages
+        Remarks on the input, made while it was read and turned into a block.
+    directory
+        Where the files were read, if they were.
+    """
+
+    common: Common
+    cameras: list[Camera]
+    frames: list[Frame]
+    images: list[ImageFrame]
+    ground: list[GroundPoint]
+    messages: list[Message] = field(default_factory=list)
+    directory: Path | None = None
+
+    @property
+    def title(self) -> str:
+        """Record 1 of COMMON."""
+        return self.common.title
+
+    def to_block(self) -> Block:
+        """Return the block: apply the rules that hold between files (GIANT guide, sections II.B and III).
+
+        Remarks are added to `messages`, once each.
+
+        Raises
+        ------
+        InputError
+            A frame without images, a camera that is not defined, or no frame at all.
+        """
+        block, messages = assemble(self)
+        known = set(self.messages)
+        self.messages += [message for message in messages if message not in known]
+        return block
+
+    @classmethod
+    def from_block(cls, block: Block, common: Common | None = None) -> Project:
+        """Return the project of a block.
+
+        Infinite standard deviations of stations become the (weak) defaults of the guide; points with a known
+        component go to GROUND, with the components that are not held in their type codes. Numbers are kept as
+        far as the columns go when the project is written: at least 4 decimals of the second for longitudes
+        and latitudes, 5 decimals of the millimetre for image coordinates.
+
+        Parameters
+        ----------
+        block
+            The block.
+        common
+            Switches of the job; title, object space, sense of rotation and spheroid come from the block.
+            Default: error propagation is asked for.
+
+        Raises
+        ------
+        InputError
+            Something that GIANT files cannot say: fixed values, or different standard deviations within a
+            photo.
+        """
+        return cls(*block_files(block, common))
+
+    def records(self) -> dict[str, list[str]]:
+        """Return the records of the five files by name.
+
+        Raises
+        ------
+        InputError
+            A value that does not fit its field.
+        """
+        geographic = self.common.geographic
+        writers: dict[str, Callable[[], list[str]]] = {
+            "COMMON": lambda: common_records(self.common),
+            "CAMERAS": lambda: camera_records(self.cameras),
+            "IMAGES": lambda: image_records(self.images),
+            "FRAMES": lambda: frame_records(self.frames, geographic),
+            "GROUND": lambda: ground_records(self.ground, geographic),
+        }
+        return {name: _written(name, writer) for name, writer in writers.items()}
+
+
+def _written(name: str, writer: Callable[[], list[str]]) -> list[str]:
+    try:
+        return writer()
+    except ValueError as error:
+        raise InputError(f"{name} cannot be written: {error}") from None
+
+
+def read_project(directory: str | os.PathLike[str]) -> Project:
+    """Read the five files of a directory, in any letter case and with any extension.
+
+    Raises
+    ------
+    InputError
+        A file that is missing or ambiguous, or a record that cannot be read; it names file, record number and
+        record.
+    """
+    directory = Path(directory)
+    files = find_files(directory)
+    sources = [Source.read(files["COMMON"])]
+    common = parse_common(sources[0])
+
+    def source(name: str) -> Source:
+        sources.append(Source.read(files[name], common.strip))
+        return sources[-1]
+
+    project = Project(
+        common=common,
+        cameras=parse_cameras(source("CAMERAS")),
+        frames=parse_frames(source("FRAMES"), common.geographic),
+        images=parse_images(source("IMAGES")),
+        ground=parse_ground(source("GROUND"), common.geographic),
+        directory=directory,
+    )
+    project.messages += [message for each in sources for message in each.messages]
+    return project
+
+
+def write_project(project: Project, directory: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write the five files into a directory, which is made if need be; each file whole or not at all.
+
+    Parameters
+    ----------
+    project
+        What to write.
+    directory
+        Where.
+    overwrite
+        Whether input files that are there already, under whatever spelling, may be replaced.
+
+    Raises
+    ------
+    InputError
+        A value that does not fit its field, or files that are there already.
+    OSError
+        The files cannot be written.
+    """
+    directory = Path(directory)
+    texts = project.records()
+    targets = {name: directory / name for name in NAMES}
+    if directory.exists():
+        for name, present in present_files(directory).items():
+            if len(present) > 1 or (present and not overwrite):
+                listed = ", ".join(path.name for path in present)
+                raise InputError(
+                    f"{listed} would be overwritten" if not overwrite else f"{listed}: which is {name}?",
+                    file=directory,
+                )
+            targets[name] = next(iter(present), targets[name])
+    write_whole({targets[name]: to_bytes(records) for name, records in texts.items()})

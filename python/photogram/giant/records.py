@@ -1,0 +1,187 @@
+"""A file as numbered records of 80 columns, and the fields of one record by their columns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from photogram.errors import InputError
+from photogram.giant.fields import parse_angle, parse_integer, parse_name, parse_real
+from photogram.messages import Message
+
+__all__ = ["Record", "Source"]
+
+T = TypeVar("T")
+WIDTH = 80
+QUARTER_CIRCLE = math.pi / 2 + 1e-12
+"""The largest latitude, rounding allowed for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The records of one file.
+
+    Attributes
+    ----------
+    path
+        Where the file is.
+    lines
+        Its records without their line ends, cut after column 80.
+    strip
+        The leading character removed from names (COMMON column 15), or nothing.
+    messages
+        Remarks made while the records are read.
+    """
+
+    path: Path
+    lines: list[str]
+    strip: str = ""
+    messages: list[Message] = field(default_factory=list)
+
+    @classmethod
+    def read(cls, path: Path, strip: str = "") -> Source:
+        """Read a text file (UTF-8, else Latin-1; any line ends).
+
+        Raises
+        ------
+        InputError
+            The file cannot be read, or a record holds a tab or another control character, which would move
+            its columns.
+        """
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+        lines = text.replace("\r\n", "\n").replace("\r", "\n").removesuffix("\x1a").split("\n")
+        if lines[-1] == "":
+            lines.pop()
+        source = cls(path, [line[:WIDTH] for line in lines], strip)
+        if not "".join(source.lines).isprintable():
+            record = next(record for record in source.filled() if not record.text.isprintable())
+            what = next(character for character in record.text if not character.isprintable())
+            raise record.error(f"the character {what!r} has no place in a record of fixed columns")
+        return source
+
+    def record(self, number: int) -> Record:
+        """Return the record of a number, from 1."""
+        return Record(self, number)
+
+    def filled(self) -> list[Record]:
+        """Return the records that are not blank."""
+        return [Record(self, number) for number, line in enumerate(self.lines, 1) if line.strip(" ")]
+
+    def error(self, text: str) -> InputError:
+        """Return an error about the file as a whole."""
+        return InputError(text, file=self.path)
+
+
+@dataclass(frozen=True)
+class Record:
+    """One record; columns are counted from 1, first and last included."""
+
+    source: Source
+    number: int
+
+    @property
+    def text(self) -> str:
+        """The characters of the record."""
+        return self.source.lines[self.number - 1]
+
+    def error(self, text: str) -> InputError:
+        """Return an error that names file, record number and record."""
+        return InputError(text, file=self.source.path, record=self.number, text=self.text)
+
+    def message(self, text: str) -> Message:
+        """Return a remark that names file, record number and record."""
+        return Message(text, self.source.path, self.number, self.text)
+
+    def remark(self, text: str) -> None:
+        """Add a remark on this record to the messages of the file."""
+        self.source.messages.append(self.message(text))
+
+    def columns(self, first: int, last: int) -> str:
+        """Return the characters of a field."""
+        return self.text[first - 1 : last]
+
+    def blank(self, first: int, last: int) -> bool:
+        """Whether a field is blank."""
+        return not self.columns(first, last).strip(" ")
+
+    def name(self, first: int) -> str:
+        """Read an eight-character name (2A4)."""
+        return parse_name(self.columns(first, first + 7), self.source.strip)
+
+    def identification(self, spellings: dict[str, Record]) -> str:
+        """Read the name in columns 1-8 and refuse a second spelling of one name.
+
+        `spellings` collects the first record of every name. Stripping a leading character, or blanks, can
+        make two names one.
+        """
+        name = self.name(1)
+        first = spellings.setdefault(name, self)
+        if first.columns(1, 8).rstrip(" ") != self.columns(1, 8).rstrip(" "):
+            raise self.error(
+                f"{self.columns(1, 8)!r} and {first.columns(1, 8)!r} (record {first.number})"
+                f" both become {name!r} without leading characters"
+            )
+        return name
+
+    def integer(self, first: int, last: int) -> int:
+        """Read an Iw field."""
+        return self._parse(first, last, "whole number", parse_integer)
+
+    def real(self, first: int, last: int, decimals: int = 3) -> float:
+        """Read an Fw.d field."""
+        format_ = f"F{last - first + 1}.{decimals}"
+        return float(self._parse(first, last, format_, lambda text: parse_real(text, decimals)))
+
+    def angle(self, first: int, last: int, decimals: int = 3) -> float:
+        """Read a packed DMS field as radians."""
+        angle, doubtful = self._parse(first, last, "DMS", lambda text: parse_angle(text, decimals))
+        if doubtful:
+            self.remark(
+                f"columns {first}-{last}: 60 minutes or 60 seconds in {self.columns(first, last).strip()!r}"
+            )
+        return angle
+
+    def deviation(self, first: int, last: int, *, angle: bool = False) -> float:
+        """Read a standard deviation, F10.3 or DMS; zero stands for the default."""
+        value = self.angle(first, last) if angle else self.real(first, last)
+        if value < 0:
+            raise self.error(f"columns {first}-{last}: the standard deviation is negative")
+        return value
+
+    def position(self, geographic: bool) -> tuple[float, float, float]:
+        """Read columns 9-44 (F12.3): X, Y, Z, or longitude and latitude (rad) and height."""
+        if not geographic:
+            return self.real(9, 20), self.real(21, 32), self.real(33, 44)
+        longitude, latitude, height = self.angle(9, 20), self.angle(21, 32), self.real(33, 44)
+        if abs(latitude) > QUARTER_CIRCLE:
+            raise self.error("columns 21-32: the latitude is beyond 90 degrees")
+        return longitude, latitude, height
+
+    def deviations(self, *angles: bool) -> tuple[float, float, float]:
+        """Read the three standard deviations of columns 45-74; `angles` says which are DMS."""
+        first, second, third = angles
+        return (
+            self.deviation(45, 54, angle=first),
+            self.deviation(55, 64, angle=second),
+            self.deviation(65, 74, angle=third),
+        )
+
+    def _parse(self, first: int, last: int, format_: str, parse: Callable[[str], T]) -> T:
+        columns = self.columns(first, last)
+        try:
+            value = parse(columns)
+        except ValueError as error:
+            raise self.error(f"columns {first}-{last} ({format_}): {error}") from None
+        if " " in columns.strip(" "):
+            self.remark(f"columns {first}-{last}: the blanks inside {columns.strip()!r} are ignored")
+        return value

@@ -1,0 +1,462 @@
+"""Simulated blocks: vertical photographs in strips over gentle relief.
+
+The block is laid out in a plane: x along the strips, y across them, z up, the origin in its centre on the
+mean terrain. Ground points stand on a grid locked to the photographs, a column under every projection centre
+and a row in the middle of every side overlap, so that neighbouring photographs and strips are tied, and so
+that the points a photograph may see are known beforehand.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram import geometry
+from photogram.block import Block
+from photogram.errors import InputError
+from photogram.geometry import Spheroid
+
+__all__ = ["Blunders", "Simulation", "simulate"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_JITTER = 0.15  # of a grid cell, either way: small enough to keep the middle of an overlap in the overlap
+
+
+@dataclass(frozen=True)
+class Blunders:
+    """Gross errors put into image observations.
+
+    Attributes
+    ----------
+    images
+        (k,) rows of the block's image arrays.
+    amounts
+        (k, 2) what was added to x and y, in millimetres.
+    """
+
+    images: Indices
+    amounts: Floats
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulated block and the truth behind it.
+
+    Attributes
+    ----------
+    block
+        What would have been measured: noisy image coordinates and control, coarse initial values of the
+        photos. Check points have their true positions, unheld; pass points have none.
+    truth
+        The same block with true positions and attitudes everywhere and image coordinates free of errors.
+    blunders
+        The gross errors in `block`.
+    """
+
+    block: Block
+    truth: Block
+    blunders: Blunders
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """The plan of the flight: metres, counts and the point grid."""
+
+    strips: int
+    photos_per_strip: int
+    base: float  # between photographs of a strip
+    separation: float  # of neighbouring strips
+    columns_per_base: int
+    rows_per_strip: int
+    reach: float  # how far from the point below it a photograph may see, in x or y
+
+    @property
+    def length(self) -> float:
+        return (self.photos_per_strip - 1) * self.base
+
+    @property
+    def width(self) -> float:
+        return (self.strips - 1) * self.separation
+
+    @property
+    def cell(self) -> tuple[float, float]:
+        return self.base / self.columns_per_base, self.separation / self.rows_per_strip
+
+
+def simulate(
+    *,
+    strips: int = 4,
+    photos_per_strip: int = 10,
+    forward_overlap: float = 0.6,
+    side_overlap: float = 0.3,
+    principal_distance: float = -152.74,
+    frame_size: float = 230.0,
+    flying_height: float = 4500.0,
+    relief: float = 150.0,
+    points_per_photo: float = 100.0,
+    crab: float = 0.03,
+    tilt: float = 0.01,
+    control: Literal["perimeter", "corners", "none"] = "perimeter",
+    control_spacing: int = 4,
+    control_sd: float = 0.05,
+    check_points: int = 20,
+    image_sd: float = 0.010,
+    position_error: float = 30.0,
+    attitude_error: float = 0.01,
+    position_sd: float = math.inf,
+    attitude_sd: float = math.inf,
+    blunders: int = 0,
+    blunder_size: float = 0.2,
+    spheroid: Spheroid | None = None,
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    photo_to_ground: bool = False,
+    seed: int | np.random.Generator = 0,
+) -> Simulation:
+    """Simulate a block of vertical photographs.
+
+    Parameters
+    ----------
+    strips, photos_per_strip
+        Their numbers; neighbouring strips are flown in opposite directions.
+    forward_overlap, side_overlap
+        Of neighbouring photographs and strips, as parts of the frame: above 0.5 and above 0 respectively,
+        below 1.
+    principal_distance
+        Millimetres; negative for the positive (diapositive) plane.
+    frame_size
+        Side of the square frame, millimetres.
+    flying_height, relief
+        Above the mean terrain, and the largest height of the smooth terrain above or below its mean; metres.
+    points_per_photo
+        Mean number of image points on a photograph, nearly: the grid has whole numbers of points in a base
+        and in a strip.
+    crab, tilt
+        Largest deviations of kappa from the heading, and of omega and phi from zero (uniform, either sign);
+        radians.
+    control
+        "perimeter": full control around the block every `control_spacing` bases and chains of height control
+        across it, as far apart; "corners": four full control points; "none". Control points are pass points
+        near these places.
+    control_sd
+        Standard deviation of every held component, metres; 0 gives fixed control.
+    check_points
+        How many points, chosen at random, carry their true position without being held.
+    image_sd
+        Standard deviation of image coordinates, millimetres: of their noise and in the block.
+    position_error, attitude_error
+        Standard deviation of the errors in the initial values of the photos, metres and radians.
+    position_sd, attitude_sd
+        Standard deviations that the block states for the initial values as observations, metres and radians;
+        infinite: free.
+    blunders, blunder_size
+        How many image points get a gross error, and its size in millimetres, in x or y, of either sign.
+    spheroid
+        None: rectangular space, x and y of the plan being X and Y. Else geographic space in metres: the plan
+        touches the spheroid at the origin, its x pointing east there; heights count from the spheroid,
+        photographs look down the local vertical.
+    origin
+        The centre of the block on the mean terrain: X, Y, Z in metres, or longitude (rad), latitude (rad),
+        height (m).
+    photo_to_ground
+        The sense of the attitude angles.
+    seed
+        Equal seeds and equal arguments give equal blocks.
+
+    Returns
+    -------
+    Simulation
+        Photos strip by strip, named by strip and photo ("0203"); images sorted by photo, then point. Points
+        seen on one photo only are left out. Names of control points begin with C, of check points with K, of
+        pass points with P.
+
+    Raises
+    ------
+    InputError
+        Arguments outside their ranges.
+    """
+    footprint = frame_size / abs(principal_distance or math.nan) * flying_height
+    _check(
+        {
+            "strips": (strips >= 1, "at least 1"),
+            "photos_per_strip": (photos_per_strip >= 2, "at least 2"),
+            "forward_overlap": (0.5 < forward_overlap < 1, "between 0.5 and 1"),
+            "side_overlap": (0 < side_overlap < 1, "between 0 and 1"),
+            "principal_distance": (math.isfinite(footprint), "finite and not 0"),
+            "frame_size": (frame_size > 0, "positive"),
+            "flying_height": (flying_height > 0, "positive"),
+            "relief": (0 <= relief < flying_height, "between 0 and the flying height"),
+            "points_per_photo": (4 <= points_per_photo < math.inf, "at least 4"),
+            "crab": (0 <= crab < math.pi / 4, "between 0 and pi/4"),
+            "tilt": (0 <= tilt < 0.1, "between 0 and 0.1"),
+            "control": (control in ("perimeter", "corners", "none"), "perimeter, corners or none"),
+            "control_spacing": (control_spacing >= 1, "at least 1"),
+            "control_sd": (0 <= control_sd < math.inf, "finite and not negative"),
+            "check_points": (check_points >= 0, "not negative"),
+            "image_sd": (0 < image_sd < math.inf, "finite and positive"),
+            "position_error": (0 <= position_error < math.inf, "finite and not negative"),
+            "attitude_error": (0 <= attitude_error < math.inf, "finite and not negative"),
+            "blunders": (blunders >= 0, "not negative"),
+            "blunder_size": (0 <= blunder_size < math.inf, "finite and not negative"),
+        }
+    )
+    streams = np.random.default_rng(seed).spawn(6)
+    terrain_random, flight_random, initial_random, image_random, control_random, blunder_random = streams
+
+    half_angle = math.atan(frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab)))
+    reach = 1.02 * (flying_height + relief) * math.tan(half_angle + 2 * tilt)
+    plan = _plan(strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach)
+    terrain = _terrain(plan, relief, footprint, terrain_random)
+    photos, rotations = _flight(plan, flying_height, crab, tilt, flight_random)
+    positions, attitudes = _into_object_space(photos, rotations, origin, spheroid, photo_to_ground)
+    ground, _ = _into_object_space(terrain, None, origin, spheroid, photo_to_ground)
+
+    image_photos, image_points = _candidates(plan)
+    xy = geometry.project(
+        ground[image_points],
+        positions[image_photos],
+        attitudes[image_photos],
+        np.full(len(image_photos), principal_distance),
+        spheroid=spheroid,
+        photo_to_ground=photo_to_ground,
+    )
+    seen = _seen(xy, image_points, frame_size)
+    used, image_points = np.unique(image_points[seen], return_inverse=True)
+    image_photos, xy, ground, terrain = image_photos[seen], xy[seen], ground[used], terrain[used]
+
+    held = _control(plan, terrain, control, control_spacing)
+    free = np.flatnonzero(~held.any(axis=1))
+    checks = control_random.choice(free, min(check_points, len(free)), replace=False)
+    known = held.copy()
+    known[checks] = True
+    metres = _metres_per_unit(ground, spheroid)
+    point_sd = np.where(held, control_sd / metres, np.inf)
+    control_noise = control_sd / metres * control_random.standard_normal(ground.shape)
+
+    metres = _metres_per_unit(positions, spheroid)
+    truth = Block(
+        photo_ids=_photo_ids(plan),
+        photo_positions=positions,
+        photo_attitudes=attitudes,
+        principal_distances=np.full(len(positions), principal_distance),
+        point_ids=_point_ids(held, checks),
+        point_positions=ground,
+        image_photos=image_photos,
+        image_points=image_points,
+        image_xy=xy,
+        image_sd=np.array(image_sd),
+        photo_position_sd=position_sd / metres,
+        photo_attitude_sd=np.array(attitude_sd),
+        point_sd=point_sd,
+        spheroid=spheroid,
+        photo_to_ground=photo_to_ground,
+        title=f"simulated block, {strips} strips of {photos_per_strip} photographs",
+    )
+    faults = _blunders(len(xy), blunders, blunder_size, blunder_random)
+    measured = xy + image_sd * image_random.standard_normal(xy.shape)
+    measured[faults.images] += faults.amounts
+    block = truth.replace(
+        photo_positions=positions + position_error / metres * initial_random.standard_normal(positions.shape),
+        photo_attitudes=attitudes + attitude_error * initial_random.standard_normal(attitudes.shape),
+        point_positions=np.where(known, ground + np.where(held, control_noise, 0.0), np.nan),
+        image_xy=measured,
+    )
+    return Simulation(block, truth, faults)
+
+
+def _check(ranges: dict[str, tuple[bool, str]]) -> None:
+    for name, (fine, expected) in ranges.items():
+        if not fine:
+            raise InputError(f"{name} must be {expected}")
+
+
+def _plan(
+    strips: int,
+    photos_per_strip: int,
+    forward_overlap: float,
+    side_overlap: float,
+    footprint: float,
+    points_per_photo: float,
+    reach: float,
+) -> _Plan:
+    base, separation = (1 - forward_overlap) * footprint, (1 - side_overlap) * footprint
+    # Points on one photo are left out: where one photo of one strip sees, the images are lost.
+    photos = strips * photos_per_strip
+    lost = _covered_once(photos_per_strip, base, footprint) * _covered_once(strips, separation, footprint)
+    density = points_per_photo * photos / (photos * footprint**2 - lost)
+    columns = max(1, round(base * math.sqrt(density)))
+    rows = max(1, round(density * base * separation / columns))
+    return _Plan(strips, photos_per_strip, base, separation, columns, rows, reach)
+
+
+def _covered_once(count: int, step: float, length: float) -> float:
+    """How much of a line only one of `count` intervals covers, their starts a step apart."""
+    starts = step * np.arange(count)
+    edges = np.sort(np.concatenate([starts, starts + length]))
+    middles = (edges[1:] + edges[:-1]) / 2
+    covers = ((starts[:, None] <= middles) & (middles < starts[:, None] + length)).sum(axis=0)
+    return float(np.diff(edges)[covers == 1].sum())
+
+
+def _window(plan: _Plan) -> tuple[Indices, Indices]:
+    """Grid columns and rows a photograph may see, counted from the column and half-strip below it."""
+    dx, dy = plan.cell
+    columns = math.ceil(plan.reach / dx + _JITTER)
+    middle, rows = -plan.rows_per_strip / 2, plan.reach / dy + _JITTER
+    return np.arange(-columns, columns + 1), np.arange(
+        math.floor(middle - rows), math.ceil(middle + rows) + 1
+    )
+
+
+def _grid(plan: _Plan) -> tuple[Indices, Indices]:
+    """All grid columns and rows: those of the first photograph to those of the last."""
+    columns, rows = _window(plan)
+    last_column = (plan.photos_per_strip - 1) * plan.columns_per_base + columns[-1]
+    last_row = (plan.strips - 1) * plan.rows_per_strip + rows[-1]
+    return np.arange(columns[0], last_column + 1), np.arange(rows[0], last_row + 1)
+
+
+def _candidates(plan: _Plan) -> tuple[Indices, Indices]:
+    """Pairs of photo and grid point that may see each other, sorted by photo, then point."""
+    columns, rows = _window(plan)
+    _, all_rows = _grid(plan)
+    strip, number = np.divmod(np.arange(plan.strips * plan.photos_per_strip), plan.photos_per_strip)
+    column = (number * plan.columns_per_base)[:, None, None] + (columns - columns[0])[:, None]
+    row = (strip * plan.rows_per_strip)[:, None, None] + (rows - rows[0])
+    points = column * len(all_rows) + row
+    photos = np.broadcast_to(np.arange(len(strip))[:, None, None], points.shape)
+    return photos.ravel(), points.ravel()
+
+
+def _seen(xy: Floats, points: Indices, frame_size: float) -> Indices:
+    """Candidates inside the frame whose point is seen at least twice."""
+    seen = np.flatnonzero((np.abs(xy) <= frame_size / 2).all(axis=1))
+    rays = np.bincount(points[seen])
+    return seen[rays[points[seen]] >= 2]
+
+
+def _terrain(plan: _Plan, relief: float, footprint: float, random: np.random.Generator) -> Floats:
+    """Ground points in the plan, (n, 3), column by column: a jittered grid on long waves."""
+    dx, dy = plan.cell
+    columns, rows = _grid(plan)
+    x, y = np.meshgrid(
+        columns * dx - plan.length / 2, (rows + plan.rows_per_strip / 2) * dy - plan.width / 2, indexing="ij"
+    )
+    jitter = random.uniform(-_JITTER, _JITTER, (2, *x.shape))
+    x, y = x + dx * jitter[0], y + dy * jitter[1]
+    waves = 8
+    heading, phase = random.uniform(0, 2 * math.pi, (2, waves))
+    wave_number = 2 * math.pi / (footprint * random.uniform(1.0, 5.0, waves))
+    z = np.zeros_like(x)
+    for h, k, p in zip(heading, wave_number, phase, strict=True):
+        z += relief / waves * np.sin(k * (math.cos(h) * x + math.sin(h) * y) + p)
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3)
+
+
+def _flight(
+    plan: _Plan, flying_height: float, crab: float, tilt: float, random: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Projection centres in the plan and rotations from the plan to the photos."""
+    strip, number = np.divmod(np.arange(plan.strips * plan.photos_per_strip), plan.photos_per_strip)
+    x, y = number * plan.base - plan.length / 2, strip * plan.separation - plan.width / 2
+    deviation = random.uniform(-1.0, 1.0, (len(strip), 3)) * [tilt, tilt, crab]
+    deviation[:, 2] += math.pi * (strip % 2)
+    return np.stack([x, y, np.full(len(x), flying_height)], axis=1), geometry.rotation_matrix(deviation)
+
+
+def _into_object_space(
+    plan_positions: Floats,
+    rotations: Floats | None,
+    origin: tuple[float, float, float],
+    spheroid: Spheroid | None,
+    photo_to_ground: bool,
+) -> tuple[Floats, Floats]:
+    """Positions and, given the rotations from the plan to the photos, attitudes in the object space."""
+    positions = plan_positions + np.asarray(origin)
+    if spheroid is not None:
+        frame, tangent_point = _east_north_up(origin[0], origin[1]), np.array([[origin[0], origin[1], 0.0]])
+        plane = plan_positions * [1.0, 1.0, 0.0]
+        xyz = geometry.geographic_to_geocentric(tangent_point, spheroid) + plane @ frame
+        positions = geometry.geocentric_to_geographic(xyz, spheroid)
+        positions[:, 2] = plan_positions[:, 2] + origin[2]
+    if rotations is None:
+        return positions, np.empty((0, 3))
+    if spheroid is not None:
+        # East at the station, seen from the plan: turned about the vertical by the convergence of the
+        # meridians.
+        east = np.stack([-np.sin(positions[:, 0]), np.cos(positions[:, 0]), np.zeros(len(positions))], axis=1)
+        in_plan = east @ frame.T
+        convergence = np.zeros_like(positions)
+        convergence[:, 2] = -np.arctan2(in_plan[:, 1], in_plan[:, 0])
+        rotations = rotations @ geometry.rotation_matrix(convergence)
+    return positions, geometry.rotation_angles(rotations.transpose(0, 2, 1) if photo_to_ground else rotations)
+
+
+def _east_north_up(longitude: float, latitude: float) -> Floats:
+    """Rows east, north and up of the local vertical frame."""
+    (sl, cl), (sp, cp) = ((math.sin(angle), math.cos(angle)) for angle in (longitude, latitude))
+    return np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
+
+
+def _metres_per_unit(positions: Floats, spheroid: Spheroid | None) -> Floats:
+    """Lengths of the units of the coordinates: ones, or radii of curvature for longitude and latitude."""
+    if spheroid is None:
+        return np.ones_like(positions)
+    latitude, height = positions[:, 1], positions[:, 2]
+    w = np.sqrt(1 - (1 - (spheroid.b / spheroid.a) ** 2) * np.sin(latitude) ** 2)
+    parallel = (spheroid.a / w + height) * np.cos(latitude)
+    meridian = spheroid.b**2 / spheroid.a / w**3 + height
+    return np.stack([parallel, meridian, np.ones_like(height)], axis=1)
+
+
+def _control(plan: _Plan, terrain: Floats, pattern: str, spacing: int) -> NDArray[np.bool_]:
+    """Which components of which points are held, (n, 3)."""
+    held = np.zeros(terrain.shape, dtype=bool)
+    if pattern == "none":
+        return held
+    right, top = plan.length / 2, (plan.width + plan.separation) / 2
+    along, across = 2, 2
+    if pattern == "perimeter":
+        along = max(2, round(2 * right / (spacing * plan.base)) + 1)
+        across = max(2, round(2 * top / (spacing * plan.base)) + 1)
+    xs, ys = np.linspace(-right, right, along), np.linspace(-top, top, across)
+    full = [(x, y) for x in xs for y in (-top, top)] + [(x, y) for x in (-right, right) for y in ys[1:-1]]
+    height = []
+    if pattern == "perimeter":
+        overlaps = np.linspace(-top, top, plan.strips + 1)[1:-1]
+        height = [(x, y) for x in xs[1:-1] for y in overlaps]
+    order = np.argsort(terrain[:, 0])
+    sorted_x = terrain[order, 0]
+    for places, components in ((height, slice(2, 3)), (full, slice(0, 3))):
+        for place in places:
+            low, high = np.searchsorted(sorted_x, [place[0] - plan.reach, place[0] + plan.reach])
+            near = order[low:high]
+            held[near[np.argmin(((terrain[near, :2] - place) ** 2).sum(axis=1))], components] = True
+    return held
+
+
+def _blunders(images: int, count: int, size: float, random: np.random.Generator) -> Blunders:
+    rows = np.sort(random.choice(images, min(count, images), replace=False))
+    amounts = np.zeros((len(rows), 2))
+    amounts[np.arange(len(rows)), random.integers(0, 2, len(rows))] = size * random.choice([-1, 1], len(rows))
+    return Blunders(rows.astype(np.int64), amounts)
+
+
+def _photo_ids(plan: _Plan) -> list[str]:
+    strip_digits, number_digits = (max(2, len(str(count))) for count in (plan.strips, plan.photos_per_strip))
+    return [
+        f"{strip:0{strip_digits}d}{number:0{number_digits}d}"
+        for strip in range(1, plan.strips + 1)
+        for number in range(1, plan.photos_per_strip + 1)
+    ]
+
+
+def _point_ids(held: NDArray[np.bool_], checks: Indices) -> list[str]:
+    kind = np.where(held.any(axis=1), "C", "P")
+    kind[checks] = "K"
+    return [f"{letter}{number:06d}" for number, letter in enumerate(kind, start=1)]

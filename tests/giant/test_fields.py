@@ -1,0 +1,224 @@
+"""Single fields: GIANT guide, section II.B; specification 2.1."""
+
+import json
+import math
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from photogram.giant.fields import (
+    format_angle,
+    format_deviations,
+    format_name,
+    format_real,
+    parse_angle,
+    parse_integer,
+    parse_name,
+    parse_real,
+)
+
+GOLDEN = json.loads((Path(__file__).parents[1] / "data" / "giant" / "golden_cases.json").read_text())
+
+
+@pytest.mark.parametrize("case", GOLDEN["implied_decimal"], ids=lambda case: case["field"])
+def test_numbers_of_the_report(case):
+    decimals = int(case["format"].split(".")[1])
+    assert float(parse_real(case["field"], decimals)) == pytest.approx(case["value"], abs=1e-12)
+
+
+@pytest.mark.parametrize("case", GOLDEN["dms_packed"], ids=lambda case: case["field"])
+def test_angles_of_the_report(case):
+    angle, doubtful = parse_angle(case["field"], 3)
+    degrees, minutes, seconds = case["dms"].removeprefix("-").split()
+    size = int(degrees) + int(minutes) / 60 + float(seconds) / 3600
+    assert math.degrees(angle) == pytest.approx(math.copysign(size, case["deg"]), abs=1e-12)
+    assert math.degrees(angle) == pytest.approx(case["deg"], abs=0.5000001e-6)  # printed to six decimals
+    assert not doubtful
+    text = format_angle(angle, 12)
+    assert Decimal(text) == Decimal(case["field"])
+    assert parse_angle(text, 3) == (angle, False)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("", 0),
+        ("          ", 0),
+        ("   12     ", "0.012"),
+        (" - 1 2.5  ", "-12.5"),
+        ("1.", 1),
+        (".5", "0.5"),
+        ("+.5", "0.5"),
+        ("1.5E2", 150),
+        ("15D3", 15),
+        ("-0.000", 0),
+    ],
+)
+def test_real(field, value):
+    assert parse_real(field, 3) == Decimal(value)
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        "nan",
+        "NaN",
+        "inf",
+        "-Infinity",
+        "1.2.3",
+        "--1",
+        "1-",
+        "1,5",
+        "12a",
+        "1_000",
+        ".",
+        "-",
+        "E5",
+        "1e999",
+        "٣",
+    ],
+)
+def test_illegal_numbers(field):
+    with pytest.raises(ValueError, match="is not a number"):
+        parse_real(field, 3)
+
+
+def test_integers():
+    assert [parse_integer(field) for field in ("", " ", "7", " 5", "5 ", "-1")] == [0, 0, 7, 5, 5, -1]
+    for field in ("x", "1.", "²"):
+        with pytest.raises(ValueError, match="whole number"):
+            parse_integer(field)
+
+
+@pytest.mark.parametrize("field", ["3610000.000", "-3610000.", "16100.", "61.000", "-60.001", "3610000000"])
+def test_illegal_angles(field):
+    with pytest.raises(ValueError, match="ILLEGAL DMS FIELD"):
+        parse_angle(field, 3)
+
+
+@pytest.mark.parametrize(
+    ("field", "arcseconds", "doubtful"),
+    [
+        ("3600000.000", 1296000, False),
+        ("6000.000", 3600, True),
+        ("60.000", 60, True),
+        ("10060.", 3660, True),
+        ("-03000.000", -1800, False),
+        ("-5930", -5.930, False),  # without a point F12.3 has three decimals
+        ("100.0E1", 600, False),
+    ],
+)
+def test_angles_at_the_limits(field, arcseconds, doubtful):
+    angle, remark = parse_angle(field, 3)
+    assert math.degrees(angle) == pytest.approx(arcseconds / 3600, abs=1e-12)
+    assert remark is doubtful
+
+
+@pytest.mark.parametrize(
+    ("field", "strip", "name"),
+    [
+        ("SH9960  ", "", "SH9960"),
+        ("  12    ", "", "12"),
+        ("000126! ", "0", "126!"),
+        ("00000000", "0", "0"),
+        ("0 12", "0", "12"),
+        ("A00", "0", "A00"),
+        ("        ", "0", ""),
+        ("A B", "", "A B"),
+    ],
+)
+def test_names(field, strip, name):
+    assert parse_name(field, strip) == name
+
+
+@pytest.mark.parametrize(
+    ("value", "field"),
+    [
+        (-152.74, "  -152.740"),
+        (0.0, "     0.000"),
+        (-0.0, "     0.000"),
+        (0.1 + 0.2, "     0.300"),
+        (-13.627512345678, "-13.627512"),
+        (-0.123456789, "-.12345679"),
+        (-123456.789, "-123456789"),  # an implied point where the explicit one would cost a digit
+        (1e-8, "0.00000001"),
+        (99.999999999, "   100.000"),
+        (999999.99999, "1000000.00"),
+        (123456789.0, "123456789."),
+        (math.nan, "          "),
+    ],
+)
+def test_writing_numbers(value, field):
+    assert format_real(value, 10, 3) == field
+
+
+@pytest.mark.parametrize("value", [1e10, -1e9, math.inf, -math.inf, 1e300])
+def test_numbers_that_do_not_fit(value):
+    with pytest.raises(ValueError, match=r"does not fit|no spelling"):
+        format_real(value, 10, 3)
+
+
+@given(st.from_regex(r" {0,4}[+-]?[0-9]{1,8}(\.[0-9]{0,6})?|[+-]?\.[0-9]{1,8}", fullmatch=True))
+def test_any_number_that_was_read_is_written_and_read_as_the_same(field):
+    assume(len(field) <= 12)
+    value = float(parse_real(field, 3))
+    assert float(parse_real(format_real(value, 12, 3), 3)) == value
+
+
+@given(st.floats(-1e8, 1e8))
+def test_any_number_is_written_as_closely_as_the_columns_allow(value):
+    text = format_real(value, 12, 3)
+    assert len(text) == 12
+    whole = len(str(int(value))) + (value < 0)
+    assert float(parse_real(text, 3)) == pytest.approx(value, abs=0.51 * 10.0 ** -max(3, 12 - whole - 2))
+
+
+@given(
+    st.sampled_from([1, -1]),
+    st.integers(0, 360),
+    st.integers(0, 59),
+    st.decimals(0, 59, places=4, allow_nan=False),
+)
+def test_any_angle_that_was_read_is_written_and_read_as_the_same(sign, degrees, minutes, seconds):
+    assume(degrees < 360 or minutes == seconds == 0)
+    field = f"{sign * (10000 * degrees + 100 * minutes + seconds):f}"[:12]
+    angle, _ = parse_angle(field, 3)
+    assert parse_angle(format_angle(angle, 12), 3)[0] == angle
+
+
+@given(st.floats(-2 * math.pi, 2 * math.pi))
+def test_any_angle_is_written_to_four_decimals_of_the_second(angle):
+    text = format_angle(angle, 12)
+    assert len(text) == 12
+    error = parse_angle(text, 3)[0] - angle
+    assert math.remainder(error, 2 * math.pi) == pytest.approx(0, abs=math.radians(0.000051 / 3600))
+
+
+def test_seconds_round_up_into_minutes_and_degrees():
+    assert format_angle(math.radians(29 + 59 / 60 + 59.9999999 / 3600), 12) == " 300000.0000"
+
+
+@pytest.mark.parametrize("angle", [6.3, -6.3, math.inf])
+def test_angles_beyond_the_circle_are_refused(angle):
+    with pytest.raises(ValueError, match="360 degrees"):
+        format_angle(angle, 12)
+
+
+def test_deviations():
+    arcsec = math.radians(1 / 3600)
+    assert (
+        format_deviations((0.0, 600 * arcsec, 0.04), (True, True, False)) == "            1000.000     0.040"
+    )
+    for value in (-0.1, 1e-12, 1e12, math.nan):
+        with pytest.raises(ValueError, match=r"cannot be written|does not fit"):
+            format_deviations((value,), (False,))
+
+
+def test_names_are_written_as_they_are_read():
+    assert format_name("SH9960") == "SH9960  "
+    for name in ("123456789", " A", "A ", "A\tB", "****", "****1"):
+        with pytest.raises(ValueError, match="name"):
+            format_name(name)
