@@ -1,7 +1,7 @@
 """Single fields of fixed-column records: numbers, packed degrees-minutes-seconds and names, read and written.
 
-Everything here works on the characters of one field and raises ValueError; :mod:`photogram.giant.records` adds
-the file, the record and the columns. Rules: GIANT guide, section II.B.
+Everything here works on the characters of one field and raises ValueError; :mod:`photogram.giant.records`
+adds the file, the record and the columns. Rules: GIANT guide, section II.B.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def parse_images(source: Source) -> list[ImageFrame]:
     if starts[-1] != len(numbers):
         header, last = source.record(numbers[starts[-1]]), source.record(numbers[-1])
         raise last.error(
-            f"the frame {header.name(1)} (record {header.number}) has no terminator {TERMINATOR}"
+            f"the frame {header.name(1)!r} (record {header.number}) has no terminator {TERMINATOR}"
         )
     points = np.ones(len(numbers), dtype=bool)
     points[ends] = False
