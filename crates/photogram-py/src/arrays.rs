@@ -1,6 +1,6 @@
 //! Rows of NumPy arrays: shapes are checked here, and what is wrong is said with the name of the argument.
 
-use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -29,6 +29,21 @@ pub fn numbers(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<
         [_] => Ok(values(array)),
         shape => Err(wrong_shape(name, "(n,)", shape)),
     }
+}
+
+/// The indices, not negative, of an (n,) array.
+pub fn indices(name: &str, array: &PyReadonlyArrayDyn<'_, i64>) -> PyResult<Vec<usize>> {
+    let negative = |index: i64| PyValueError::new_err(format!("{name} holds the negative index {index}"));
+    match array.shape() {
+        [_] => array.as_array().iter().map(|&i| usize::try_from(i).map_err(|_| negative(i))).collect(),
+        shape => Err(wrong_shape(name, "(n,)", shape)),
+    }
+}
+
+/// Rows as an (n, N) array.
+pub fn table<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let count = rows.len();
+    PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
 }
 
 /// Refuses arrays whose lengths differ from the first one's.

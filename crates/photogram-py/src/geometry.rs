@@ -1,6 +1,6 @@
 //! The geometry functions, row by row over arrays; their documentation is in `_photocore.pyi`.
 
-use crate::arrays::{check_lengths, matrices, numbers, rows};
+use crate::arrays::{check_lengths, matrices, numbers, rows, table};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::geometry::{
     self, Ellipsoid, GeometryError, ObjectSpace, Photo, Point, RotationSense, Vector3,
@@ -82,10 +82,7 @@ fn project<'py>(
             ("principal_distances", principal_distances.len()),
         ],
     )?;
-    let space = match spheroid {
-        None => ObjectSpace::Rectangular,
-        Some(axes) => ObjectSpace::Geographic(ellipsoid(axes)?),
-    };
+    let space = object_space(spheroid)?;
     let sense = if photo_to_ground { RotationSense::PhotoToGround } else { RotationSense::GroundToPhoto };
     let image = |i: usize| {
         let photo = Photo::new(space, sense, positions[i], attitudes[i], principal_distances[i]);
@@ -98,7 +95,7 @@ fn ellipsoid((a, b): (f64, f64)) -> PyResult<Ellipsoid> {
     Ellipsoid::new(a, b).map_err(|error: GeometryError| PyValueError::new_err(error.to_string()))
 }
 
-fn table<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
-    let count = rows.len();
-    PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
+/// The object space: geographic when a spheroid is given by its semi-axes.
+pub fn object_space(spheroid: Option<(f64, f64)>) -> PyResult<ObjectSpace> {
+    spheroid.map_or(Ok(ObjectSpace::Rectangular), |axes| ellipsoid(axes).map(ObjectSpace::Geographic))
 }

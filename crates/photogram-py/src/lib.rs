@@ -1,7 +1,9 @@
 //! The extension module `photogram._photocore`: converts arrays, releases the GIL, decides nothing.
 
 mod arrays;
+mod block;
 mod geometry;
+mod solution;
 
 use pyo3::prelude::*;
 
@@ -9,5 +11,5 @@ use pyo3::prelude::*;
 fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     geometry::register(module)?;
-    Ok(())
+    block::register(module)
 }

@@ -1,0 +1,205 @@
+//! Block triangulation; its documentation is in `_photocore.pyi`.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use numpy::PyReadonlyArrayDyn;
+use photocore::adjustment::{Criterion, Event, Iteration, Options as AdjustmentOptions, Phase};
+use photocore::geometry::RotationSense;
+use photocore::normals::Ordering;
+use photocore::programs::block::{Block, BlockError, Image, Options, Photo, Point, UnitVariance};
+use pyo3::create_exception;
+use pyo3::exceptions::{PyException, PyValueError};
+use pyo3::prelude::*;
+
+use crate::arrays::{check_lengths, indices, numbers, rows};
+use crate::geometry::object_space;
+use crate::solution::{BlockSolution, IterationRow};
+
+create_exception!(
+    _photocore,
+    BlockFailure,
+    PyException,
+    "The block cannot be adjusted: (kind, message, photos, points)."
+);
+
+/// Adds the function and its classes to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("BlockFailure", module.py().get_type::<BlockFailure>())?;
+    module.add_class::<BlockSolution>()?;
+    module.add_function(wrap_pyfunction!(adjust_block, module)?)
+}
+
+#[pyfunction]
+#[pyo3(signature = (
+    photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd, principal_distances, point_positions, point_sd,
+    image_photos, image_points, image_xy, image_sd, *, spheroid, photo_to_ground, criterion, limit, max_iterations,
+    covariance, ordering, unit_variance, threads, progress
+))]
+fn adjust_block(
+    py: Python<'_>,
+    photo_positions: PyReadonlyArrayDyn<'_, f64>,
+    photo_attitudes: PyReadonlyArrayDyn<'_, f64>,
+    photo_position_sd: PyReadonlyArrayDyn<'_, f64>,
+    photo_attitude_sd: PyReadonlyArrayDyn<'_, f64>,
+    principal_distances: PyReadonlyArrayDyn<'_, f64>,
+    point_positions: PyReadonlyArrayDyn<'_, f64>,
+    point_sd: PyReadonlyArrayDyn<'_, f64>,
+    image_photos: PyReadonlyArrayDyn<'_, i64>,
+    image_points: PyReadonlyArrayDyn<'_, i64>,
+    image_xy: PyReadonlyArrayDyn<'_, f64>,
+    image_sd: PyReadonlyArrayDyn<'_, f64>,
+    spheroid: Option<(f64, f64)>,
+    photo_to_ground: bool,
+    criterion: &str,
+    limit: f64,
+    max_iterations: usize,
+    covariance: bool,
+    ordering: &str,
+    unit_variance: &str,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<BlockSolution> {
+    let positions = rows("photo_positions", &photo_positions)?;
+    let attitudes = rows("photo_attitudes", &photo_attitudes)?;
+    let position_sd = rows("photo_position_sd", &photo_position_sd)?;
+    let attitude_sd = rows("photo_attitude_sd", &photo_attitude_sd)?;
+    let distances = numbers("principal_distances", &principal_distances)?;
+    check_lengths(
+        ("photo_positions", positions.len()),
+        &[
+            ("photo_attitudes", attitudes.len()),
+            ("photo_position_sd", position_sd.len()),
+            ("photo_attitude_sd", attitude_sd.len()),
+            ("principal_distances", distances.len()),
+        ],
+    )?;
+    let coordinates = rows("point_positions", &point_positions)?;
+    let sd = rows("point_sd", &point_sd)?;
+    check_lengths(("point_positions", coordinates.len()), &[("point_sd", sd.len())])?;
+    let photos_of = indices("image_photos", &image_photos)?;
+    let points_of = indices("image_points", &image_points)?;
+    let xy = rows("image_xy", &image_xy)?;
+    let xy_sd = rows("image_sd", &image_sd)?;
+    check_lengths(
+        ("image_xy", xy.len()),
+        &[("image_photos", photos_of.len()), ("image_points", points_of.len()), ("image_sd", xy_sd.len())],
+    )?;
+    let photo = |i: usize| Photo {
+        position: positions[i],
+        attitude: attitudes[i],
+        position_sd: position_sd[i],
+        attitude_sd: attitude_sd[i],
+        principal_distance: distances[i],
+    };
+    let image = |i: usize| Image { photo: photos_of[i], point: points_of[i], xy: xy[i], sd: xy_sd[i] };
+    let block = Block {
+        space: object_space(spheroid)?,
+        sense: if photo_to_ground { RotationSense::PhotoToGround } else { RotationSense::GroundToPhoto },
+        photos: (0..positions.len()).map(photo).collect(),
+        points: (0..sd.len()).map(|i| Point { coordinates: coordinates[i], sd: sd[i] }).collect(),
+        images: (0..xy.len()).map(image).collect(),
+    };
+    let criterion = match criterion {
+        "fraction" => Criterion::Fraction(limit),
+        "percent" => Criterion::Percent(limit),
+        other => return Err(unknown("criterion", other)),
+    };
+    let options = Options {
+        adjustment: AdjustmentOptions { criterion, max_iterations, covariance },
+        ordering: match ordering {
+            "auto" => Ordering::Auto,
+            "input" => Ordering::Input,
+            "rcm" => Ordering::ReverseCuthillMckee,
+            other => return Err(unknown("ordering", other)),
+        },
+        unit_variance: match unit_variance {
+            "free" => UnitVariance::Free,
+            "constrained" => UnitVariance::Constrained,
+            "unity" => UnitVariance::Unity,
+            other => return Err(unknown("unit_variance", other)),
+        },
+    };
+    run(py, &block, &options, threads, progress)
+}
+
+/// Adjusts without the GIL. Signals and the caller's `progress` are looked after now and then, on this thread.
+fn run(
+    py: Python<'_>,
+    block: &Block,
+    options: &Options,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<BlockSolution> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let mut raised = None;
+    let mut last = Instant::now();
+    let mut watch = |event: Event| {
+        let due = matches!(event, Event::Iteration(_)) || last.elapsed() > PATIENCE;
+        if !due {
+            return ControlFlow::Continue(());
+        }
+        last = Instant::now();
+        match Python::attach(|py| tell(py, progress.as_ref(), event)) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                raised = Some(error);
+                ControlFlow::Break(())
+            }
+        }
+    };
+    let solution = py.detach(|| block.adjust(options, &pool, &mut watch));
+    match (solution, raised) {
+        (_, Some(error)) => Err(error),
+        (Ok(solution), None) => Ok(BlockSolution::new(solution)),
+        (Err(error), None) => Err(failure(&error)),
+    }
+}
+
+/// Between two looks at signals and progress.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+fn tell(py: Python<'_>, progress: Option<&Py<PyAny>>, event: Event) -> PyResult<()> {
+    py.check_signals()?;
+    let Some(progress) = progress else { return Ok(()) };
+    match event {
+        Event::Progress { phase, done, total } => {
+            progress.call1(py, (phase_name(phase), done, total, None::<()>))
+        }
+        Event::Iteration(iteration) => {
+            progress.call1(py, ("iteration", iteration.number, 0, Some(iteration_row(&iteration))))
+        }
+    }
+    .map(drop)
+}
+
+pub fn iteration_row(iteration: &Iteration) -> IterationRow {
+    (iteration.number, iteration.sum_of_squares, iteration.largest_change, iteration.damping)
+}
+
+fn phase_name(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Form => "form",
+        Phase::Factor => "factor",
+        Phase::Solve => "solve",
+        Phase::Invert => "invert",
+        Phase::Cofactors => "cofactors",
+    }
+}
+
+fn failure(error: &BlockError) -> PyErr {
+    let (kind, photos, points) = match error {
+        BlockError::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
+        BlockError::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
+        BlockError::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
+        BlockError::Empty => ("empty", vec![], vec![]),
+        BlockError::NotFinite => ("not finite", vec![], vec![]),
+        BlockError::Index(_) | BlockError::Layout(_) | BlockError::Interrupted => ("input", vec![], vec![]),
+    };
+    BlockFailure::new_err((kind, error.to_string(), photos, points))
+}
+
+fn unknown(option: &str, value: &str) -> PyErr {
+    PyValueError::new_err(format!("{option} cannot be {value:?}"))
+}

@@ -1,0 +1,181 @@
+//! The adjusted block as arrays; its documentation is in `_photocore.pyi`.
+
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use photocore::adjustment::Status;
+use photocore::programs::block::{AdjustedImage, Solution};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::table;
+use crate::block::iteration_row;
+
+/// Number, weighted sum of squares, largest change in standard deviations, damping.
+pub type IterationRow = (usize, f64, f64, f64);
+
+/// An adjusted block.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct BlockSolution {
+    solution: Solution,
+}
+
+impl BlockSolution {
+    pub fn new(solution: Solution) -> Self {
+        Self { solution }
+    }
+
+    fn images<'py>(
+        &self,
+        py: Python<'py>,
+        part: impl Fn(&AdjustedImage) -> [f64; 2],
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let missing = [f64::NAN; 2];
+        table(py, self.solution.images.iter().map(|image| image.as_ref().map_or(missing, &part)).collect())
+    }
+}
+
+#[pymethods]
+impl BlockSolution {
+    #[getter]
+    fn status(&self) -> &'static str {
+        match self.solution.adjustment.status {
+            Status::Converged => "converged",
+            Status::NotConverged => "not converged",
+            Status::Diverged => "diverged",
+        }
+    }
+
+    #[getter]
+    fn initial_sum_of_squares(&self) -> f64 {
+        self.solution.adjustment.initial_sum_of_squares
+    }
+
+    #[getter]
+    fn iterations(&self) -> Vec<IterationRow> {
+        self.solution.adjustment.iterations.iter().map(iteration_row).collect()
+    }
+
+    #[getter]
+    fn photo_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, self.solution.photos.iter().map(|photo| photo.position).collect())
+    }
+
+    #[getter]
+    fn photo_attitudes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, self.solution.photos.iter().map(|photo| photo.attitude).collect())
+    }
+
+    #[getter]
+    fn photo_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        squares(py, self.solution.photos.iter().map(|photo| photo.cofactors).collect())
+    }
+
+    #[getter]
+    fn photo_redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, self.solution.photos.iter().map(|photo| photo.redundancy).collect())
+    }
+
+    #[getter]
+    fn point_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let missing = [f64::NAN; 3];
+        table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.coordinates)).collect())
+    }
+
+    #[getter]
+    fn point_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let missing = [[f64::NAN; 3]; 3];
+        squares(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.cofactors)).collect())
+    }
+
+    #[getter]
+    fn point_redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let missing = [f64::NAN; 3];
+        table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.redundancy)).collect())
+    }
+
+    #[getter]
+    fn point_rays<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_vec(py, self.solution.points.iter().map(|p| p.map_or(0, |p| p.rays as i64)).collect())
+    }
+
+    #[getter]
+    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.images(py, |image| image.residual)
+    }
+
+    #[getter]
+    fn redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.images(py, |image| image.redundancy)
+    }
+
+    #[getter]
+    fn standardized<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.images(py, |image| image.standardized)
+    }
+
+    #[getter]
+    fn dropped(&self) -> Vec<(usize, &'static str)> {
+        self.solution.dropped.iter().map(|dropped| (dropped.point, dropped.reason.name())).collect()
+    }
+
+    #[getter]
+    fn sums_of_squares(&self) -> (f64, f64, f64) {
+        let sums = self.solution.sums_of_squares;
+        (sums.camera, sums.ground, sums.plates)
+    }
+
+    #[getter]
+    fn degrees_of_freedom(&self) -> i64 {
+        self.solution.degrees_of_freedom
+    }
+
+    #[getter]
+    fn variance_of_unit_weight(&self) -> Option<f64> {
+        self.solution.variance_of_unit_weight
+    }
+
+    #[getter]
+    fn counts(&self) -> (usize, usize, usize) {
+        let counts = self.solution.adjustment.counts;
+        (counts.observations, counts.weighted, counts.unknowns)
+    }
+
+    #[getter]
+    fn ordering(&self) -> &'static str {
+        self.solution.adjustment.ordering.name()
+    }
+
+    #[getter]
+    fn operations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let operations = self.solution.adjustment.operations;
+        let dict = PyDict::new(py);
+        dict.set_item("reduction", operations.reduction)?;
+        dict.set_item("factor", operations.factor)?;
+        dict.set_item("inverse", operations.inverse)?;
+        Ok(dict)
+    }
+
+    #[getter]
+    fn formations(&self) -> usize {
+        self.solution.adjustment.formations
+    }
+
+    #[getter]
+    fn seconds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let seconds = self.solution.adjustment.seconds;
+        let dict = PyDict::new(py);
+        dict.set_item("form", seconds.form)?;
+        dict.set_item("factor", seconds.factor)?;
+        dict.set_item("solve", seconds.solve)?;
+        dict.set_item("invert", seconds.invert)?;
+        dict.set_item("cofactors", seconds.cofactors)?;
+        Ok(dict)
+    }
+}
+
+fn squares<const N: usize>(
+    py: Python<'_>,
+    matrices: Vec<[[f64; N]; N]>,
+) -> PyResult<Bound<'_, PyArray3<f64>>> {
+    let count = matrices.len();
+    PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, N, N])
+}
