@@ -50,6 +50,17 @@ def test_the_truth_projects_onto_its_images(space):
 
 
 @pytest.mark.parametrize("space", SPACES.values(), ids=SPACES.keys())
+def test_no_image_is_missing(space):
+    truth = simulate(strips=3, photos_per_strip=4, crab=0.3, tilt=0.09, relief=1500.0, **space).truth
+    photos, points = (index.ravel() for index in np.indices((len(truth.photo_ids), len(truth.point_ids))))
+    everything = truth.replace(
+        image_photos=photos, image_points=points, image_xy=np.zeros((len(photos), 2)), image_sd=np.array(0.01)
+    )
+    inside = (np.abs(project(everything)) <= 115.0).all(axis=1)
+    np.testing.assert_array_equal(sees(truth).ravel(), inside)
+
+
+@pytest.mark.parametrize("space", SPACES.values(), ids=SPACES.keys())
 @pytest.mark.parametrize(("forward", "side"), [(0.6, 0.3), (0.8, 0.6)])
 def test_overlaps_come_out(space, forward, side):
     truth = simulate(

@@ -216,18 +216,18 @@ def simulate(
     positions, attitudes = _into_object_space(photos, rotations, origin, spheroid, photo_to_ground)
     ground, _ = _into_object_space(terrain, None, origin, spheroid, photo_to_ground)
 
-    image_photos, image_points = _candidates(plan)
-    xy = geometry.project(
-        ground[image_points],
-        positions[image_photos],
-        attitudes[image_photos],
-        np.full(len(image_photos), principal_distance),
-        spheroid=spheroid,
-        photo_to_ground=photo_to_ground,
+    image_photos, image_points, xy = _photograph(
+        _candidates(plan),
+        ground,
+        positions,
+        attitudes,
+        principal_distance,
+        frame_size,
+        spheroid,
+        photo_to_ground,
     )
-    seen = _seen(xy, image_points, frame_size)
-    used, image_points = np.unique(image_points[seen], return_inverse=True)
-    image_photos, xy, ground, terrain = image_photos[seen], xy[seen], ground[used], terrain[used]
+    used, image_points = np.unique(image_points, return_inverse=True)
+    ground, terrain = ground[used], terrain[used]
 
     held = _control(plan, terrain, control, control_spacing)
     free = np.flatnonzero(~held.any(axis=1))
@@ -333,11 +333,30 @@ def _candidates(plan: _Plan) -> tuple[Indices, Indices]:
     return photos.ravel(), points.ravel()
 
 
-def _seen(xy: Floats, points: Indices, frame_size: float) -> Indices:
-    """Candidates inside the frame whose point is seen at least twice."""
+def _photograph(
+    candidates: tuple[Indices, Indices],
+    ground: Floats,
+    positions: Floats,
+    attitudes: Floats,
+    principal_distance: float,
+    frame_size: float,
+    spheroid: Spheroid | None,
+    photo_to_ground: bool,
+) -> tuple[Indices, Indices, Floats]:
+    """Photos, points and coordinates of the images in the frame whose points are seen at least twice."""
+    photos, points = candidates
+    xy = geometry.project(
+        ground[points],
+        positions[photos],
+        attitudes[photos],
+        np.full(len(photos), principal_distance),
+        spheroid=spheroid,
+        photo_to_ground=photo_to_ground,
+    )
     seen = np.flatnonzero((np.abs(xy) <= frame_size / 2).all(axis=1))
     rays = np.bincount(points[seen])
-    return seen[rays[points[seen]] >= 2]
+    seen = seen[rays[points[seen]] >= 2]
+    return photos[seen], points[seen], xy[seen]
 
 
 def _terrain(plan: _Plan, relief: float, footprint: float, random: np.random.Generator) -> Floats:
