@@ -1,7 +1,28 @@
 """Photogrammetric least-squares adjustment with the covariance of every result."""
 
+from photogram._photocore import __version__
+from photogram.adjustment import AsPublished, Progress, adjust
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
+from photogram.geometry import Spheroid
 from photogram.messages import Message
+from photogram.result import Iteration, Result
+from photogram.simulate import Simulation, simulate
 
-__all__ = ["AdjustmentError", "Block", "InputError", "Message", "PhotogramError", "RankError"]
+__all__ = [
+    "AdjustmentError",
+    "AsPublished",
+    "Block",
+    "InputError",
+    "Iteration",
+    "Message",
+    "PhotogramError",
+    "Progress",
+    "RankError",
+    "Result",
+    "Simulation",
+    "Spheroid",
+    "__version__",
+    "adjust",
+    "simulate",
+]

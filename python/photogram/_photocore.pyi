@@ -4,10 +4,17 @@ Arrays are float64. Angles are radians, image coordinates millimetres, lengths t
 space. All functions release the GIL.
 """
 
+from collections.abc import Callable
+from typing import final
+
 import numpy as np
 from numpy.typing import NDArray
 
 _Floats = NDArray[np.float64]
+_Indices = NDArray[np.int64]
+
+IterationRow = tuple[int, float, float, float]
+"""Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
 __version__: str
 
@@ -130,3 +137,182 @@ def project(
         An argument of another shape or length (the message names it and its shape) or axes that make no
         spheroid.
     """
+
+class BlockError(Exception):
+    """A block that cannot be adjusted.
+
+    `args` is (kind, message, photos, points): kind is `undetermined points`, `undetermined photos`, `no
+    intersection`, `not finite`, `empty` or `input`; photos is a list of photo indices for each undetermined
+    combination of unknowns, points a list of point indices.
+    """
+
+def adjust_block(
+    photo_positions: _Floats,
+    photo_attitudes: _Floats,
+    photo_position_sd: _Floats,
+    photo_attitude_sd: _Floats,
+    principal_distances: _Floats,
+    point_positions: _Floats,
+    point_sd: _Floats,
+    image_photos: _Indices,
+    image_points: _Indices,
+    image_xy: _Floats,
+    image_sd: _Floats,
+    *,
+    spheroid: tuple[float, float] | None,
+    photo_to_ground: bool,
+    criterion: str,
+    limit: float,
+    max_iterations: int,
+    covariance: bool,
+    ordering: str,
+    unit_variance: str,
+    threads: int,
+    progress: Callable[[str, int, int, IterationRow | None], None] | None,
+) -> BlockSolution:
+    """Adjust a block by least squares (GIANT guide, sections 4 to 9).
+
+    Standard deviations are infinite for free unknowns, zero for fixed ones. Positions are X, Y, Z, or
+    longitude (rad), latitude (rad), height when a spheroid is given.
+
+    Parameters
+    ----------
+    photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd
+        (P, 3) initial (and, where weighted, observed) values and their standard deviations; omega, phi, kappa
+        in radians.
+    principal_distances
+        (P,) millimetres, signed.
+    point_positions, point_sd
+        (n, 3) coordinates, NaN where unknown, and standard deviations, finite for held components.
+    image_photos, image_points
+        (m,) indices.
+    image_xy, image_sd
+        (m, 2) millimetres.
+    spheroid
+        Semi-axes (a, b) for geographic space, None for rectangular space.
+    photo_to_ground
+        The sense of the angles.
+    criterion, limit
+        `fraction`: no unknown changes by more than `limit` of its standard deviation; `percent`: the sum of
+        squares changes by less than `limit` percent.
+    max_iterations
+        Iterations at the most.
+    covariance
+        Whether to compute cofactors and redundancy numbers; NaN otherwise.
+    ordering
+        `auto`, `input` or `rcm`.
+    unit_variance
+        `free`, `constrained` or `unity` (GIANT guide, Appendix E).
+    threads
+        Number of threads; 0 for all processors.
+    progress
+        Called on the calling thread as (phase, points done, points in all, None), or ("iteration", number, 0,
+        row). What it raises stops the adjustment and is passed on. Signals are looked after at the same time,
+        so that Ctrl-C stops it too.
+
+    Raises
+    ------
+    BlockError
+        A block that cannot be adjusted.
+    ValueError
+        An argument of another shape, length or choice; the message names it.
+    """
+
+@final
+class BlockSolution:
+    """An adjusted block, in the order of its photos (P), points (n) and images (m).
+
+    Points and images that were left out are NaN. Cofactors hold for a priori unit weight.
+    """
+
+    @property
+    def status(self) -> str:
+        """`converged`, `not converged` or `diverged`."""
+
+    @property
+    def initial_sum_of_squares(self) -> float:
+        """Weighted sum of squares at the initial values."""
+
+    @property
+    def iterations(self) -> list[IterationRow]:
+        """Every iteration."""
+
+    @property
+    def photo_positions(self) -> _Floats:
+        """(P, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
+
+    @property
+    def photo_attitudes(self) -> _Floats:
+        """(P, 3) omega, phi, kappa in radians."""
+
+    @property
+    def photo_cofactors(self) -> _Floats:
+        """(P, 6, 6): position, then attitude, in the units of the values."""
+
+    @property
+    def photo_redundancy(self) -> _Floats:
+        """(P, 6) redundancy numbers of position and attitude as observations; 0 unless weighted."""
+
+    @property
+    def point_positions(self) -> _Floats:
+        """(n, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
+
+    @property
+    def point_cofactors(self) -> _Floats:
+        """(n, 3, 3) in the units of the values."""
+
+    @property
+    def point_redundancy(self) -> _Floats:
+        """(n, 3) redundancy numbers of held components; 0 unless weighted."""
+
+    @property
+    def point_rays(self) -> _Indices:
+        """(n,) number of images; 0 for points left out."""
+
+    @property
+    def residuals(self) -> _Floats:
+        """(m, 2) observed minus computed, millimetres."""
+
+    @property
+    def redundancy(self) -> _Floats:
+        """(m, 2) redundancy numbers."""
+
+    @property
+    def standardized(self) -> _Floats:
+        """(m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight."""
+
+    @property
+    def dropped(self) -> list[tuple[int, str]]:
+        """Points left out, each with the reason."""
+
+    @property
+    def sums_of_squares(self) -> tuple[float, float, float]:
+        """Weighted sums of squares: camera, ground, plates."""
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Of the chosen unit variance."""
+
+    @property
+    def variance_of_unit_weight(self) -> float | None:
+        """None without degrees of freedom."""
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Image coordinates, weighted unknowns, unknowns that are not fixed."""
+
+    @property
+    def ordering(self) -> str:
+        """`input` or `rcm`."""
+
+    @property
+    def operations(self) -> dict[str, float]:
+        """Predicted multiply-adds of `reduction`, `factor` and `inverse`, each time they are carried out."""
+
+    @property
+    def formations(self) -> int:
+        """How often the normal equations were formed."""
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds in `form`, `factor`, `solve`, `invert` and `cofactors`, over all iterations."""

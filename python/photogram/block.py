@@ -19,25 +19,26 @@ __all__ = ["Block"]
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_RECTANGULAR = ("X", "Y", "Z")
-_GEOGRAPHIC = ("longitude_deg", "latitude_deg", "height")
-_ATTITUDE = ("omega_deg", "phi_deg", "kappa_deg")
+RECTANGULAR_COLUMNS = ("X", "Y", "Z")
+GEOGRAPHIC_COLUMNS = ("longitude_deg", "latitude_deg", "height")
+ATTITUDE_COLUMNS = ("omega_deg", "phi_deg", "kappa_deg")
 
 
 @dataclass
 class Block:
     """A block of photographs with its measurements and everything known beforehand.
 
-    P photos, n points, m image observations. Positions are X, Y, Z in the linear unit of the object space when
-    `spheroid` is None (rectangular space), else longitude (rad, east positive), latitude (rad) and height (linear unit).
+    P photos, n points, m image observations. Positions are X, Y, Z in the linear unit of the object space
+    when `spheroid` is None (rectangular space), else longitude (rad, east positive), latitude (rad) and
+    height (linear unit).
 
     Parameters
     ----------
     photo_ids
         P names, all different.
     photo_positions, photo_attitudes
-        (P, 3) initial positions, and omega, phi, kappa in radians: M = M_kappa M_phi M_omega (GIANT guide, section 5).
-        They are the observed values too where their standard deviation is finite.
+        (P, 3) initial positions, and omega, phi, kappa in radians: M = M_kappa M_phi M_omega (GIANT guide,
+        section 5). They are the observed values too where their standard deviation is finite.
     principal_distances
         (P,) in millimetres; negative for the positive (diapositive) plane, positive for the negative plane.
     point_ids
@@ -49,10 +50,11 @@ class Block:
     image_xy, image_sd
         (m, 2) image coordinates and their standard deviations in millimetres; `image_sd` may be a number.
     photo_position_sd, photo_attitude_sd
-        (P, 3) standard deviations in the units of the values: infinite (free, the default), 0 (fixed) or between (weighted).
+        (P, 3) standard deviations in the units of the values: infinite (free, the default), 0 (fixed) or
+        between (weighted).
     point_sd
-        (n, 3): finite for held components of control, 0 to fix them, infinite (the default) for pass points and unheld components.
-        An unheld component with a finite position is a check on the adjustment.
+        (n, 3): finite for held components of control, 0 to fix them, infinite (the default) for pass points
+        and unheld components. An unheld component with a finite position is a check on the adjustment.
     spheroid
         None for rectangular space, else the ellipsoid of geographic space.
     photo_to_ground
@@ -116,7 +118,9 @@ class Block:
         bad = ~((self.image_sd > 0) & np.isfinite(self.image_sd))
         self._refuse("image_sd", bad, "is not a positive, finite standard deviation", None)
         held_unknown = np.isfinite(self.point_sd) & np.isnan(self.point_positions)
-        self._refuse("point_positions", held_unknown, "is unknown but held (its point_sd is finite)", self.point_ids)
+        self._refuse(
+            "point_positions", held_unknown, "is unknown but held (its point_sd is finite)", self.point_ids
+        )
 
     def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
         if bad.any():
@@ -124,7 +128,8 @@ class Block:
             if owners is not None:
                 of = owners[row]
             else:
-                of = f"{self.point_ids[self.image_points[row]]} on photo {self.photo_ids[self.image_photos[row]]}"
+                point, photo = self.image_points[row], self.image_photos[row]
+                of = f"{self.point_ids[point]} on photo {self.photo_ids[photo]}"
             raise InputError(f"{name} of {of} {why}: {getattr(self, name)[row].tolist()}")
 
     @property
@@ -150,13 +155,15 @@ class Block:
         Parameters
         ----------
         photos
-            `photo`; `X`, `Y`, `Z` (or `longitude_deg`, `latitude_deg`, `height` when a spheroid is given); `omega_deg`, `phi_deg`,
-            `kappa_deg`. Optional: `principal_distance_mm`, and `sd_` before any of the six names (same units).
+            `photo`; `X`, `Y`, `Z` (or `longitude_deg`, `latitude_deg`, `height` when a spheroid is given);
+            `omega_deg`, `phi_deg`, `kappa_deg`. Optional: `principal_distance_mm`, and `sd_` before any of
+            the six names (same units).
         images
             `photo`, `point`, `x_mm`, `y_mm`. Optional: `sd_x_mm`, `sd_y_mm`.
         points
-            Control and check points: `point` and the three coordinates as for photos; NaN where unknown. Optional: `sd_` columns;
-            without them, or where they are infinite or NaN, components are not held. Image points without a row here are pass points.
+            Control and check points: `point` and the three coordinates as for photos; NaN where unknown.
+            Optional: `sd_` columns; without them, or where they are infinite or NaN, components are not held.
+            Image points without a row here are pass points.
         principal_distance
             Millimetres, signed, for all photos, when the column is not there.
         image_sd
@@ -169,7 +176,7 @@ class Block:
         InputError
             A column that is missing, a photo that `photos` does not name, or whatever the class refuses.
         """
-        axes = _RECTANGULAR if spheroid is None else _GEOGRAPHIC
+        axes = RECTANGULAR_COLUMNS if spheroid is None else GEOGRAPHIC_COLUMNS
         photo_ids = [str(name) for name in _column(photos, "photos", "photo")]
         image_point_names = [str(name) for name in _column(images, "images", "point")]
         control_ids = [str(name) for name in _column(points, "points", "point")] if points is not None else []
@@ -186,16 +193,21 @@ class Block:
         return cls(
             photo_ids=photo_ids,
             photo_positions=_columns(photos, "photos", axes),
-            photo_attitudes=_columns(photos, "photos", _ATTITUDE),
-            principal_distances=_columns(photos, "photos", ["principal_distance_mm"], principal_distance)[:, 0],
-            point_ids=_names("point column of points", point_ids if len(set(control_ids)) == len(control_ids) else control_ids),
+            photo_attitudes=_columns(photos, "photos", ATTITUDE_COLUMNS),
+            principal_distances=_columns(photos, "photos", ["principal_distance_mm"], principal_distance)[
+                :, 0
+            ],
+            point_ids=_names(
+                "point column of points",
+                point_ids if len(set(control_ids)) == len(control_ids) else control_ids,
+            ),
             point_positions=positions,
             image_photos=_lookup("photo", photo_ids, _column(images, "images", "photo")),
             image_points=_lookup("point", point_ids, image_point_names),
             image_xy=_columns(images, "images", ["x_mm", "y_mm"]),
             image_sd=_columns(images, "images", ["sd_x_mm", "sd_y_mm"], image_sd),
             photo_position_sd=_columns(photos, "photos", [f"sd_{axis}" for axis in axes], np.inf),
-            photo_attitude_sd=_columns(photos, "photos", [f"sd_{axis}" for axis in _ATTITUDE], np.inf),
+            photo_attitude_sd=_columns(photos, "photos", [f"sd_{axis}" for axis in ATTITUDE_COLUMNS], np.inf),
             point_sd=sd,
             spheroid=spheroid,
             photo_to_ground=photo_to_ground,
@@ -206,6 +218,11 @@ class Block:
         """Return a copy with some fields replaced, checked anew."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         return type(self)(**{**values, **changes})
+
+
+def position_columns(block: Block) -> tuple[str, str, str]:
+    """Names of the three columns of positions in tables."""
+    return GEOGRAPHIC_COLUMNS if block.geographic else RECTANGULAR_COLUMNS
 
 
 def _names(name: str, values: Sequence[str]) -> list[str]:
@@ -251,7 +268,7 @@ def _column(table: Mapping[str, Any], table_name: str, name: str) -> Sequence[An
 def _columns(
     table: Mapping[str, Any], table_name: str, names: Sequence[str], default: float | None = None
 ) -> Floats:
-    """Stack columns as (rows, len(names)) in radians for names that end in `_deg`; absent columns get the default."""
+    """Stack columns as (rows, len(names)), `_deg` ones in radians; absent ones get the default."""
     columns = []
     for name in names:
         if name not in table and default is not None:
@@ -272,4 +289,6 @@ def _lookup(kind: str, ids: Sequence[str], names: Sequence[Any]) -> Indices:
     try:
         return np.array([index[str(name)] for name in names], dtype=np.int64)
     except KeyError as error:
-        raise InputError(f"images names the {kind} {error.args[0]!r}, which the {kind}s do not list") from None
+        raise InputError(
+            f"images names the {kind} {error.args[0]!r}, which the {kind}s do not list"
+        ) from None

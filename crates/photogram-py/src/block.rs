@@ -7,7 +7,7 @@ use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Criterion, Event, Iteration, Options as AdjustmentOptions, Phase};
 use photocore::geometry::RotationSense;
 use photocore::normals::Ordering;
-use photocore::programs::block::{Block, BlockError, Image, Options, Photo, Point, UnitVariance};
+use photocore::programs::block::{Block, BlockError as Failure, Image, Options, Photo, Point, UnitVariance};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
@@ -18,14 +18,14 @@ use crate::solution::{BlockSolution, IterationRow};
 
 create_exception!(
     _photocore,
-    BlockFailure,
+    BlockError,
     PyException,
     "The block cannot be adjusted: (kind, message, photos, points)."
 );
 
 /// Adds the function and its classes to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("BlockFailure", module.py().get_type::<BlockFailure>())?;
+    module.add("BlockError", module.py().get_type::<BlockError>())?;
     module.add_class::<BlockSolution>()?;
     module.add_function(wrap_pyfunction!(adjust_block, module)?)
 }
@@ -188,16 +188,16 @@ fn phase_name(phase: Phase) -> &'static str {
     }
 }
 
-fn failure(error: &BlockError) -> PyErr {
+fn failure(error: &Failure) -> PyErr {
     let (kind, photos, points) = match error {
-        BlockError::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
-        BlockError::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
-        BlockError::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
-        BlockError::Empty => ("empty", vec![], vec![]),
-        BlockError::NotFinite => ("not finite", vec![], vec![]),
-        BlockError::Index(_) | BlockError::Layout(_) | BlockError::Interrupted => ("input", vec![], vec![]),
+        Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
+        Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
+        Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
+        Failure::Empty => ("empty", vec![], vec![]),
+        Failure::NotFinite => ("not finite", vec![], vec![]),
+        Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
-    BlockFailure::new_err((kind, error.to_string(), photos, points))
+    BlockError::new_err((kind, error.to_string(), photos, points))
 }
 
 fn unknown(option: &str, value: &str) -> PyErr {

@@ -1,0 +1,239 @@
+"""Adjustment of a block by least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.block import Block
+from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.messages import Message
+from photogram.result import Iteration, Result
+
+__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
+
+UnitVariance = Literal["free", "constrained", "unity"]
+Ordering = Literal["auto", "input", "rcm"]
+
+
+@dataclass(frozen=True)
+class AsPublished:
+    """The iteration of the 1987 program (GIANT guide, section 6).
+
+    Attributes
+    ----------
+    percent
+        Converged when the weighted sum of squares changes by less than this from one iteration to the next.
+    max_iterations
+        Limit of iterations.
+    """
+
+    percent: float = 5.0
+    max_iterations: int = 4
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far an adjustment has come.
+
+    Attributes
+    ----------
+    phase
+        `form`, `factor`, `solve`, `invert`, `cofactors`, or `iteration` when one is over.
+    done, total
+        Points done of all, within the phase.
+    iteration
+        The iteration that is over.
+    """
+
+    phase: str
+    done: int
+    total: int
+    iteration: Iteration | None = None
+
+
+def adjust(
+    block: Block,
+    *,
+    unit_variance: UnitVariance = "constrained",
+    max_iterations: int = 50,
+    tolerance: float = 1e-5,
+    as_published: AsPublished | None = None,
+    covariance: bool = True,
+    fix_photos: bool = False,
+    ordering: Ordering = "auto",
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Result:
+    """Adjust a block by least squares.
+
+    Every unknown is a weighted parameter, from free to fixed. Points that their image points cannot determine
+    are left out (the result's `messages` and `dropped` say which); the others start from the intersection of
+    their rays.
+
+    Parameters
+    ----------
+    block
+        The block.
+    unit_variance
+        What the variance of unit weight is based on (GIANT guide, Appendix E): every weighted quantity
+        (`constrained`), image coordinates and ground control only (`free`), or 1 (`unity`). Covariances are
+        scaled by it.
+    max_iterations
+        Iterations at the most.
+    tolerance
+        Iterate until no unknown changes by more than this fraction of its standard deviation (a priori unit
+        weight). A step that raises the sum of squares is damped (Levenberg-Marquardt).
+    as_published
+        Iterate as the 1987 program did instead.
+    covariance
+        Whether to compute covariances, redundancy numbers and standardized residuals.
+    fix_photos
+        Keep positions and attitudes as they are: every point by itself.
+    ordering
+        How photos are ordered for elimination: in input order, by reverse Cuthill-McKee, or the cheaper of
+        them.
+    threads
+        Number of threads; all processors when None. The result does not depend on it, to the last bit.
+    progress
+        Called now and then with what is going on; an exception it raises stops the adjustment.
+
+    Returns
+    -------
+    The result; its `status` says whether the adjustment converged.
+
+    Raises
+    ------
+    RankError
+        The observations do not determine all unknowns; names the photos and points concerned.
+    AdjustmentError
+        There is nothing to adjust, or the initial values give no finite image coordinates.
+    InputError
+        An option that cannot be.
+    KeyboardInterrupt
+        Ctrl-C.
+    """
+    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads)
+    if fix_photos:
+        block = block.replace(photo_position_sd=np.array(0.0), photo_attitude_sd=np.array(0.0))
+
+    def report(phase: str, done: int, total: int, iteration: _photocore.IterationRow | None) -> None:
+        if progress is not None:
+            progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
+
+    try:
+        solution = _photocore.adjust_block(
+            block.photo_positions,
+            block.photo_attitudes,
+            block.photo_position_sd,
+            block.photo_attitude_sd,
+            block.principal_distances,
+            block.point_positions,
+            block.point_sd,
+            block.image_photos,
+            block.image_points,
+            block.image_xy,
+            block.image_sd,
+            spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
+            photo_to_ground=block.photo_to_ground,
+            criterion="percent" if as_published else "fraction",
+            limit=as_published.percent if as_published else tolerance,
+            max_iterations=as_published.max_iterations if as_published else max_iterations,
+            covariance=covariance,
+            ordering=ordering,
+            unit_variance=unit_variance,
+            threads=threads or 0,
+            progress=report if progress is not None else None,
+        )
+    except _photocore.BlockError as error:
+        raise _named(block, *error.args) from None
+    return Result.from_solution(block, solution, unit_variance, _messages(block, solution))
+
+
+def _check_options(
+    unit_variance: str,
+    ordering: str,
+    max_iterations: int,
+    tolerance: float,
+    as_published: AsPublished | None,
+    threads: int | None,
+) -> None:
+    if unit_variance not in get_args(UnitVariance):
+        raise InputError(
+            f"unit_variance is one of {', '.join(get_args(UnitVariance))}, not {unit_variance!r}"
+        )
+    if ordering not in get_args(Ordering):
+        raise InputError(f"ordering is one of {', '.join(get_args(Ordering))}, not {ordering!r}")
+    if max_iterations < 1 or (as_published and as_published.max_iterations < 1):
+        raise InputError("there must be one iteration at least")
+    if not tolerance > 0 or (as_published and not as_published.percent > 0):
+        raise InputError("the criterion of convergence must be positive")
+    if threads is not None and threads < 1:
+        raise InputError(f"threads must be positive, not {threads}")
+
+
+def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+    """Collect remarks on the block that did not stop the adjustment, the gravest first."""
+    by_reason: dict[str, list[str]] = {}
+    for point, reason in solution.dropped:
+        by_reason.setdefault(reason, []).append(block.point_ids[point])
+    messages = [
+        Message(f"left out, {reason}: {_listed(names, most=len(names))}")
+        for reason, names in by_reason.items()
+    ]
+    held = np.isfinite(block.point_sd) & (solution.point_rays > 0)[:, np.newaxis]
+    if not held.any() and not (block.photo_position_sd == 0).all():
+        messages.insert(
+            0, Message("there is no control: the datum of the block rests on the weights of its photos")
+        )
+    return messages
+
+
+def _named(
+    block: Block, kind: str, message: str, photos: list[list[int]], points: list[int]
+) -> AdjustmentError:
+    """Put names to the indices of a failure of the core."""
+    point_names = [block.point_ids[i] for i in points]
+    if kind == "undetermined points":
+        seen = sorted({int(p) for p in block.image_photos[np.isin(block.image_points, points)]})
+        photo_names = [block.photo_ids[p] for p in seen]
+        text = f"the rays on photos {_listed(photo_names)} do not determine the points {_listed(point_names)}"
+        return RankError(text, photo_names, point_names)
+    if kind == "undetermined photos":
+        return _undetermined_photos(block, photos)
+    if kind == "no intersection":
+        return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
+    return AdjustmentError(message)
+
+
+def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankError:
+    concerned = sorted({photo for combination in combinations for photo in combination})
+    names = [block.photo_ids[photo] for photo in concerned]
+    points = np.unique(block.image_points[np.isin(block.image_photos, concerned)])
+    point_names = [block.point_ids[point] for point in points]
+    lines = [f"the observations leave {len(combinations)} combinations of unknowns undetermined:"]
+    for each in sorted(set(map(tuple, combinations))):
+        count = sum(tuple(combination) == each for combination in combinations)
+        on = np.unique(block.image_points[np.isin(block.image_photos, each)])
+        moved = (
+            f"all {len(each)} photos together"
+            if len(each) == len(block.photo_ids) > 1
+            else f"photos {_listed([block.photo_ids[photo] for photo in each])}"
+        )
+        lines.append(
+            f"  {count} moving {moved}, which hold the points {_listed([block.point_ids[p] for p in on])}"
+        )
+    if not np.isfinite(block.point_sd).any():
+        lines.append(
+            "  there is no control; weights for the positions and attitudes of photos would give a datum"
+        )
+    return RankError("\n".join(lines), names, point_names)
+
+
+def _listed(names: list[str], most: int = 12) -> str:
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

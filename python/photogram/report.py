@@ -1,0 +1,259 @@
+"""The adjustment report as text: problems, then how good it is, then values with their deviations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram import _photocore
+
+if TYPE_CHECKING:
+    from photogram.result import Floats, Result
+
+__all__ = ["report", "summary"]
+
+_SUSPECTS = 20
+_BLUNDER = 3.0
+_ARCSEC = 180 * 3600 / math.pi
+
+
+def report(result: Result) -> str:
+    """Return the report of an adjusted block."""
+    sections = [
+        *summary(result),
+        ("Iterations", _iterations(result)),
+        (
+            f"Image coordinates with |standardized residual| > {_BLUNDER:g} (largest {_SUSPECTS})",
+            _suspects(result),
+        ),
+        ("Check points: adjusted minus supplied", _check_points(result)),
+        ("Control points: adjusted minus supplied", _control(result)),
+        ("Photos", _photos(result)),
+        ("Points", _points(result)),
+        ("Work", _work(result)),
+    ]
+    head = f"photogram {_photocore.__version__}  block adjustment  {result.block.title}".rstrip()
+    parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
+    return "\n\n".join([head, *parts]) + "\n"
+
+
+def summary(result: Result) -> list[tuple[str, list[str]]]:
+    """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
+    return [
+        ("Problems", _problems(result)),
+        ("Adjustment", _adjustment(result)),
+        ("Residuals", _residuals(result)),
+    ]
+
+
+def _problems(result: Result) -> list[str]:
+    problems = [str(message) for message in result.messages]
+    if not result.converged:
+        problems.insert(0, f"the adjustment has {result.status}: do not use these values")
+    if result.variance_of_unit_weight is None:
+        problems.append("there are no degrees of freedom: covariances are scaled by 1")
+    return problems or ["none"]
+
+
+def _adjustment(result: Result) -> list[str]:
+    block, sums = result.block, result.sums_of_squares
+    kinds = result.point_kinds[result.used_points].tolist()
+    variance = result.variance_of_unit_weight
+    held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
+    axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
+    components = ", ".join(f"{axis} {count}" for axis, count in zip(axes, held.sum(axis=0), strict=True))
+    basis = {"free": "cameras free", "constrained": "cameras constrained", "unity": "set to 1"}[
+        result.unit_variance
+    ]
+    rows = [
+        ("status", result.status),
+        ("iterations", f"{len(result.iterations)}"),
+        ("variance of unit weight", f"{variance:.6f} ({basis})" if variance is not None else "undefined"),
+        (
+            "standard deviation of unit weight",
+            f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
+        ),
+        ("degrees of freedom", f"{result.degrees_of_freedom}"),
+        ("weighted sum of squares, camera", f"{sums.camera:.6f}"),
+        ("weighted sum of squares, ground", f"{sums.ground:.6f}"),
+        ("weighted sum of squares, plates", f"{sums.plates:.6f}"),
+        ("weighted sum of squares, total", f"{sums.total:.6f}"),
+        ("photos", f"{len(block.photo_ids)}"),
+        ("points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
+        ("held components of control", components),
+        ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
+        ("object space", "geographic" if block.geographic else "rectangular"),
+        ("rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
+    ]
+    return [f"{name:<36}{value}" for name, value in rows]
+
+
+def _residuals(result: Result) -> list[str]:
+    used = result.used_images
+    lines = [
+        f"rms of image residuals              {_rms(result.residuals[used][:, axis]) * 1000:.3f} um in {name}"
+        for axis, name in enumerate("xy")
+    ]
+    redundancy = result.redundancy[used]
+    if np.isfinite(redundancy).all() and redundancy.size:
+        lines.append(
+            f"mean redundancy number              {redundancy.mean():.3f} (least {redundancy.min():.3f})"
+        )
+        largest = np.nan_to_num(np.abs(result.standardized[used])).max()
+        lines.append(f"largest |standardized residual|     {largest:.2f}")
+    for kind in ("control", "check"):
+        of_kind = result.used_points & (result.point_kinds == kind)
+        supplied = (
+            np.isfinite(result.block.point_sd)
+            if kind == "control"
+            else np.isfinite(result.block.point_positions)
+        )
+        differences = np.where(supplied, result.point_differences, np.nan)[of_kind]
+        values = [_rms(column[np.isfinite(column)]) for column in differences.T]
+        if np.isfinite(differences).any():
+            shown = ", ".join(_differences(result, values))
+            lines.append(f"{f'rms of {kind} points':<36}{shown}")
+    return lines
+
+
+def _iterations(result: Result) -> list[str]:
+    lines = [f"{'number':>6} {'weighted sum of squares':>24} {'largest change / sd':>20} {'damping':>9}"]
+    lines.append(f"{0:>6} {result.initial_weighted_sum_of_squares:>24.6f}")
+    lines += [
+        f"{i.number:>6} {i.weighted_sum_of_squares:>24.6f} {i.largest_change:>20.3e} {i.damping:>9.1e}"
+        for i in result.iterations
+    ]
+    return lines
+
+
+def _suspects(result: Result) -> list[str]:
+    size = np.nan_to_num(np.abs(result.standardized))
+    images, axes = np.nonzero(size > _BLUNDER)
+    if not images.size:
+        return ["none"]
+    order = np.argsort(-size[images, axes], kind="stable")[:_SUSPECTS]
+    block = result.block
+    lines = [f"{'photo':<10} {'point':<10}   {'residual um':>12} {'redundancy':>11} {'standardized':>13}"]
+    lines += [
+        f"{block.photo_ids[block.image_photos[i]]:<10} {block.point_ids[block.image_points[i]]:<10} "
+        f"{'xy'[axis]}"
+        f" {result.residuals[i, axis] * 1000:>12.2f} {result.redundancy[i, axis]:>11.3f}"
+        f" {result.standardized[i, axis]:>13.2f}"
+        for i, axis in zip(images[order], axes[order], strict=True)
+    ]
+    return [*lines, f"{images.size} in all"]
+
+
+def _check_points(result: Result) -> list[str]:
+    check = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
+    return _difference_table(result, check, result.block.point_positions)
+
+
+def _control(result: Result) -> list[str]:
+    control = np.flatnonzero(result.used_points & (result.point_kinds == "control"))
+    held = np.where(np.isfinite(result.block.point_sd), result.block.point_positions, np.nan)
+    return _difference_table(result, control, held)
+
+
+def _difference_table(result: Result, points: Sequence[int] | np.ndarray, supplied: Floats) -> list[str]:
+    if len(points) == 0:
+        return []
+    axes = ("dlon", "dlat", "dh") if result.block.geographic else ("dX", "dY", "dZ")
+    units = _difference_units(result)
+    lines = [
+        f"{'point':<10}" + "".join(f"{f'{axis} {unit}':>16}" for axis, unit in zip(axes, units, strict=True))
+    ]
+    for point in points:
+        values = (result.point_positions[point] - supplied[point]) * _outward(result)
+        lines.append(f"{result.block.point_ids[point]:<10}" + "".join(_number(value, 5) for value in values))
+    return lines
+
+
+def _photos(result: Result) -> list[str]:
+    position, sd_position = _position_formats(result)
+    lines = [
+        f"{'photo':<10}{_position_head(result)}{'omega deg':>15}{'phi deg':>15}{'kappa deg':>15}",
+        f"{'':<10}{_sd_head(result)}{'sd arcsec':>15}{'sd arcsec':>15}{'sd arcsec':>15}",
+    ]
+    for i, name in enumerate(result.block.photo_ids):
+        angles = "".join(f"{angle:>15.7f}" for angle in np.degrees(result.photo_attitudes[i]))
+        deviations = "".join(f"{sd * _ARCSEC:>15.3f}" for sd in result.photo_sd[i, 3:])
+        lines.append(f"{name:<10}{position(result.photo_positions[i])}{angles}")
+        lines.append(f"{'':<10}{sd_position(result.photo_sd[i, :3])}{deviations}")
+    return lines
+
+
+def _points(result: Result) -> list[str]:
+    position, sd_position = _position_formats(result)
+    lines = [f"{'point':<10}{_position_head(result)}  rays  kind", f"{'':<10}{_sd_head(result)}"]
+    for i in np.flatnonzero(result.used_points):
+        head = f"{result.block.point_ids[i]:<10}{position(result.point_positions[i])}"
+        lines.append(f"{head}  {result.point_rays[i]:>4}  {result.point_kinds[i]}")
+        lines.append(f"{'':<10}{sd_position(result.point_sd[i])}")
+    return lines
+
+
+def _work(result: Result) -> list[str]:
+    order = {"input": "in input order", "rcm": "by reverse Cuthill-McKee"}[result.ordering]
+    lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
+    lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
+    lines += [f"{f'seconds in {name}':<36}{seconds:.3f} s" for name, seconds in result.seconds.items()]
+    return lines
+
+
+def _rms(values: Floats) -> float:
+    return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
+
+
+def _outward(result: Result) -> Floats:
+    """Return the factors from inner units to those of the report: arcsec for angles."""
+    return np.array([_ARCSEC, _ARCSEC, 1.0] if result.block.geographic else [1.0, 1.0, 1.0])
+
+
+def _difference_units(result: Result) -> tuple[str, str, str]:
+    return ("arcsec", "arcsec", "m") if result.block.geographic else ("m", "m", "m")
+
+
+def _differences(result: Result, values: Iterable[float]) -> list[str]:
+    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+    outward = np.array(list(values)) * _outward(result)
+    triples = zip(axes, outward, _difference_units(result), strict=True)
+    return [f"{axis} {value:.5f} {unit}" for axis, value, unit in triples if math.isfinite(value)]
+
+
+def _position_head(result: Result) -> str:
+    names = ("longitude", "latitude", "height m") if result.block.geographic else ("X m", "Y m", "Z m")
+    return "".join(f"{name:>20}" for name in names)
+
+
+def _sd_head(result: Result) -> str:
+    return "".join(f"{f'sd {unit}':>20}" for unit in _difference_units(result))
+
+
+def _position_formats(result: Result) -> tuple[Callable[[Floats], str], Callable[[Floats], str]]:
+    """How positions and their standard deviations are written."""
+
+    def position(values: Floats) -> str:
+        if result.block.geographic:
+            return f"{_dms(values[0], 5):>20}{_dms(values[1], 5):>20}{values[2]:>20.4f}"
+        return "".join(f"{value:>20.4f}" for value in values)
+
+    def deviations(values: Floats) -> str:
+        return "".join(f"{value:>20.5f}" for value in values * _outward(result))
+
+    return position, deviations
+
+
+def _dms(angle: float, decimals: int) -> str:
+    """Degrees, minutes and seconds of an angle in radians, rounded as a whole so that no 60 appears."""
+    units = round(abs(angle) * _ARCSEC * 10**decimals)
+    minutes, seconds = divmod(units, 60 * 10**decimals)
+    sign = "-" if angle < 0 else ""
+    return f"{sign}{minutes // 60} {minutes % 60:02d} {seconds / 10**decimals:0{decimals + 3}.{decimals}f}"
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:>16.{decimals}f}" if math.isfinite(value) else f"{'-':>16}"
