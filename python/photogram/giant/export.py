@@ -13,15 +13,16 @@ from photogram.block import Block
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
-from photogram.giant.frames import Frame
-from photogram.giant.ground import CHECK_POINT, GroundPoint
+from photogram.giant.files import written
+from photogram.giant.frames import Frame, frame_records
+from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
 from photogram.giant.images import ImageFrame
 from photogram.messages import Message
 
 if TYPE_CHECKING:
     from photogram.giant.project import Project
 
-__all__ = ["adjusted_frames", "adjusted_ground", "block_files"]
+__all__ = ["adjusted_frames", "adjusted_ground", "adjusted_records", "block_files"]
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -163,3 +164,43 @@ def adjusted_ground(project: Project, block: Block, positions: Floats) -> list[G
         )
         for name, row in zip(names, rows, strict=True)
     ]
+
+
+def adjusted_records(
+    project: Project,
+    block: Block,
+    *,
+    photo_positions: Floats,
+    photo_attitudes: Floats,
+    point_positions: Floats,
+    converged: bool,
+) -> dict[str, list[str]]:
+    """Return the records of the output files by name (GIANT guide, section II.A).
+
+    RESTART (unit 20) always; FRAMES (unit 8) and GROUND (unit 9) of an adjustment that converged, unless
+    COMMON says not to save them.
+
+    Parameters
+    ----------
+    project, block
+        What was adjusted: `block` is `project.to_block()`.
+    photo_positions, photo_attitudes, point_positions
+        (P, 3), (P, 3) and (n, 3) values of the last iteration, as in :func:`adjusted_frames` and
+        :func:`adjusted_ground`.
+    converged
+        Whether they are the solution.
+
+    Raises
+    ------
+    InputError
+        A value that does not fit its field.
+    """
+    geographic = project.common.geographic
+    frames = adjusted_frames(project, block, photo_positions, photo_attitudes)
+    records = {"RESTART": written("RESTART", lambda: frame_records(frames, geographic))}
+    if converged and project.common.save_stations:
+        records["FRAMES"] = records["RESTART"]
+    if converged and project.common.save_points:
+        ground = adjusted_ground(project, block, point_positions)
+        records["GROUND"] = written("GROUND", lambda: ground_records(ground, geographic))
+    return records

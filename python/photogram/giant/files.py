@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from photogram.errors import InputError
 
-__all__ = ["NAMES", "find_files", "present_files", "to_bytes", "write_whole"]
+__all__ = ["NAMES", "find_files", "present_files", "to_bytes", "write_whole", "written"]
 
 NAMES = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")
 """The input files; they are found in any letter case and with any one extension."""
@@ -50,6 +50,20 @@ def find_files(directory: Path) -> dict[str, Path]:
     return files
 
 
+def written(name: str, writer: Callable[[], list[str]]) -> list[str]:
+    """Return the records that a writer makes.
+
+    Raises
+    ------
+    InputError
+        A value that does not fit its field; the message begins with the name of the file.
+    """
+    try:
+        return writer()
+    except ValueError as error:
+        raise InputError(f"{name} cannot be written: {error}") from None
+
+
 def to_bytes(records: Iterable[str]) -> bytes:
     """Return records as the bytes of a text file."""
     return "".join(f"{record}\n" for record in records).encode()
@@ -65,13 +79,14 @@ def write_whole(files: Mapping[Path, bytes]) -> None:
     OSError
         A file cannot be written; no file has changed unless the very moving of one failed.
     """
-    temporary = {path: path.with_name(f".{path.name}.{os.getpid()}.tmp") for path in files}
+    begun: dict[Path, Path] = {}
     try:
         for path, content in files.items():
             path.parent.mkdir(parents=True, exist_ok=True)
-            temporary[path].write_bytes(content)
-        for path in files:
-            temporary[path].replace(path)
+            begun[path] = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+            begun[path].write_bytes(content)
+        for path, temporary in begun.items():
+            temporary.replace(path)
     finally:
-        for path in temporary.values():
-            path.unlink(missing_ok=True)
+        for temporary in begun.values():
+            temporary.unlink(missing_ok=True)

@@ -13,7 +13,7 @@ from photogram.giant.assembly import assemble
 from photogram.giant.cameras import Camera, camera_records, parse_cameras
 from photogram.giant.common import Common, common_records, parse_common
 from photogram.giant.export import block_files
-from photogram.giant.files import NAMES, find_files, present_files, to_bytes, write_whole
+from photogram.giant.files import NAMES, find_files, present_files, to_bytes, write_whole, written
 from photogram.giant.frames import Frame, frame_records, parse_frames
 from photogram.giant.ground import GroundPoint, ground_records, parse_ground
 from photogram.giant.images import ImageFrame, image_records, parse_images
@@ -106,14 +106,7 @@ class Project:
             "FRAMES": lambda: frame_records(self.frames, geographic),
             "GROUND": lambda: ground_records(self.ground, geographic),
         }
-        return {name: _written(name, writer) for name, writer in writers.items()}
-
-
-def _written(name: str, writer: Callable[[], list[str]]) -> list[str]:
-    try:
-        return writer()
-    except ValueError as error:
-        raise InputError(f"{name} cannot be written: {error}") from None
+        return {name: written(name, writer) for name, writer in writers.items()}
 
 
 def read_project(directory: str | os.PathLike[str]) -> Project:
@@ -146,6 +139,21 @@ def read_project(directory: str | os.PathLike[str]) -> Project:
     return project
 
 
+def project_files(project: Project, directory: Path, *, overwrite: bool = False) -> dict[Path, bytes]:
+    """Return the five files of a project as they would be written by :func:`write_project`."""
+    texts = project.records()
+    targets = {name: directory / name for name in NAMES}
+    if directory.exists():
+        for name, present in present_files(directory).items():
+            listed = ", ".join(path.name for path in present)
+            if present and not overwrite:
+                raise InputError(f"{listed} would be overwritten", file=directory)
+            if len(present) > 1:
+                raise InputError(f"more than one file could be {name}: {listed}", file=directory)
+            targets[name] = next(iter(present), targets[name])
+    return {targets[name]: to_bytes(records) for name, records in texts.items()}
+
+
 def write_project(project: Project, directory: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write the five files into a directory, which is made if need be; each file whole or not at all.
 
@@ -165,16 +173,4 @@ def write_project(project: Project, directory: str | os.PathLike[str], *, overwr
     OSError
         The files cannot be written.
     """
-    directory = Path(directory)
-    texts = project.records()
-    targets = {name: directory / name for name in NAMES}
-    if directory.exists():
-        for name, present in present_files(directory).items():
-            if len(present) > 1 or (present and not overwrite):
-                listed = ", ".join(path.name for path in present)
-                raise InputError(
-                    f"{listed} would be overwritten" if not overwrite else f"{listed}: which is {name}?",
-                    file=directory,
-                )
-            targets[name] = next(iter(present), targets[name])
-    write_whole({targets[name]: to_bytes(records) for name, records in texts.items()})
+    write_whole(project_files(project, Path(directory), overwrite=overwrite))

@@ -1,0 +1,283 @@
+"""The command line: exit codes, what is written and what is not."""
+
+import inspect
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import photogram.simulate
+from photogram.cli import app
+from photogram.cli import simulate as simulate_command
+from photogram.giant import read_project
+
+STRASBOURG = Path(__file__).parents[2] / "shared" / "data" / "strasbourg" / "giant"
+SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]
+OUTPUTS = {"FRAMES", "GROUND", "RESTART", "report.txt"}
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run the command line in an empty directory."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("NO_COLOR", "1")
+    runner = CliRunner()
+    return lambda *arguments: runner.invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def project(run, tmp_path):
+    """Simulate a small project."""
+    result = run("simulate", tmp_path / "block", *SMALL)
+    assert result.exit_code == 0, result.output
+    return tmp_path / "block"
+
+
+def names(directory):
+    return {path.name for path in directory.iterdir()}
+
+
+def damage(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+# Help
+
+
+def test_help_names_the_commands_and_is_quick(run):
+    result = run("--help")
+    assert result.exit_code == 0
+    for word in ("giant", "simulate", "--version", "Exit codes"):
+        assert word in result.output
+    heavy = "import sys, photogram.cli; sys.exit('pandas' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", heavy], check=False).returncode == 0
+
+
+def test_version_and_usage(run):
+    assert run("--version").output.split()[0] == "photogram"
+    for arguments in (
+        ["giant"],
+        ["giant", "x", "--example"],
+        ["giant", "x", "--ordering", "best"],
+        ["nothing"],
+    ):
+        assert run(*arguments).exit_code == 2
+
+
+# giant
+
+
+def test_a_project_is_adjusted(run, project, tmp_path):
+    before = {path.name: path.read_bytes() for path in project.iterdir()}
+    result = run("giant", project, "--json", tmp_path / "result.json")
+    assert result.exit_code == 0, result.output
+    assert "converged" in result.output
+    assert "standard deviation of unit weight" in result.output
+    assert names(tmp_path / "block-adjusted") == OUTPUTS
+    assert {path.name: path.read_bytes() for path in project.iterdir()} == before
+    document = json.loads((tmp_path / "result.json").read_bytes())
+    assert document["status"] == "converged"
+
+    adjusted = read_project_with(project, tmp_path / "block-adjusted", tmp_path / "again")
+    positions = np.array([photo["position"] for photo in document["photos"]])
+    assert np.abs(np.array([frame.position for frame in adjusted.frames]) - positions).max() < 1e-4
+    assert all(frame.position_sd == (0, 0, 0) for frame in adjusted.frames)
+
+
+def read_project_with(project, adjusted, directory):
+    """Read the project again, with the adjusted stations in place of its own."""
+    directory.mkdir()
+    for path in project.iterdir():
+        (directory / path.name).write_bytes(path.read_bytes())
+    (directory / "FRAMES").write_bytes((adjusted / "FRAMES").read_bytes())
+    return read_project(directory)
+
+
+def test_a_restart_needs_fewer_iterations(run, project, tmp_path):
+    assert run("giant", project, "--json", "first.json").exit_code == 0
+    read_project_with(project, tmp_path / "block-adjusted", tmp_path / "again")
+    assert run("giant", "again", "--json", "second.json").exit_code == 0
+    first, second = (json.loads((tmp_path / name).read_bytes()) for name in ("first.json", "second.json"))
+    assert len(second["iterations"]) < len(first["iterations"])
+    assert second["weighted_sum_of_squares"]["plates"] == pytest.approx(
+        first["weighted_sum_of_squares"]["plates"]
+    )
+
+
+def test_save_flags_of_common(run, project, tmp_path):
+    damage(project / "COMMON", "0100000000100", "0100001010100")
+    assert run("giant", project, "--quiet").exit_code == 0
+    assert names(tmp_path / "block-adjusted") == {"RESTART", "report.txt"}
+
+
+def test_quiet_prints_nothing(run, project):
+    result = run("giant", project, "--quiet", "--threads", "1", "--ordering", "rcm")
+    assert (result.exit_code, result.output) == (0, "")
+
+
+def test_as_published_stops_at_the_limit_of_common(run, project, tmp_path):
+    common = project / "COMMON"
+    title, job = common.read_text().splitlines()
+    common.write_text(f"{title}\n{job[:13]}1{job[14:]}\n")
+    result = run("giant", project, "--as-published", "--json", "result.json")
+    assert result.exit_code == 3
+    assert "not converged" in result.output
+    assert names(tmp_path / "block-adjusted") == {"RESTART", "report.txt"}
+    assert json.loads(Path("result.json").read_bytes())["status"] == "not converged"
+    assert run("giant", project).exit_code == 0
+
+
+def test_bad_input_writes_nothing(run, project, tmp_path):
+    record = (project / "IMAGES").read_text().splitlines()[3]
+    damage(project / "IMAGES", record, record[:10] + "       NaN" + record[20:])
+    result = run("giant", project, "--json", tmp_path / "result.json")
+    assert result.exit_code == 1
+    assert result.stdout == ""
+    assert (
+        f"{project / 'IMAGES'}, record 4: columns 11-20 (F10.3): '       NaN' is not a number"
+        in result.stderr
+    )
+    assert f"|{record[:10]}       NaN{record[20:]}|" in result.stderr
+    assert "Traceback" not in result.output
+    assert names(tmp_path) == {"block"}
+
+
+@pytest.mark.parametrize("missing", ["COMMON", "GROUND"])
+def test_a_missing_file(run, project, tmp_path, missing):
+    (project / missing).unlink()
+    result = run("giant", project)
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert f"{missing} is missing" in result.stderr
+    assert names(tmp_path) == {"block"}
+
+
+def test_results_never_go_over_a_project(run, project, tmp_path):
+    result = run("giant", project, "--out", project)
+    assert result.exit_code == 1
+    assert "over the input" in result.stderr
+    assert run("giant", project, "--out", project, "--overwrite").exit_code == 1
+
+    assert run("simulate", "other", *SMALL).exit_code == 0
+    before = {path.name: path.read_bytes() for path in Path("other").iterdir()}
+    result = run("giant", project, "--out", "other")
+    assert result.exit_code == 1
+    assert "holds another project (COMMON, CAMERAS, IMAGES); --overwrite allows it" in result.stderr
+    assert {path.name: path.read_bytes() for path in Path("other").iterdir()} == before
+    assert run("giant", project, "--out", "other", "--overwrite").exit_code == 0
+    assert Path("other", "FRAMES").read_bytes() != before["FRAMES"]
+
+
+def test_an_output_that_cannot_be_written_leaves_nothing_half_done(run, project, tmp_path):
+    (tmp_path / "taken").touch()
+    result = run("giant", project, "--json", tmp_path / "taken" / "result.json")
+    assert result.exit_code == 1
+    assert "taken" in result.stderr
+    assert "Traceback" not in result.output
+    assert not any(path.is_file() for path in (tmp_path / "block-adjusted").glob("*"))
+
+
+def test_read_only_data_are_adjusted_into_the_current_directory(run, project, tmp_path, monkeypatch):
+    inside = tmp_path / "here"
+    inside.mkdir()
+    monkeypatch.chdir(inside)
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != tmp_path)
+    assert run("giant", project).exit_code == 0
+    assert names(inside) == {"block-adjusted"}
+    assert names(inside / "block-adjusted") == OUTPUTS
+
+
+def test_the_packaged_example(run, tmp_path):
+    result = run("giant", "--example")
+    assert result.exit_code == 0, result.output
+    assert names(tmp_path) == {"galveston-adjusted"}
+    assert names(tmp_path / "galveston-adjusted") == OUTPUTS
+
+
+def test_strasbourg(run, tmp_path):
+    if not STRASBOURG.exists():
+        pytest.skip("the Strasbourg block is not beside the repository")
+    result = run("giant", STRASBOURG, "--out", "out", "--json", "result.json")
+    assert result.exit_code == 0, result.output
+    document = json.loads(Path("result.json").read_bytes())
+    expected = json.loads((STRASBOURG / "expected.json").read_bytes())
+    for group in ("plates", "ground"):
+        assert document["weighted_sum_of_squares"][group] == pytest.approx(
+            expected["weighted_sum_of_squares"][group], rel=1e-6
+        )
+    assert "rms of the differences at check points" in result.output
+
+
+def test_as_a_process(project):
+    command = [sys.executable, "-m", "photogram.cli", "giant", str(project), "--quiet"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    (project / "FRAMES").unlink()
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "FRAMES is missing" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+# simulate
+
+
+def test_the_options_of_simulate_are_the_arguments_of_the_function():
+    arguments = inspect.signature(photogram.simulate.simulate).parameters
+    options = inspect.signature(simulate_command).parameters
+    assert set(options) - set(arguments) == {"out", "overwrite"}
+    assert set(arguments) <= set(options)
+    for name in set(arguments) - {"spheroid"}:
+        assert options[name].default == arguments[name].default
+
+
+def test_simulate_writes_a_project_and_its_truth(run, tmp_path):
+    result = run("simulate", "block", *SMALL, "--blunders", "3", "--seed", "7")
+    assert result.exit_code == 0
+    assert "8 photographs" in result.output
+    assert names(tmp_path / "block") == {"COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND", "truth.json"}
+    project = read_project("block")
+    truth = json.loads(Path("block", "truth.json").read_bytes())
+    assert [photo["id"] for photo in truth["photos"]] == [frame.name for frame in project.frames]
+    errors = np.array([photo["position"] for photo in truth["photos"]]) - [
+        frame.position for frame in project.frames
+    ]
+    assert 5 < errors.std() < 60
+    assert len(truth["blunders"]) == 3
+    assert truth["units"]["position"] == "X, Y, Z in m"
+    again = run("simulate", "block", *SMALL)
+    assert again.exit_code == 1
+    assert "would be overwritten" in again.stderr
+    assert run("simulate", "block", *SMALL, "--overwrite").exit_code == 0
+
+
+def test_simulate_in_geographic_space(run):
+    options = ["--spheroid", "clarke1866", "--origin", "-95", "29.5", "10", "--photo-to-ground"]
+    assert run("simulate", "block", *SMALL, *options).exit_code == 0
+    project = read_project("block")
+    assert project.common.geographic
+    assert project.common.photo_to_ground
+    positions = project.to_block().photo_positions
+    assert np.degrees(positions[:, :2]).mean(axis=0) == pytest.approx([-95, 29.5], abs=0.01)
+    truth = json.loads(Path("block", "truth.json").read_bytes())
+    assert truth["photos"][0]["position"][:2] == pytest.approx(
+        np.degrees(positions[0, :2]).tolist(), abs=0.002
+    )
+    assert run("giant", "block", "--quiet").exit_code == 0
+
+
+def test_simulate_refuses_impossible_blocks(run, tmp_path):
+    result = run("simulate", "block", "--strips", "0")
+    assert result.exit_code == 1
+    assert "strips must be at least 1" in result.stderr
+    result = run("simulate", "block", *SMALL, "--control-sd", "0")
+    assert result.exit_code == 1
+    assert "is fixed" in result.stderr
+    assert names(tmp_path) == set()
