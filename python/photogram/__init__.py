@@ -1,12 +1,13 @@
 """Photogrammetric least-squares adjustment with the covariance of every result."""
 
 from photogram._photocore import __version__
+from photogram.adjusted import Iteration
 from photogram.adjustment import AsPublished, Progress, adjust
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
-from photogram.result import Iteration, Result
+from photogram.result import Result
 from photogram.simulate import Simulation, simulate
 
 __all__ = [

@@ -9,10 +9,11 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
+from photogram.adjusted import Iteration
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
-from photogram.result import Iteration, Result
+from photogram.result import Result
 
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
 

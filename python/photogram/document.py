@@ -10,17 +10,17 @@ import orjson
 from photogram import _photocore
 
 if TYPE_CHECKING:
-    from photogram.result import Floats, Result
+    from photogram.adjusted import AdjustedBlock, Floats
 
 __all__ = ["to_json"]
 
 
-def to_json(result: Result) -> bytes:
+def to_json(result: AdjustedBlock) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""
     return orjson.dumps(_document(result), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
 
 
-def _document(result: Result) -> dict[str, Any]:
+def _document(result: AdjustedBlock) -> dict[str, Any]:
     sums = result.sums_of_squares
     return {
         "program": f"photogram {_photocore.__version__}",
@@ -68,7 +68,7 @@ def _document(result: Result) -> dict[str, Any]:
     }
 
 
-def _units(result: Result) -> dict[str, str]:
+def _units(result: AdjustedBlock) -> dict[str, str]:
     linear = "linear unit of the object space"
     geographic = result.block.geographic
     return {
@@ -86,7 +86,7 @@ def _units(result: Result) -> dict[str, str]:
     }
 
 
-def _outward(result: Result, positions: Floats) -> Floats:
+def _outward(result: AdjustedBlock, positions: Floats) -> Floats:
     """Longitude and latitude in degrees, as the document has them."""
     if not result.block.geographic:
         return positions
@@ -95,7 +95,7 @@ def _outward(result: Result, positions: Floats) -> Floats:
     return outward
 
 
-def _photos(result: Result) -> list[dict[str, Any]]:
+def _photos(result: AdjustedBlock) -> list[dict[str, Any]]:
     columns = zip(
         result.block.photo_ids,
         _outward(result, result.photo_positions).tolist(),
@@ -116,7 +116,7 @@ def _photos(result: Result) -> list[dict[str, Any]]:
     ]
 
 
-def _points(result: Result) -> list[dict[str, Any]]:
+def _points(result: AdjustedBlock) -> list[dict[str, Any]]:
     columns = zip(
         result.block.point_ids,
         _outward(result, result.point_positions).tolist(),
@@ -132,7 +132,7 @@ def _points(result: Result) -> list[dict[str, Any]]:
     ]
 
 
-def _observations(result: Result) -> list[dict[str, Any]]:
+def _observations(result: AdjustedBlock) -> list[dict[str, Any]]:
     block, used = result.block, result.used_images
     columns = zip(
         block.image_photos[used].tolist(),
@@ -154,7 +154,7 @@ def _observations(result: Result) -> list[dict[str, Any]]:
     ]
 
 
-def _check_points(result: Result) -> list[dict[str, Any]]:
+def _check_points(result: AdjustedBlock) -> list[dict[str, Any]]:
     check = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
     differences = _outward(result, result.point_differences[check]).tolist()
     return [

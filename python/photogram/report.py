@@ -11,7 +11,7 @@ import numpy as np
 from photogram import _photocore
 
 if TYPE_CHECKING:
-    from photogram.result import Floats, Result
+    from photogram.adjusted import AdjustedBlock, Floats
 
 __all__ = ["report", "summary"]
 
@@ -20,7 +20,7 @@ _BLUNDER = 3.0
 _ARCSEC = 180 * 3600 / math.pi
 
 
-def report(result: Result) -> str:
+def report(result: AdjustedBlock) -> str:
     """Return the report of an adjusted block."""
     sections = [
         *summary(result),
@@ -40,7 +40,7 @@ def report(result: Result) -> str:
     return "\n\n".join([head, *parts]) + "\n"
 
 
-def summary(result: Result) -> list[tuple[str, list[str]]]:
+def summary(result: AdjustedBlock) -> list[tuple[str, list[str]]]:
     """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
     return [
         ("Problems", _problems(result)),
@@ -49,7 +49,7 @@ def summary(result: Result) -> list[tuple[str, list[str]]]:
     ]
 
 
-def _problems(result: Result) -> list[str]:
+def _problems(result: AdjustedBlock) -> list[str]:
     problems = [str(message) for message in result.messages]
     if not result.converged:
         problems.insert(0, f"the adjustment has {result.status}: do not use these values")
@@ -58,7 +58,7 @@ def _problems(result: Result) -> list[str]:
     return problems or ["none"]
 
 
-def _adjustment(result: Result) -> list[str]:
+def _adjustment(result: AdjustedBlock) -> list[str]:
     block, sums = result.block, result.sums_of_squares
     kinds = result.point_kinds[result.used_points].tolist()
     variance = result.variance_of_unit_weight
@@ -91,7 +91,7 @@ def _adjustment(result: Result) -> list[str]:
     return [f"{name:<36}{value}" for name, value in rows]
 
 
-def _residuals(result: Result) -> list[str]:
+def _residuals(result: AdjustedBlock) -> list[str]:
     used = result.used_images
     lines = [
         f"rms of image residuals              {_rms(result.residuals[used][:, axis]) * 1000:.3f} um in {name}"
@@ -119,7 +119,7 @@ def _residuals(result: Result) -> list[str]:
     return lines
 
 
-def _iterations(result: Result) -> list[str]:
+def _iterations(result: AdjustedBlock) -> list[str]:
     lines = [f"{'number':>6} {'weighted sum of squares':>24} {'largest change / sd':>20} {'damping':>9}"]
     lines.append(f"{0:>6} {result.initial_weighted_sum_of_squares:>24.6f}")
     lines += [
@@ -129,7 +129,7 @@ def _iterations(result: Result) -> list[str]:
     return lines
 
 
-def _suspects(result: Result) -> list[str]:
+def _suspects(result: AdjustedBlock) -> list[str]:
     size = np.nan_to_num(np.abs(result.standardized))
     images, axes = np.nonzero(size > _BLUNDER)
     if not images.size:
@@ -147,18 +147,20 @@ def _suspects(result: Result) -> list[str]:
     return [*lines, f"{images.size} in all"]
 
 
-def _check_points(result: Result) -> list[str]:
+def _check_points(result: AdjustedBlock) -> list[str]:
     check = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
     return _difference_table(result, check, result.block.point_positions)
 
 
-def _control(result: Result) -> list[str]:
+def _control(result: AdjustedBlock) -> list[str]:
     control = np.flatnonzero(result.used_points & (result.point_kinds == "control"))
     held = np.where(np.isfinite(result.block.point_sd), result.block.point_positions, np.nan)
     return _difference_table(result, control, held)
 
 
-def _difference_table(result: Result, points: Sequence[int] | np.ndarray, supplied: Floats) -> list[str]:
+def _difference_table(
+    result: AdjustedBlock, points: Sequence[int] | np.ndarray, supplied: Floats
+) -> list[str]:
     if len(points) == 0:
         return []
     axes = ("dlon", "dlat", "dh") if result.block.geographic else ("dX", "dY", "dZ")
@@ -172,7 +174,7 @@ def _difference_table(result: Result, points: Sequence[int] | np.ndarray, suppli
     return lines
 
 
-def _photos(result: Result) -> list[str]:
+def _photos(result: AdjustedBlock) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [
         f"{'photo':<10}{_position_head(result)}{'omega deg':>15}{'phi deg':>15}{'kappa deg':>15}",
@@ -186,7 +188,7 @@ def _photos(result: Result) -> list[str]:
     return lines
 
 
-def _points(result: Result) -> list[str]:
+def _points(result: AdjustedBlock) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [f"{'point':<10}{_position_head(result)}  rays  kind", f"{'':<10}{_sd_head(result)}"]
     for i in np.flatnonzero(result.used_points):
@@ -196,7 +198,7 @@ def _points(result: Result) -> list[str]:
     return lines
 
 
-def _work(result: Result) -> list[str]:
+def _work(result: AdjustedBlock) -> list[str]:
     order = {"input": "in input order", "rcm": "by reverse Cuthill-McKee"}[result.ordering]
     lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
     lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
@@ -208,32 +210,32 @@ def _rms(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
 
 
-def _outward(result: Result) -> Floats:
+def _outward(result: AdjustedBlock) -> Floats:
     """Return the factors from inner units to those of the report: arcsec for angles."""
     return np.array([_ARCSEC, _ARCSEC, 1.0] if result.block.geographic else [1.0, 1.0, 1.0])
 
 
-def _difference_units(result: Result) -> tuple[str, str, str]:
+def _difference_units(result: AdjustedBlock) -> tuple[str, str, str]:
     return ("arcsec", "arcsec", "m") if result.block.geographic else ("m", "m", "m")
 
 
-def _differences(result: Result, values: Iterable[float]) -> list[str]:
+def _differences(result: AdjustedBlock, values: Iterable[float]) -> list[str]:
     axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
     outward = np.array(list(values)) * _outward(result)
     triples = zip(axes, outward, _difference_units(result), strict=True)
     return [f"{axis} {value:.5f} {unit}" for axis, value, unit in triples if math.isfinite(value)]
 
 
-def _position_head(result: Result) -> str:
+def _position_head(result: AdjustedBlock) -> str:
     names = ("longitude", "latitude", "height m") if result.block.geographic else ("X m", "Y m", "Z m")
     return "".join(f"{name:>20}" for name in names)
 
 
-def _sd_head(result: Result) -> str:
+def _sd_head(result: AdjustedBlock) -> str:
     return "".join(f"{f'sd {unit}':>20}" for unit in _difference_units(result))
 
 
-def _position_formats(result: Result) -> tuple[Callable[[Floats], str], Callable[[Floats], str]]:
+def _position_formats(result: AdjustedBlock) -> tuple[Callable[[Floats], str], Callable[[Floats], str]]:
     """How positions and their standard deviations are written."""
 
     def position(values: Floats) -> str:

@@ -1,274 +1,50 @@
-"""The adjusted block: arrays with their covariances, tables, report and JSON document."""
+"""The result of an adjustment: an adjusted block and the ways to show it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from photogram.block import Block
-from photogram.messages import Message
+from photogram.adjusted import AdjustedBlock
+from photogram.document import to_json
+from photogram.report import report
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram import _photocore
-
-__all__ = ["Iteration", "Result", "SumsOfSquares"]
-
-Floats = NDArray[np.float64]
+__all__ = ["Result"]
 
 
-@dataclass(frozen=True)
-class Iteration:
-    """One iteration.
-
-    Attributes
-    ----------
-    number
-        From 1.
-    weighted_sum_of_squares
-        After its corrections.
-    largest_change
-        No unknown changed by more than this multiple of its standard deviation (a priori unit weight).
-    damping
-        Levenberg-Marquardt damping of its step; 0 for a Gauss-Newton step.
-    """
-
-    number: int
-    weighted_sum_of_squares: float
-    largest_change: float
-    damping: float
-
-
-@dataclass(frozen=True)
-class SumsOfSquares:
-    """Weighted sums of squares.
-
-    Attributes
-    ----------
-    camera
-        Of the weighted positions and attitudes of the photos.
-    ground
-        Of the held components of control.
-    plates
-        Of the image coordinates.
-    """
-
-    camera: float
-    ground: float
-    plates: float
-
-    @property
-    def total(self) -> float:
-        """All together."""
-        return self.camera + self.ground + self.plates
-
-
-@dataclass(frozen=True, eq=False)
-class Result:
-    """An adjusted block of P photos, n points and m image observations, in the order of the block.
-
-    Positions are X, Y, Z or longitude (rad), latitude (rad), height; angles are radians, image coordinates
-    millimetres. What was left out of the adjustment is NaN. Cofactors hold for a priori unit weight;
-    covariances are cofactors times the variance of unit weight.
-
-    Attributes
-    ----------
-    block
-        What was adjusted.
-    status
-        `converged`, `not converged` or `diverged`.
-    messages
-        Remarks on the block that did not stop the adjustment.
-    initial_weighted_sum_of_squares, iterations
-        The history.
-    sums_of_squares, degrees_of_freedom
-        Weighted sums by group, and the degrees of freedom of the chosen unit variance.
-    unit_variance
-        What the variance of unit weight is based on: `free`, `constrained` or `unity`.
-    variance_of_unit_weight
-        None without degrees of freedom; covariances are then scaled by 1.
-    photo_positions, photo_attitudes
-        (P, 3) adjusted.
-    photo_cofactors
-        (P, 6, 6): position, then omega, phi, kappa.
-    photo_redundancy
-        (P, 6) redundancy numbers of positions and attitudes as observations; 0 unless weighted.
-    point_positions
-        (n, 3) adjusted.
-    point_cofactors
-        (n, 3, 3).
-    point_redundancy
-        (n, 3) redundancy numbers of held components; 0 unless weighted.
-    point_rays
-        (n,) number of images; 0 for points left out.
-    residuals
-        (m, 2) observed minus computed, millimetres.
-    redundancy
-        (m, 2) redundancy numbers.
-    standardized
-        (m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight (Baarda's w);
-        NaN without redundancy.
-    dropped
-        Points left out, with the reason.
-    ordering, operations, formations, seconds
-        The ordering of photos in force, predicted multiply-adds of each phase, the number of formations of
-        the normal equations, and seconds spent in each phase.
-    """
-
-    block: Block
-    status: str
-    messages: list[Message]
-    initial_weighted_sum_of_squares: float
-    iterations: list[Iteration]
-    sums_of_squares: SumsOfSquares
-    degrees_of_freedom: int
-    unit_variance: str
-    variance_of_unit_weight: float | None
-    photo_positions: Floats
-    photo_attitudes: Floats
-    photo_cofactors: Floats
-    photo_redundancy: Floats
-    point_positions: Floats
-    point_cofactors: Floats
-    point_redundancy: Floats
-    point_rays: NDArray[np.int64]
-    residuals: Floats
-    redundancy: Floats
-    standardized: Floats
-    dropped: Mapping[str, str]
-    ordering: str
-    operations: Mapping[str, float]
-    formations: int
-    seconds: Mapping[str, float]
-
-    @classmethod
-    def from_solution(
-        cls, block: Block, solution: _photocore.BlockSolution, unit_variance: str, messages: list[Message]
-    ) -> Result:
-        """Take over what the core found."""
-        return cls(
-            block=block,
-            status=solution.status,
-            messages=messages,
-            initial_weighted_sum_of_squares=solution.initial_sum_of_squares,
-            iterations=[Iteration(*row) for row in solution.iterations],
-            sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
-            degrees_of_freedom=solution.degrees_of_freedom,
-            unit_variance=unit_variance,
-            variance_of_unit_weight=solution.variance_of_unit_weight,
-            photo_positions=solution.photo_positions,
-            photo_attitudes=solution.photo_attitudes,
-            photo_cofactors=solution.photo_cofactors,
-            photo_redundancy=solution.photo_redundancy,
-            point_positions=solution.point_positions,
-            point_cofactors=solution.point_cofactors,
-            point_redundancy=solution.point_redundancy,
-            point_rays=solution.point_rays,
-            residuals=solution.residuals,
-            redundancy=solution.redundancy,
-            standardized=solution.standardized,
-            dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
-            ordering=solution.ordering,
-            operations=solution.operations,
-            formations=solution.formations,
-            seconds=solution.seconds,
-        )
-
-    @property
-    def converged(self) -> bool:
-        """Whether the criterion of convergence was met."""
-        return self.status == "converged"
-
-    @property
-    def covariance_scale(self) -> float:
-        """What cofactors are multiplied by: the variance of unit weight, or 1 where there is none."""
-        return 1.0 if self.variance_of_unit_weight is None else self.variance_of_unit_weight
-
-    @property
-    def photo_covariances(self) -> Floats:
-        """(P, 6, 6) covariances of position and attitude, scaled by the variance of unit weight."""
-        return self.photo_cofactors * self.covariance_scale
-
-    @property
-    def point_covariances(self) -> Floats:
-        """(n, 3, 3) covariances, scaled by the variance of unit weight."""
-        return self.point_cofactors * self.covariance_scale
-
-    @property
-    def photo_sd(self) -> Floats:
-        """(P, 6) standard deviations of position and attitude."""
-        return _standard_deviations(self.photo_covariances)
-
-    @property
-    def point_sd(self) -> Floats:
-        """(n, 3) standard deviations."""
-        return _standard_deviations(self.point_covariances)
-
-    @property
-    def point_kinds(self) -> NDArray[np.str_]:
-        """(n,) `control` with a component held, `check` with components known but none held, else `pass`."""
-        held = np.isfinite(self.block.point_sd).any(axis=1)
-        known = np.isfinite(self.block.point_positions).any(axis=1)
-        return np.where(held, "control", np.where(known, "check", "pass"))
-
-    @property
-    def used_points(self) -> NDArray[np.bool_]:
-        """(n,) whether a point took part."""
-        return self.point_rays > 0
-
-    @property
-    def used_images(self) -> NDArray[np.bool_]:
-        """(m,) whether an image took part."""
-        used: NDArray[np.bool_] = self.used_points[self.block.image_points]
-        return used
-
-    @property
-    def point_differences(self) -> Floats:
-        """(n, 3) adjusted minus supplied coordinates; NaN where none were supplied."""
-        return self.point_positions - self.block.point_positions
+class Result(AdjustedBlock):
+    """An adjusted block with its tables, report and JSON document."""
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, angles in degrees."""
-        from photogram import tables
+        from photogram import tables  # pandas takes long to import
 
         return tables.photo_table(self)
 
     def point_table(self) -> pd.DataFrame:
         """Return adjusted points as a data frame: kind, rays, values and standard deviations, in degrees."""
-        from photogram import tables
+        from photogram import tables  # pandas takes long to import
 
         return tables.point_table(self)
 
     def image_table(self) -> pd.DataFrame:
         """Return image observations as a data frame: residuals, redundancy numbers, test values."""
-        from photogram import tables
+        from photogram import tables  # pandas takes long to import
 
         return tables.image_table(self)
 
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""
-        from photogram import tables
+        from photogram import tables  # pandas takes long to import
 
         return tables.check_table(self)
 
     def report(self) -> str:
         """Return the adjustment report as text."""
-        from photogram.report import report
-
         return report(self)
 
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); `docs/json.md` lists its members."""
-        from photogram.document import to_json
-
         return to_json(self)
-
-
-def _standard_deviations(covariances: Floats) -> Floats:
-    deviations: Floats = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    return deviations

@@ -15,12 +15,12 @@ import pandas as pd
 from photogram.block import ATTITUDE_COLUMNS, position_columns
 
 if TYPE_CHECKING:
-    from photogram.result import Floats, Result
+    from photogram.adjusted import AdjustedBlock, Floats
 
 __all__ = ["check_table", "image_table", "photo_table", "point_table"]
 
 
-def photo_table(result: Result) -> pd.DataFrame:
+def photo_table(result: AdjustedBlock) -> pd.DataFrame:
     """Return adjusted photos: `photo`, position, attitude, and `sd_` of each; angles in degrees."""
     names = [*position_columns(result.block), *ATTITUDE_COLUMNS]
     values = np.hstack([result.photo_positions, result.photo_attitudes])
@@ -33,7 +33,7 @@ def photo_table(result: Result) -> pd.DataFrame:
     )
 
 
-def point_table(result: Result) -> pd.DataFrame:
+def point_table(result: AdjustedBlock) -> pd.DataFrame:
     """Return adjusted points: `point`, `kind`, `rays`, coordinates, and `sd_` of each; angles in degrees."""
     used = result.used_points
     names = position_columns(result.block)
@@ -48,7 +48,7 @@ def point_table(result: Result) -> pd.DataFrame:
     )
 
 
-def image_table(result: Result) -> pd.DataFrame:
+def image_table(result: AdjustedBlock) -> pd.DataFrame:
     """Return image observations: residuals in millimetres, redundancy numbers, standardized residuals."""
     block, used = result.block, result.used_images
     return pd.DataFrame(
@@ -62,7 +62,7 @@ def image_table(result: Result) -> pd.DataFrame:
     )
 
 
-def check_table(result: Result) -> pd.DataFrame:
+def check_table(result: AdjustedBlock) -> pd.DataFrame:
     """Return check points: adjusted minus supplied coordinates (`d_`) and standard deviations (`sd_`)."""
     check = result.used_points & (result.point_kinds == "check")
     names = position_columns(result.block)

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use numpy::PyReadonlyArrayDyn;
-use photocore::adjustment::{Criterion, Event, Iteration, Options as AdjustmentOptions, Phase};
+use photocore::adjustment::{Criterion, Event, Options as AdjustmentOptions, Phase};
 use photocore::geometry::RotationSense;
 use photocore::normals::Ordering;
 use photocore::programs::block::{Block, BlockError as Failure, Image, Options, Photo, Point, UnitVariance};
@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{check_lengths, indices, numbers, rows};
 use crate::geometry::object_space;
-use crate::solution::{BlockSolution, IterationRow};
+use crate::solution::{BlockSolution, iteration_row};
 
 create_exception!(
     _photocore,
@@ -172,10 +172,6 @@ fn tell(py: Python<'_>, progress: Option<&Py<PyAny>>, event: Event) -> PyResult<
         }
     }
     .map(drop)
-}
-
-pub fn iteration_row(iteration: &Iteration) -> IterationRow {
-    (iteration.number, iteration.sum_of_squares, iteration.largest_change, iteration.damping)
 }
 
 fn phase_name(phase: Phase) -> &'static str {

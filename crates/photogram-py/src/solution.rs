@@ -1,16 +1,20 @@
 //! The adjusted block as arrays; its documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use photocore::adjustment::Status;
+use photocore::adjustment::{Iteration, Status};
 use photocore::programs::block::{AdjustedImage, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::table;
-use crate::block::iteration_row;
 
 /// Number, weighted sum of squares, largest change in standard deviations, damping.
 pub type IterationRow = (usize, f64, f64, f64);
+
+/// One iteration as Python sees it.
+pub fn iteration_row(iteration: &Iteration) -> IterationRow {
+    (iteration.number, iteration.sum_of_squares, iteration.largest_change, iteration.damping)
+}
 
 /// An adjusted block.
 #[pyclass(frozen, module = "photogram._photocore")]

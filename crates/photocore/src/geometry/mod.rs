@@ -1,7 +1,7 @@
 //! Pure functions of photogrammetric geometry with their partial derivatives.
 //!
 //! * [`vector`]: products of 3-vectors and 3x3 matrices;
-//! * [`rotation`]: omega, phi, kappa and the rotation matrix;
+//! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix;
 //! * [`ellipsoid`]: longitude, latitude, height, geocentric coordinates, and the local vertical frame;
 //! * [`collinearity`]: the projection of a point into a photo and its linearization.
 //!
