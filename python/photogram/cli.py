@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import replace
 from enum import StrEnum
 from importlib.metadata import version as version_of
 from importlib.resources import as_file, files
@@ -31,8 +32,6 @@ __all__ = ["app", "main"]
 
 INPUT_ERROR = 1
 NOT_CONVERGED = 3
-SHOWN = 20
-"""How many remarks the summary shows at most."""
 EXAMPLE = "galveston"
 """The packaged example, a directory of photogram.examples."""
 
@@ -170,6 +169,7 @@ def giant(
     with _failures(), ExitStack() as resources:
         from photogram.giant import read_project
         from photogram.giant.files import write_whole
+        from photogram.summary import summarize
 
         if directory is None:
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
@@ -183,9 +183,9 @@ def giant(
             written[json] = result.to_json()
         write_whole(written)
         if not quiet:
-            _summarize(project, result)
+            summarize(result, output)
             output.print("written: " + escape(", ".join(str(path) for path in written)))
-    if result.status != "converged":
+    if not result.converged:
         raise typer.Exit(NOT_CONVERGED)
 
 
@@ -218,7 +218,7 @@ def _adjust(
 
     common = project.common
     with errors.status("reading", spinner="line") if not quiet else nullcontext() as status:
-        return adjust(
+        result = adjust(
             block,
             unit_variance=common.unit_variance,
             ordering=ordering.value,
@@ -229,11 +229,20 @@ def _adjust(
             progress=_progress(status) if status is not None else None,
             threads=threads,
         )
+    return replace(result, messages=[*project.messages, *result.messages])
 
 
 def _progress(status: Status) -> Callable[[Progress], None]:
+    """Return a function that keeps the status line at the phase and the last iteration."""
+    last = ""
+
     def show(progress: Progress) -> None:
-        status.update(escape(str(progress)))
+        nonlocal last
+        if progress.iteration is not None:
+            size = progress.iteration.weighted_sum_of_squares
+            last = f"iteration {progress.iteration.number}: weighted sum of squares {size:.6g}; "
+        elif progress.total:
+            status.update(f"{last}{progress.phase} {100 * progress.done // progress.total} %")
 
     return show
 
@@ -249,83 +258,10 @@ def _result_files(project: Project, block: Block, result: Result, out: Path) -> 
         photo_positions=result.photo_positions,
         photo_attitudes=result.photo_attitudes,
         point_positions=result.point_positions,
-        converged=result.status == "converged",
+        converged=result.converged,
     )
     made = {out / name: to_bytes(lines) for name, lines in records.items()}
-    remarks = "".join(f"{message}\n" for message in project.messages)
-    return {**made, out / "report.txt": (remarks + result.report()).encode()}
-
-
-def _summarize(project: Project, result: Result) -> None:
-    """Print the outcome: problems first, then the figures, a unit on every line."""
-    remarks = [*project.messages, *result.messages]
-    for message in remarks[:SHOWN]:
-        output.print(f"[yellow]remark:[/] {escape(str(message))}")
-    if len(remarks) > SHOWN:
-        output.print(f"[yellow]and {len(remarks) - SHOWN} more remarks[/] (all are in report.txt)")
-    colour = "green" if result.status == "converged" else "bold red"
-    output.print(f"[{colour}]{result.status}[/] after {len(result.iterations)} iterations")
-    for name, value in _figures(result):
-        output.print(f"  {name:<42} {escape(value)}")
-    largest = _largest_residuals(result)
-    if largest:
-        output.print("  largest standardized residuals (no unit), with the residual in micrometres")
-        for line in largest:
-            output.print(f"    {escape(line)}")
-
-
-def _figures(result: Result) -> list[tuple[str, str]]:
-    """Name the figures that judge an adjustment."""
-    import numpy as np
-
-    block, variance = result.block, result.variance_of_unit_weight
-    x_rms, y_rms = 1000 * np.sqrt(np.mean(result.residuals**2, axis=0))
-    unit = "rad, rad, linear units" if block.geographic else "linear units"
-    held = np.isfinite(block.point_sd)
-    figures = [
-        (
-            "photographs, points, image points",
-            f"{len(block.photo_ids)}, {len(block.point_ids)}, {len(block.image_xy)}",
-        ),
-        ("held components of control", f"{held.sum()}"),
-        ("degrees of freedom", f"{result.degrees_of_freedom}"),
-        (
-            "variance of unit weight",
-            "undefined" if variance is None else f"{variance:.6g} (no unit, a priori 1)",
-        ),
-        (
-            "standard deviation of unit weight",
-            "undefined" if variance is None else f"{math.sqrt(variance):.4f} (no unit)",
-        ),
-        ("rms of the image residuals, x, y", f"{x_rms:.2f}, {y_rms:.2f} micrometres"),
-    ]
-    for name, chosen in (("control", held), ("check points", ~held)):
-        difference = np.where(chosen, result.point_positions - block.point_positions, np.nan)
-        known = np.isfinite(difference)
-        if known.any():
-            rms = [
-                math.sqrt(np.mean(column[fine] ** 2)) if fine.any() else math.nan
-                for column, fine in zip(difference.T, known.T, strict=True)
-            ]
-            figures.append(
-                (f"rms of the differences at {name}", f"{', '.join(f'{value:.4g}' for value in rms)} {unit}")
-            )
-    return figures
-
-
-def _largest_residuals(result: Result, count: int = 5) -> list[str]:
-    """Describe the image coordinates with the largest standardized residuals, largest first."""
-    import numpy as np
-
-    size = np.nan_to_num(np.abs(result.standardized)).ravel()
-    lines = []
-    for at in np.argsort(-size, kind="stable")[:count].tolist():
-        row, axis = divmod(at, 2)
-        photo = result.block.photo_ids[result.block.image_photos[row]]
-        point = result.block.point_ids[result.block.image_points[row]]
-        value, residual = result.standardized[row, axis], 1000 * result.residuals[row, axis]
-        lines.append(f"{value:8.2f}  point {point:8} photo {photo:8} {'xy'[axis]} {residual:8.2f}")
-    return lines
+    return {**made, out / "report.txt": result.report().encode()}
 
 
 @app.command()

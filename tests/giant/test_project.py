@@ -217,9 +217,8 @@ def test_control_that_is_not_photographed_is_ignored(tmp_path):
 def test_no_control_at_all_is_remarked_on(tmp_path, ground):
     project = project_of(tmp_path, GROUND=ground)
     assert not np.isfinite(project.to_block().point_sd).any()
-    assert texts(project) == [
-        "no photographed control point: the datum rests on the weights of the camera stations alone"
-    ]
+    assert project.messages[0].file == (tmp_path / "GROUND" if ground else tmp_path)
+    assert texts(project) == ["GROUND holds no component of a photographed point: there is no control"]
 
 
 def test_refraction_that_is_not_applied_is_remarked_on(tmp_path):

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.block import Block
 from photogram.errors import InputError
 from photogram.giant.frames import ATTITUDE_SD, Frame
-from photogram.giant.ground import GroundPoint
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.records import Record
 from photogram.messages import Message
@@ -168,16 +167,12 @@ def _control(project: Project, index: dict[str, int], messages: list[Message]) -
         position[row] = np.where(held | (np.array(point.position) != 0), point.position, np.nan)
         sd[row] = np.where(held, _or_default(point.sd, project.common.default_control_sd), np.inf)
     if not np.isfinite(sd).any():
-        messages.append(_no_control(project.ground))
+        record = next((point.record for point in project.ground if point.record), None)
+        path = record.source.path if record else project.directory
+        messages.append(
+            Message("GROUND holds no component of a photographed point: there is no control", path)
+        )
     return position, sd
-
-
-def _no_control(ground: list[GroundPoint]) -> Message:
-    record = next((point.record for point in ground if point.record), None)
-    path = record.source.path if record else None
-    return Message(
-        "no photographed control point: the datum rests on the weights of the camera stations alone", path
-    )
 
 
 def _or_default(values: ArrayLike, default: ArrayLike) -> Floats:

@@ -29,6 +29,9 @@ __all__ = [
 ARCSEC = math.pi / 648000.0
 """One second of arc in radians."""
 
+MOST_DECIMALS = 6
+"""Decimals of a number above 1 that has more digits than fit, unless it has fewer columns."""
+
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d{1,2}))?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 
@@ -102,10 +105,11 @@ def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
 
 
 def format_real(value: float, width: int, decimals: int) -> str:
-    """Write a number for an Fw.d field: explicit point, as many digits as it needs and fit, right-justified.
+    """Write a number for an Fw.d field: explicit point, as many digits as it needs, right-justified.
 
-    At least `decimals` decimals where there is room. The implied point of the format is used only where the
-    explicit one would cost a digit. NaN, an unknown value, is a blank field.
+    A number that does not fit is rounded. At least `decimals` decimals where there is room. The implied point
+    of the format is used only where the explicit one would cost a digit. NaN, an unknown value, is a blank
+    field.
 
     Raises
     ------
@@ -133,7 +137,7 @@ def format_real(value: float, width: int, decimals: int) -> str:
 
 def _rounded(value: float, width: int) -> str:
     """Round to the decimals that fit; too long where not even the whole number and its point do."""
-    places, excess = width, 1
+    places, excess = (width if abs(value) < 1 else MOST_DECIMALS) + 1, 1
     while excess > 0 and places > 0:
         places = max(0, places - excess)
         text = f"{value:#.{places}f}"
@@ -151,20 +155,12 @@ def pack_dms(arcseconds: Decimal) -> str:
     return f"{'-' if arcseconds < 0 else ''}{packed:f}"
 
 
-def format_angle(value: float, width: int, *, decimals: int = 4, whole_circles: bool = True) -> str:
-    """Write radians as a packed DMS field with an explicit point and as many decimals of the second as fit.
+def format_angle(value: float, width: int) -> str:
+    """Write radians as a packed DMS field with an explicit point, right-justified.
 
-    Parameters
-    ----------
-    value
-        Radians; NaN, an unknown value, is a blank field.
-    width
-        Columns of the field.
-    decimals
-        Decimals of the second to show at least, where there is room.
-    whole_circles
-        Whether a negative angle that would lose the fourth decimal may be written with 360 degrees added,
-        which spares the sign.
+    An angle that came from such a field is written exactly; others to five decimals of the second, or four
+    where the columns end. A negative angle that would lose the fourth decimal gets 360 degrees added, which
+    spares the sign. NaN, an unknown value, is a blank field.
 
     Raises
     ------
@@ -173,25 +169,27 @@ def format_angle(value: float, width: int, *, decimals: int = 4, whole_circles: 
     """
     if math.isnan(value):
         return " " * width
-    if not abs(value) <= 2 * math.pi:
-        raise ValueError(f"{value} rad is beyond 360 degrees")
-    text = _packed(value, width, decimals)
-    coarse = len(text) - 1 - text.index(".") < 4 and parse_angle(text, 0)[0] != value
-    if coarse and value < 0 and whole_circles:
-        text = _packed(value + 2 * math.pi, width, decimals)
+    text = _packed(value, width, least=4)
+    if parse_angle(text, 0)[0] != value:
+        text = _packed(value, width, least=4, most=5)
+        if value < 0 and len(text) - 1 - text.index(".") < 4:
+            text = _packed(value + 2 * math.pi, width, least=4)
     return text.rjust(width)
 
 
-def _packed(value: float, width: int, decimals: int) -> str:
+def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
+    """Write radians as packed DMS with `least` to `most` decimals of the second, as far as they fit."""
+    if not abs(value) <= 2 * math.pi:
+        raise ValueError(f"{value} rad is beyond 360 degrees")
     arcseconds = Decimal(repr(value / ARCSEC))
-    places, excess = width - 1, 1
+    places, excess = min(most, width - 2) + 1, 1
     while excess > 0 and places > 0:
         places = max(0, places - excess)
         whole, _, fraction = pack_dms(round(arcseconds, places)).partition(".")
         excess = len(whole) + 1 + places - width
     if excess > 0:
         raise ValueError(f"{value} rad does not fit {width} columns")
-    return f"{whole}.{fraction.rstrip('0').ljust(min(decimals, places), '0')}"
+    return f"{whole}.{fraction.rstrip('0').ljust(min(least, places), '0')}"
 
 
 def format_name(name: str) -> str:
@@ -231,9 +229,7 @@ def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
         if value == 0:
             fields.append(" " * 10)
             continue
-        field = (
-            format_angle(value, 10, decimals=3, whole_circles=False) if angle else format_real(value, 10, 3)
-        )
+        field = _packed(value, 10, least=3).rjust(10) if angle else format_real(value, 10, 3)
         if not value > 0 or not any(digit in field for digit in "123456789"):
             raise ValueError(f"the standard deviation {value} cannot be written in ten columns")
         fields.append(field)
