@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import photogram
 from photogram.cli import app
 from photogram.cli import simulate as simulate_command
 from photogram.giant import read_project
@@ -133,6 +134,39 @@ def test_as_published_stops_at_the_limit_of_common(run, project, tmp_path):
     assert names(tmp_path / "block-adjusted") == {"RESTART", "report.txt"}
     assert json.loads(Path("result.json").read_bytes())["status"] == "not converged"
     assert run("giant", project).exit_code == 0
+
+
+def test_intersection_only_leaves_the_stations(run, project, tmp_path):
+    title, job = (project / "COMMON").read_text().splitlines()
+    (project / "COMMON").write_text(f"{title}\n{job[:9]}1{job[10:]}\n")
+    assert run("giant", project, "--quiet").exit_code == 0
+    before, after = (
+        read_project(project),
+        read_project_with(project, tmp_path / "block-adjusted", tmp_path / "again"),
+    )
+    assert [frame.position for frame in after.frames] == [frame.position for frame in before.frames]
+
+
+def test_remarks_are_in_the_summary_the_report_and_the_document(run, tmp_path):
+    assert run("simulate", "block", *SMALL, "--control", "none").exit_code == 0
+    result = run("giant", "block", "--json", "result.json")
+    assert result.exit_code == 0
+    remark = "GROUND holds no component of a photographed point: there is no control"
+    assert result.output.startswith("remark: ")
+    assert remark in result.output
+    assert remark in Path("block-adjusted", "report.txt").read_text()
+    assert any(remark in message for message in json.loads(Path("result.json").read_bytes())["messages"])
+
+
+def test_an_adjustment_that_fails_writes_nothing(run, project, tmp_path, monkeypatch):
+    def fail(*_arguments, **_options):
+        raise photogram.RankError("the observations do not determine photo [1]", ["1"], [])
+
+    monkeypatch.setattr(photogram, "adjust", fail)
+    result = run("giant", project)
+    assert (result.exit_code, result.stdout) == (3, "")
+    assert result.stderr == "error: the observations do not determine photo [1]\n"
+    assert names(tmp_path) == {"block"}
 
 
 def test_bad_input_writes_nothing(run, project, tmp_path):

