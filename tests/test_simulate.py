@@ -10,7 +10,7 @@ import pytest
 
 from photogram import Block, InputError, geometry
 from photogram.geometry import Spheroid
-from photogram.simulate import simulate
+from photogram.simulation import simulate
 
 GALVESTON = (math.radians(-95.0), math.radians(29.7), 0.0)
 SPACES = {

@@ -8,7 +8,7 @@ from photogram.errors import AdjustmentError, InputError, PhotogramError, RankEr
 from photogram.geometry import Spheroid
 from photogram.messages import Message
 from photogram.result import Result
-from photogram.simulate import Simulation, simulate
+from photogram.simulation import Simulation, simulate
 
 __all__ = [
     "AdjustmentError",

@@ -25,10 +25,6 @@ def report(result: AdjustedBlock) -> str:
     sections = [
         *summary(result),
         ("Iterations", _iterations(result)),
-        (
-            f"Image coordinates with |standardized residual| > {_BLUNDER:g} (largest {_SUSPECTS})",
-            _suspects(result),
-        ),
         ("Check points: adjusted minus supplied", _check_points(result)),
         ("Control points: adjusted minus supplied", _control(result)),
         ("Photos", _photos(result)),
@@ -46,6 +42,7 @@ def summary(result: AdjustedBlock) -> list[tuple[str, list[str]]]:
         ("Problems", _problems(result)),
         ("Adjustment", _adjustment(result)),
         ("Residuals", _residuals(result)),
+        (f"Image coordinates with |standardized residual| > {_BLUNDER:g}, largest first", _suspects(result)),
     ]
 
 
@@ -144,7 +141,7 @@ def _suspects(result: AdjustedBlock) -> list[str]:
         f" {result.standardized[i, axis]:>13.2f}"
         for i, axis in zip(images[order], axes[order], strict=True)
     ]
-    return [*lines, f"{images.size} in all"]
+    return lines if images.size == len(order) else [*lines, f"and {images.size - len(order)} more"]
 
 
 def _check_points(result: AdjustedBlock) -> list[str]:
@@ -168,8 +165,8 @@ def _difference_table(
     lines = [
         f"{'point':<10}" + "".join(f"{f'{axis} {unit}':>16}" for axis, unit in zip(axes, units, strict=True))
     ]
-    for point in points:
-        values = (result.point_positions[point] - supplied[point]) * _outward(result)
+    differences = (result.point_positions - supplied)[points] * _outward(result)
+    for point, values in zip(points, differences, strict=True):
         lines.append(f"{result.block.point_ids[point]:<10}" + "".join(_number(value, 5) for value in values))
     return lines
 
@@ -180,21 +177,36 @@ def _photos(result: AdjustedBlock) -> list[str]:
         f"{'photo':<10}{_position_head(result)}{'omega deg':>15}{'phi deg':>15}{'kappa deg':>15}",
         f"{'':<10}{_sd_head(result)}{'sd arcsec':>15}{'sd arcsec':>15}{'sd arcsec':>15}",
     ]
-    for i, name in enumerate(result.block.photo_ids):
-        angles = "".join(f"{angle:>15.7f}" for angle in np.degrees(result.photo_attitudes[i]))
-        deviations = "".join(f"{sd * _ARCSEC:>15.3f}" for sd in result.photo_sd[i, 3:])
-        lines.append(f"{name:<10}{position(result.photo_positions[i])}{angles}")
-        lines.append(f"{'':<10}{sd_position(result.photo_sd[i, :3])}{deviations}")
+    rows = zip(
+        result.block.photo_ids,
+        result.photo_positions,
+        np.degrees(result.photo_attitudes),
+        result.photo_sd,
+        strict=True,
+    )
+    for name, values, angles, sd in rows:
+        lines.append(f"{name:<10}{position(values)}" + "".join(f"{angle:>15.7f}" for angle in angles))
+        lines.append(
+            f"{'':<10}{sd_position(sd[:3])}" + "".join(f"{each * _ARCSEC:>15.3f}" for each in sd[3:])
+        )
     return lines
 
 
 def _points(result: AdjustedBlock) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [f"{'point':<10}{_position_head(result)}  rays  kind", f"{'':<10}{_sd_head(result)}"]
-    for i in np.flatnonzero(result.used_points):
-        head = f"{result.block.point_ids[i]:<10}{position(result.point_positions[i])}"
-        lines.append(f"{head}  {result.point_rays[i]:>4}  {result.point_kinds[i]}")
-        lines.append(f"{'':<10}{sd_position(result.point_sd[i])}")
+    rows = zip(
+        result.block.point_ids,
+        result.point_positions,
+        result.point_sd,
+        result.point_rays,
+        result.point_kinds,
+        strict=True,
+    )
+    for name, values, sd, rays, kind in rows:
+        if rays:
+            lines.append(f"{name:<10}{position(values)}  {rays:>4}  {kind}")
+            lines.append(f"{'':<10}{sd_position(sd)}")
     return lines
 
 
@@ -243,8 +255,10 @@ def _position_formats(result: AdjustedBlock) -> tuple[Callable[[Floats], str], C
             return f"{_dms(values[0], 5):>20}{_dms(values[1], 5):>20}{values[2]:>20.4f}"
         return "".join(f"{value:>20.4f}" for value in values)
 
+    outward = _outward(result)
+
     def deviations(values: Floats) -> str:
-        return "".join(f"{value:>20.5f}" for value in values * _outward(result))
+        return "".join(f"{value:>20.5f}" for value in values * outward)
 
     return position, deviations
 

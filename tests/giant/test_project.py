@@ -23,9 +23,9 @@ from small_project import (
 
 from photogram.block import Block
 from photogram.errors import InputError
+from photogram.files import write_whole
 from photogram.giant import Project, read_project, write_project
 from photogram.giant.export import adjusted_frames, adjusted_ground
-from photogram.giant.files import write_whole
 
 STRASBOURG = Path(__file__).parents[3] / "shared" / "data" / "strasbourg" / "giant"
 
@@ -218,7 +218,7 @@ def test_no_control_at_all_is_remarked_on(tmp_path, ground):
     project = project_of(tmp_path, GROUND=ground)
     assert not np.isfinite(project.to_block().point_sd).any()
     assert project.messages[0].file == (tmp_path / "GROUND" if ground else tmp_path)
-    assert texts(project) == ["GROUND holds no component of a photographed point: there is no control"]
+    assert texts(project) == ["GROUND holds no component of a photographed point"]
 
 
 def test_refraction_that_is_not_applied_is_remarked_on(tmp_path):

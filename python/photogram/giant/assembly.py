@@ -18,14 +18,14 @@ from photogram.messages import Message
 if TYPE_CHECKING:
     from photogram.geometry import Spheroid
     from photogram.giant.common import Common
-    from photogram.giant.project import Project
+    from photogram.giant.contents import Contents
 
 __all__ = ["assemble"]
 
 Floats = NDArray[np.float64]
 
 
-def assemble(project: Project) -> tuple[Block, list[Message]]:
+def assemble(project: Contents) -> tuple[Block, list[Message]]:
     """Return the block of a project, and the remarks on what was left out or deserves a look.
 
     Photos stand in the order of FRAMES, points in the order of their first image.
@@ -87,7 +87,7 @@ def _unsupported(common: Common) -> list[Message]:
     ]
 
 
-def _photos(project: Project, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:
+def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:
     """Pair FRAMES with IMAGES. Images of frames that FRAMES does not list are left out silently."""
     listed = {frame.name for frame in project.frames}
     measured: dict[str, ImageFrame] = {}
@@ -120,7 +120,7 @@ def _lost_header(images: list[ImageFrame], name: str) -> str:
     return ""
 
 
-def _principal_distances(project: Project, images: list[ImageFrame]) -> Floats:
+def _principal_distances(project: Contents, images: list[ImageFrame]) -> Floats:
     cameras = {camera.name: camera.principal_distance for camera in project.cameras}
     for each in images:
         if not each.principal_distance and each.camera not in cameras:
@@ -151,7 +151,7 @@ def _first_images(
     return kept
 
 
-def _control(project: Project, index: dict[str, int], messages: list[Message]) -> tuple[Floats, Floats]:
+def _control(project: Contents, index: dict[str, int], messages: list[Message]) -> tuple[Floats, Floats]:
     """Return positions and standard deviations of all points: those of GROUND where it has any."""
     position = np.full((len(index), 3), np.nan)
     sd = np.full((len(index), 3), np.inf)
@@ -169,9 +169,7 @@ def _control(project: Project, index: dict[str, int], messages: list[Message]) -
     if not np.isfinite(sd).any():
         record = next((point.record for point in project.ground if point.record), None)
         path = record.source.path if record else project.directory
-        messages.append(
-            Message("GROUND holds no component of a photographed point: there is no control", path)
-        )
+        messages.append(Message("GROUND holds no component of a photographed point", path))
     return position, sd
 
 

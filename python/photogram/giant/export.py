@@ -20,7 +20,7 @@ from photogram.giant.images import ImageFrame
 from photogram.messages import Message
 
 if TYPE_CHECKING:
-    from photogram.giant.project import Project
+    from photogram.giant.contents import Contents
 
 __all__ = ["adjusted_frames", "adjusted_ground", "adjusted_records", "block_files"]
 
@@ -118,7 +118,7 @@ def _triple(values: Floats) -> Triple:
     return first, second, third
 
 
-def adjusted_frames(project: Project, block: Block, positions: Floats, attitudes: Floats) -> list[Frame]:
+def adjusted_frames(project: Contents, block: Block, positions: Floats, attitudes: Floats) -> list[Frame]:
     """Return the stations for units 8 and 20: adjusted values with the standard deviations of the input.
 
     Parameters
@@ -140,7 +140,7 @@ def adjusted_frames(project: Project, block: Block, positions: Floats, attitudes
     ]
 
 
-def adjusted_ground(project: Project, block: Block, positions: Floats) -> list[GroundPoint]:
+def adjusted_ground(project: Contents, block: Block, positions: Floats) -> list[GroundPoint]:
     """Return the points for unit 9: every point on two or more photographs.
 
     Control keeps its standard deviations and type code. Pass points get the type code 7, so that the file can
@@ -167,7 +167,7 @@ def adjusted_ground(project: Project, block: Block, positions: Floats) -> list[G
 
 
 def adjusted_records(
-    project: Project,
+    project: Contents,
     block: Block,
     *,
     photo_positions: Floats,

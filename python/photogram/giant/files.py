@@ -1,14 +1,13 @@
-"""Finding the files of a project, and writing files whole or not at all."""
+"""Finding the files of a project."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from photogram.errors import InputError
 
-__all__ = ["NAMES", "find_files", "present_files", "to_bytes", "write_whole", "written"]
+__all__ = ["NAMES", "find_files", "present_files", "to_bytes", "written"]
 
 NAMES = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")
 """The input files; they are found in any letter case and with any one extension."""
@@ -67,26 +66,3 @@ def written(name: str, writer: Callable[[], list[str]]) -> list[str]:
 def to_bytes(records: Iterable[str]) -> bytes:
     """Return records as the bytes of a text file."""
     return "".join(f"{record}\n" for record in records).encode()
-
-
-def write_whole(files: Mapping[Path, bytes]) -> None:
-    """Write files so that each is there whole or not at all.
-
-    All are written beside their places first, then moved there.
-
-    Raises
-    ------
-    OSError
-        A file cannot be written; no file has changed unless the very moving of one failed.
-    """
-    begun: dict[Path, Path] = {}
-    try:
-        for path, content in files.items():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            begun[path] = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-            begun[path].write_bytes(content)
-        for path, temporary in begun.items():
-            temporary.replace(path)
-    finally:
-        for temporary in begun.values():
-            temporary.unlink(missing_ok=True)

@@ -3,52 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from photogram.block import Block
 from photogram.errors import InputError
+from photogram.files import write_whole
 from photogram.giant.assembly import assemble
-from photogram.giant.cameras import Camera, camera_records, parse_cameras
-from photogram.giant.common import Common, common_records, parse_common
+from photogram.giant.cameras import parse_cameras
+from photogram.giant.common import Common, parse_common
+from photogram.giant.contents import Contents
 from photogram.giant.export import block_files
-from photogram.giant.files import NAMES, find_files, present_files, to_bytes, write_whole, written
-from photogram.giant.frames import Frame, frame_records, parse_frames
-from photogram.giant.ground import GroundPoint, ground_records, parse_ground
-from photogram.giant.images import ImageFrame, image_records, parse_images
+from photogram.giant.files import NAMES, find_files, present_files, to_bytes
+from photogram.giant.frames import parse_frames
+from photogram.giant.ground import parse_ground
+from photogram.giant.images import parse_images
 from photogram.giant.records import Source
-from photogram.messages import Message
 
-__all__ = ["Project", "read_project", "write_project"]
+__all__ = ["Project", "project_files", "read_project", "write_project"]
 
 
-@dataclass
-class Project:
-    """The content of the five files.
-
-    Attributes
-    ----------
-    common, cameras, frames, images, ground
-        The files, each with its own names and units (see their classes).
-    messages
-        Remarks on the input, made while it was read and turned into a block.
-    directory
-        Where the files were read, if they were.
-    """
-
-    common: Common
-    cameras: list[Camera]
-    frames: list[Frame]
-    images: list[ImageFrame]
-    ground: list[GroundPoint]
-    messages: list[Message] = field(default_factory=list)
-    directory: Path | None = None
-
-    @property
-    def title(self) -> str:
-        """Record 1 of COMMON."""
-        return self.common.title
+class Project(Contents):
+    """A project: the content of the five files, and the way to a block and back."""
 
     def to_block(self) -> Block:
         """Return the block: apply the rules that hold between files (GIANT guide, sections II.B and III).
@@ -89,24 +64,6 @@ class Project:
             photo.
         """
         return cls(*block_files(block, common))
-
-    def records(self) -> dict[str, list[str]]:
-        """Return the records of the five files by name.
-
-        Raises
-        ------
-        InputError
-            A value that does not fit its field.
-        """
-        geographic = self.common.geographic
-        writers: dict[str, Callable[[], list[str]]] = {
-            "COMMON": lambda: common_records(self.common),
-            "CAMERAS": lambda: camera_records(self.cameras),
-            "IMAGES": lambda: image_records(self.images),
-            "FRAMES": lambda: frame_records(self.frames, geographic),
-            "GROUND": lambda: ground_records(self.ground, geographic),
-        }
-        return {name: written(name, writer) for name, writer in writers.items()}
 
 
 def read_project(directory: str | os.PathLike[str]) -> Project:

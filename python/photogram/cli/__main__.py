@@ -1,0 +1,5 @@
+"""`python -m photogram.cli`."""
+
+from photogram.cli import main
+
+main()

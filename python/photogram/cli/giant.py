@@ -1,0 +1,201 @@
+"""`photogram giant`: adjust a GIANT project."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import ExitStack, nullcontext
+from dataclasses import replace
+from enum import StrEnum
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+
+if TYPE_CHECKING:
+    from rich.status import Status
+
+    from photogram import Block, Progress, Result
+    from photogram.giant import Project
+
+__all__ = ["giant"]
+
+SHOWN = 24
+"""Lines of a section that the summary shows at most."""
+EXAMPLE = "galveston"
+"""The packaged example, a directory of photogram.examples."""
+
+
+class Ordering(StrEnum):
+    """How the photographs are ordered in the normal equations."""
+
+    AUTO = "auto"
+    INPUT = "input"
+    RCM = "rcm"
+
+
+def giant(
+    directory: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="DIR",
+            help="Directory of COMMON, CAMERAS, IMAGES, FRAMES, GROUND (any letter case, any extension).",
+            show_default=False,
+        ),
+    ] = None,
+    example: Annotated[
+        bool,
+        typer.Option(
+            "--example", help="Adjust the packaged example instead: 20 photographs at Galveston Bay."
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OUT",
+            help="Directory for adjusted stations and points, and report. Default: DIR-adjusted beside DIR.",
+            show_default=False,
+        ),
+    ] = None,
+    json: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
+    ] = None,
+    as_published: Annotated[
+        bool,
+        typer.Option(
+            "--as-published", help="Stop by the percent criterion and the limit of iterations of COMMON."
+        ),
+    ] = False,
+    ordering: Annotated[
+        Ordering, typer.Option(help="Order of the photographs in the normal equations.")
+    ] = Ordering.AUTO,
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Threads; the results do not depend on it. Default: all.", show_default=False
+        ),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    overwrite: Annotated[
+        bool,
+        typer.Option("--overwrite", help="Allow OUT to be a directory with another GIANT project in it."),
+    ] = False,
+) -> None:
+    """Adjust a GIANT project: photographs, points and their covariances.
+
+    Writes FRAMES and GROUND (adjusted, when converged), RESTART (stations of the last iteration), report.txt.
+    """
+    if example == (directory is not None):
+        raise typer.BadParameter("give a directory, or --example", param_hint="DIR")
+    with failures(), ExitStack() as resources:
+        from photogram.files import write_whole
+        from photogram.giant import read_project
+
+        if directory is None:
+            directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
+            out = out or Path(f"{EXAMPLE}-adjusted")
+        out = _output_directory(directory, out, overwrite)
+        project = read_project(directory)
+        block = project.to_block()
+        result = _adjust(project, block, as_published, ordering, threads, quiet)
+        written = _result_files(project, block, result, out)
+        if json is not None:
+            written[json] = result.to_json()
+        write_whole(written)
+        if not quiet:
+            _summarize(result)
+            output.print("written: " + escape(", ".join(str(path) for path in written)))
+    if not result.converged:
+        raise typer.Exit(NOT_CONVERGED)
+
+
+def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Path:
+    """Choose where results go: never over the input, and not over another project unless told."""
+    from photogram.errors import InputError
+    from photogram.giant.files import present_files
+
+    if out is None:
+        place = directory.resolve()
+        # Published data are often read-only: then the results go where the command is given.
+        parent = place.parent if os.access(place.parent, os.W_OK) else Path()
+        return parent / f"{place.name}-adjusted"
+    if out.exists() and not out.is_dir():
+        raise InputError("is not a directory", file=out)
+    if out.exists() and out.samefile(directory):
+        raise InputError("the results would be written over the input", file=out)
+    if out.exists() and not overwrite:
+        inputs = [path.name for name in ("COMMON", "CAMERAS", "IMAGES") for path in present_files(out)[name]]
+        if inputs:
+            raise InputError(f"holds another project ({', '.join(inputs)}); --overwrite allows it", file=out)
+    return out
+
+
+def _adjust(
+    project: Project, block: Block, as_published: bool, ordering: Ordering, threads: int | None, quiet: bool
+) -> Result:
+    """Adjust the block as COMMON asks, with the progress on standard error."""
+    from photogram import AsPublished, adjust
+
+    common = project.common
+    with errors.status("reading", spinner="line") if not quiet else nullcontext() as status:
+        result = adjust(
+            block,
+            unit_variance=common.unit_variance,
+            ordering=ordering.value,
+            as_published=AsPublished(common.convergence_percent, common.max_iterations)
+            if as_published
+            else None,
+            fix_photos=common.intersection_only,
+            progress=_progress(status) if status is not None else None,
+            threads=threads,
+        )
+    return replace(result, messages=[*project.messages, *result.messages])
+
+
+def _progress(status: Status) -> Callable[[Progress], None]:
+    """Return a function that keeps the status line at the phase and the last iteration."""
+    last = ""
+
+    def show(progress: Progress) -> None:
+        nonlocal last
+        if progress.iteration is not None:
+            size = progress.iteration.weighted_sum_of_squares
+            last = f"iteration {progress.iteration.number}: weighted sum of squares {size:.6g}; "
+        elif progress.total:
+            status.update(f"{last}{progress.phase} {100 * progress.done // progress.total} %")
+
+    return show
+
+
+def _result_files(project: Project, block: Block, result: Result, out: Path) -> dict[Path, bytes]:
+    """Make everything that goes to the output directory, before anything is written."""
+    from photogram.giant.export import adjusted_records
+    from photogram.giant.files import to_bytes
+
+    records = adjusted_records(
+        project,
+        block,
+        photo_positions=result.photo_positions,
+        photo_attitudes=result.photo_attitudes,
+        point_positions=result.point_positions,
+        converged=result.converged,
+    )
+    made = {out / name: to_bytes(lines) for name, lines in records.items()}
+    return {**made, out / "report.txt": result.report().encode()}
+
+
+def _summarize(result: Result) -> None:
+    """Print the first sections of the report: problems, figures, residuals."""
+    from photogram.report import summary
+
+    for title, lines in summary(result):
+        output.print(f"[bold]{title}[/]")
+        for line in lines[:SHOWN]:
+            output.print(f"  {escape(line)}")
+        if len(lines) > SHOWN:
+            output.print(f"  and {len(lines) - SHOWN} more lines in report.txt")

@@ -1,0 +1,63 @@
+"""The content of the five files of a GIANT project."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from photogram.giant.cameras import Camera, camera_records
+from photogram.giant.common import Common, common_records
+from photogram.giant.files import written
+from photogram.giant.frames import Frame, frame_records
+from photogram.giant.ground import GroundPoint, ground_records
+from photogram.giant.images import ImageFrame, image_records
+from photogram.messages import Message
+
+__all__ = ["Contents"]
+
+
+@dataclass
+class Contents:
+    """The content of the five files.
+
+    Attributes
+    ----------
+    common, cameras, frames, images, ground
+        The files, each with its own names and units (see their classes).
+    messages
+        Remarks on the input, made while it was read and turned into a block.
+    directory
+        Where the files were read, if they were.
+    """
+
+    common: Common
+    cameras: list[Camera]
+    frames: list[Frame]
+    images: list[ImageFrame]
+    ground: list[GroundPoint]
+    messages: list[Message] = field(default_factory=list)
+    directory: Path | None = None
+
+    @property
+    def title(self) -> str:
+        """Record 1 of COMMON."""
+        return self.common.title
+
+    def records(self) -> dict[str, list[str]]:
+        """Return the records of the five files by name.
+
+        Raises
+        ------
+        InputError
+            A value that does not fit its field.
+        """
+        geographic = self.common.geographic
+        writers: dict[str, Callable[[], list[str]]] = {
+            "COMMON": lambda: common_records(self.common),
+            "CAMERAS": lambda: camera_records(self.cameras),
+            "IMAGES": lambda: image_records(self.images),
+            "FRAMES": lambda: frame_records(self.frames, geographic),
+            "GROUND": lambda: ground_records(self.ground, geographic),
+        }
+        return {name: written(name, writer) for name, writer in writers.items()}
