@@ -17,6 +17,8 @@ __all__ = ["report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
+# With less redundancy a blunder hides in the unknowns; the test value repeats that of another image coordinate.
+_TESTABLE = 0.01
 _ARCSEC = 180 * 3600 / math.pi
 
 
@@ -127,7 +129,8 @@ def _iterations(result: AdjustedBlock) -> list[str]:
 
 
 def _suspects(result: AdjustedBlock) -> list[str]:
-    size = np.nan_to_num(np.abs(result.standardized))
+    testable = result.redundancy > _TESTABLE
+    size = np.where(testable, np.nan_to_num(np.abs(result.standardized)), 0.0)
     images, axes = np.nonzero(size > _BLUNDER)
     if not images.size:
         return ["none"]
