@@ -179,7 +179,7 @@ class Block:
         axes = RECTANGULAR_COLUMNS if spheroid is None else GEOGRAPHIC_COLUMNS
         photo_ids = [str(name) for name in _column(photos, "photos", "photo")]
         image_point_names = [str(name) for name in _column(images, "images", "point")]
-        control_ids = [str(name) for name in _column(points, "points", "point")] if points is not None else []
+        control_ids = _names("points", _column(points, "points", "point")) if points is not None else []
         point_ids = list(dict.fromkeys([*control_ids, *image_point_names]))
 
         positions = np.full((len(point_ids), 3), np.nan)
@@ -197,10 +197,7 @@ class Block:
             principal_distances=_columns(photos, "photos", ["principal_distance_mm"], principal_distance)[
                 :, 0
             ],
-            point_ids=_names(
-                "point column of points",
-                point_ids if len(set(control_ids)) == len(control_ids) else control_ids,
-            ),
+            point_ids=point_ids,
             point_positions=positions,
             image_photos=_lookup("photo", photo_ids, _column(images, "images", "photo")),
             image_points=_lookup("point", point_ids, image_point_names),
@@ -258,11 +255,10 @@ def _index(name: str, value: ArrayLike, length: int, count: int) -> Indices:
 
 
 def _column(table: Mapping[str, Any], table_name: str, name: str) -> Sequence[Any]:
-    try:
-        column = table[name]
-    except KeyError:
-        raise InputError(f"{table_name} has no column {name}") from None
-    return list(column)
+    if name not in table:
+        raise InputError(f"{table_name} has no column {name}")
+    column: Sequence[Any] = table[name]
+    return column
 
 
 def _columns(
@@ -279,8 +275,7 @@ def _columns(
         except (TypeError, ValueError) as error:
             raise InputError(f"{table_name}, column {name}: {error}") from None
         columns.append(np.radians(column) if name.endswith("_deg") else column)
-    first = next(iter(table)) if not hasattr(table, "columns") else table.columns[0]
-    rows = len(_column(table, table_name, first))
+    rows = len(_column(table, table_name, "photo" if table_name == "photos" else "point"))
     return np.stack([np.broadcast_to(column, (rows,)) for column in columns], axis=1)
 
 

@@ -17,7 +17,7 @@ __all__ = ["report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
-# With less redundancy a blunder hides in the unknowns; the test value repeats that of another image coordinate.
+# With less redundancy a blunder hides in the unknowns; the test value repeats that of another coordinate.
 _TESTABLE = 0.01
 _ARCSEC = 180 * 3600 / math.pi
 
