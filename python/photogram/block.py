@@ -270,8 +270,9 @@ def _columns(
         if name not in table and default is not None:
             columns.append(np.asarray(default, dtype=np.float64))
             continue
+        values = _column(table, table_name, name)
         try:
-            column = np.asarray(_column(table, table_name, name), dtype=np.float64)
+            column = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise InputError(f"{table_name}, column {name}: {error}") from None
         columns.append(np.radians(column) if name.endswith("_deg") else column)
