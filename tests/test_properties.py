@@ -42,7 +42,7 @@ random_blocks = st.fixed_dictionaries(
 )
 # Derandomized: what a test run says of a commit does not depend on chance.
 some_blocks = settings(
-    max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 
 
@@ -109,7 +109,7 @@ def priors(block: Block, result: Result) -> tuple[Floats, Floats]:
 def test_redundancy_numbers_sum_to_the_degrees_of_freedom(arguments):
     block = block_of(arguments)
     result = adjust(block)
-    assert result.converged
+    assert result.converged, result.iterations
     assert result.used_points.all()
     sd, _ = priors(block, result)
     observations = block.image_xy.size + int((np.isfinite(sd) & (sd > 0)).sum())
@@ -150,7 +150,7 @@ def test_the_solution_satisfies_its_normal_equations_and_the_inverse_is_theirs(a
         deviations = np.sqrt(np.diag(expected))
         # As correlations: the entries have different units. The differences leave six digits.
         assert (np.abs(found - expected) <= 1e-5 * np.outer(deviations, deviations)).all()
-        np.testing.assert_array_equal(found, found.T)
+        assert (np.abs(found - found.T) <= 1e-13 * np.outer(deviations, deviations)).all()
         np.testing.assert_array_equal(found[deviations == 0], 0.0)
 
     adjusted = np.einsum("ij,jk,ik->i", weighted, inverse[np.ix_(free, free)], weighted)
@@ -333,9 +333,9 @@ def test_fixed_unknowns_stay_and_have_no_covariance(block):
     result = with_weights(block, 0.0)
     assert result.converged
     given = result.block
-    np.testing.assert_allclose(result.photo_positions[2], given.photo_positions[2], rtol=1e-15, atol=0)
+    np.testing.assert_array_equal(result.photo_positions[2], given.photo_positions[2])
     np.testing.assert_array_equal(result.photo_attitudes[5], given.photo_attitudes[5])
-    np.testing.assert_allclose(result.point_positions[7], given.point_positions[7], rtol=1e-15, atol=0)
+    np.testing.assert_array_equal(result.point_positions[7], given.point_positions[7])
     for cofactors in (result.photo_cofactors[2, :3], result.photo_cofactors[5, 3:], result.point_cofactors[7]):
         np.testing.assert_array_equal(cofactors, 0.0)
     assert (result.photo_cofactors[2].diagonal()[3:] > 0).all()
@@ -356,7 +356,12 @@ def test_weights_lead_from_free_to_fixed(block):
         for name in ("photo_positions", "point_positions"):
             np.testing.assert_allclose(getattr(near, name), getattr(limit, name), rtol=0, atol=2e-5)
         np.testing.assert_allclose(near.photo_attitudes, limit.photo_attitudes, rtol=0, atol=1e-8)
-        np.testing.assert_allclose(near.photo_sd[[0, 1, 3]], limit.photo_sd[[0, 1, 3]], rtol=1e-4)
+        for cofactors, expected in ((near.photo_cofactors, limit.photo_cofactors),
+                                    (near.point_cofactors, limit.point_cofactors)):  # fmt: skip
+            deviations, limits = (
+                np.sqrt(np.diagonal(each, axis1=1, axis2=2)) for each in (cofactors, expected)
+            )
+            np.testing.assert_allclose(deviations, limits, rtol=1e-4, atol=2e-6)
         np.testing.assert_allclose(near.redundancy, limit.redundancy, rtol=0, atol=1e-5)
     between = with_weights(block, 0.2)
     for row, name in ((2, "photo_sd"), (7, "point_sd")):
@@ -414,7 +419,8 @@ def test_a_shift_of_the_origin_changes_nothing(seed, shift):
     np.testing.assert_allclose(there.point_sd, here.point_sd, rtol=1e-8)
 
 
-@pytest.mark.parametrize("turn", [1, 90, 180])
+# The last one puts the centre of the block on the antimeridian.
+@pytest.mark.parametrize("turn", [1.0, 90.0, 180.0 - STRASBOURG_DEG[0]])
 def test_turning_the_earth_changes_nothing(turn):
     arguments: dict[str, Any] = {"strips": 2, "photos_per_strip": 3, "points_per_photo": 15, "seed": 6}
     block = simulate(**arguments, **GEOGRAPHIC).block
@@ -428,8 +434,10 @@ def test_turning_the_earth_changes_nothing(turn):
     # Geocentric coordinates have a spacing of 1e-9 m, which differs from place to place.
     metres = np.array([6.4e6, 6.4e6, 1.0])
     for name in ("photo_positions", "point_positions"):
-        moved = (getattr(there, name) - eastward - getattr(here, name)) * metres
-        assert np.abs(moved).max() < 1e-6, name
+        moved = getattr(there, name) - eastward - getattr(here, name)
+        moved[:, 0] = np.remainder(moved[:, 0] + math.pi, math.tau) - math.pi
+        assert np.abs(moved * metres).max() < 1e-6, name
+    np.testing.assert_allclose(there.point_differences * metres, here.point_differences * metres, atol=1e-6)
     np.testing.assert_allclose(there.photo_attitudes, here.photo_attitudes, rtol=0, atol=1e-10)
     np.testing.assert_allclose(there.point_sd, here.point_sd, rtol=1e-6)
 
