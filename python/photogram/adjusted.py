@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
@@ -227,8 +228,14 @@ class AdjustedBlock:
 
     @property
     def point_differences(self) -> Floats:
-        """(n, 3) adjusted minus supplied coordinates; NaN where none were supplied."""
-        return self.point_positions - self.block.point_positions
+        """(n, 3) adjusted minus supplied coordinates; NaN where none were supplied.
+
+        Longitudes differ by half a turn at the most, on whichever side of the antimeridian they are counted.
+        """
+        differences = self.point_positions - self.block.point_positions
+        if self.block.geographic:
+            differences[:, 0] -= math.tau * np.round(differences[:, 0] / math.tau)
+        return differences
 
 
 def _standard_deviations(covariances: Floats) -> Floats:

@@ -149,17 +149,17 @@ def _suspects(result: AdjustedBlock) -> list[str]:
 
 def _check_points(result: AdjustedBlock) -> list[str]:
     check = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
-    return _difference_table(result, check, result.block.point_positions)
+    return _difference_table(result, check, result.point_differences)
 
 
 def _control(result: AdjustedBlock) -> list[str]:
     control = np.flatnonzero(result.used_points & (result.point_kinds == "control"))
-    held = np.where(np.isfinite(result.block.point_sd), result.block.point_positions, np.nan)
+    held = np.where(np.isfinite(result.block.point_sd), result.point_differences, np.nan)
     return _difference_table(result, control, held)
 
 
 def _difference_table(
-    result: AdjustedBlock, points: Sequence[int] | np.ndarray, supplied: Floats
+    result: AdjustedBlock, points: Sequence[int] | np.ndarray, differences: Floats
 ) -> list[str]:
     if len(points) == 0:
         return []
@@ -168,8 +168,7 @@ def _difference_table(
     lines = [
         f"{'point':<10}" + "".join(f"{f'{axis} {unit}':>16}" for axis, unit in zip(axes, units, strict=True))
     ]
-    differences = (result.point_positions - supplied)[points] * _outward(result)
-    for point, values in zip(points, differences, strict=True):
+    for point, values in zip(points, differences[points] * _outward(result), strict=True):
         lines.append(f"{result.block.point_ids[point]:<10}" + "".join(_number(value, 5) for value in values))
     return lines
 

@@ -1,5 +1,7 @@
 //! The block normal equations against dense algebra.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 use std::ops::{ControlFlow, Range};
 
 use faer::Mat;

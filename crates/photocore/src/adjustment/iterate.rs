@@ -216,6 +216,10 @@ struct Run<'a, 'w, M: Model> {
 
 /// A step is accepted when the sum of squares does not rise by more than its own rounding error.
 const ROUNDING: f64 = 1e-12;
+/// A Gauss-Newton step that changes no unknown by more than this multiple of its standard deviation is accepted as it is:
+/// it lowers the sum of squares by less than the square of this, which may drown in the rounding errors of the computed
+/// observations (geocentric coordinates are good to a nanometre only).
+const NEGLIGIBLE: f64 = 1e-3;
 /// First damping after a step that failed; it falls by ten after a success, and below [`LEAST_DAMPING`] to zero.
 const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-5;
@@ -244,8 +248,10 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
             let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
             let next = self.form(trial, relaxed)?;
-            // A sum of squares that is not a number is a failure too.
-            if next.sum_of_squares <= best * (1.0 + ROUNDING) {
+            let negligible = damping == 0.0 && solved.change <= NEGLIGIBLE;
+            let highest = if negligible { f64::MAX } else { best * (1.0 + ROUNDING) };
+            // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
+            if next.sum_of_squares <= highest && next.normals.deficient_locals.is_empty() {
                 best = next.sum_of_squares;
                 let iteration =
                     Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };

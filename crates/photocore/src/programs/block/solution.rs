@@ -109,7 +109,7 @@ impl Solution {
         let prior_redundancy = adjustment.prior_redundancy.take();
         let redundancy_of = |unknown: usize| prior_redundancy.as_ref().map_or(f64::NAN, |all| all[unknown]);
         let photos = photo_part.as_chunks::<6>().0.iter().enumerate().map(|(photo, values)| AdjustedPhoto {
-            position: std::array::from_fn(|k| values[k] + origin[k]),
+            position: absolute(block.photos[photo].position, block.photos[photo].position_sd, values, origin),
             attitude: std::array::from_fn(|k| values[3 + k]),
             cofactors: square(cofactors.as_ref().map(|all| &all.kept[36 * photo..])),
             redundancy: std::array::from_fn(|k| redundancy_of(3 * points.len() + 6 * photo + k)),
@@ -118,7 +118,7 @@ impl Solution {
         let layout = problem.layout();
         for (local, (&point, values)) in points.iter().zip(point_part.as_chunks::<3>().0).enumerate() {
             adjusted_points[point] = Some(AdjustedPoint {
-                coordinates: std::array::from_fn(|k| values[k] + origin[k]),
+                coordinates: absolute(block.points[point].coordinates, block.points[point].sd, values, origin),
                 cofactors: square(cofactors.as_ref().map(|all| &all.local[9 * local..])),
                 redundancy: std::array::from_fn(|k| redundancy_of(3 * local + k)),
                 rays: layout.groups_of(local).len(),
@@ -135,6 +135,11 @@ impl Solution {
             adjustment,
         }
     }
+}
+
+/// Coordinates counted from the origin of the object space again; fixed ones as they were given, to the last bit.
+fn absolute(given: Vector3, sd: Vector3, values: &[f64], origin: Vector3) -> Vector3 {
+    std::array::from_fn(|k| if sd[k] == 0.0 { given[k] } else { values[k] + origin[k] })
 }
 
 fn square<const N: usize>(values: Option<&[f64]>) -> [[f64; N]; N] {
