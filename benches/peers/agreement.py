@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram.result import Result
 
-# Largest differences allowed. gtsam stops when its error falls by less than 1e-5 of itself: what is then left to
-# the minimum is a small fraction of a standard deviation.
+# Largest differences allowed. gtsam stops when its error falls by less than 1e-5 of itself: from there to the
+# minimum it is a small fraction of a standard deviation.
 STANDARD_DEVIATIONS = 1e-3
 SUM_OF_SQUARES = 1e-8
 

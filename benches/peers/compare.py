@@ -173,8 +173,8 @@ def _name(side: Ours) -> str:
 def _footnotes(arguments: argparse.Namespace) -> str:
     return (
         f"{arguments.repetitions} repetitions in turn, from equal initial photographs and points. Seconds of "
-        "photogram are `adjust()` as a whole, with the intersection of the initial points; those of gtsam are "
-        "ordering and `optimize()`.\n\n"
+        "photogram are `adjust()` as a whole, with the intersection of the initial points; those of gtsam "
+        "are ordering and `optimize()`.\n\n"
         f"{_processor()}, {os.cpu_count()} processors; Python {platform.python_version()}, "
         f"photogram {version('photogram')}, gtsam {version('gtsam')}."
     )
