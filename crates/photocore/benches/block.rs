@@ -1,0 +1,222 @@
+//! A block of parallel strips adjusted, as a whole and phase by phase.
+
+// A benchmark that cannot run has nobody to report to.
+#![allow(clippy::expect_used, missing_docs)]
+
+use std::hint::black_box;
+use std::ops::ControlFlow;
+
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use photocore::adjustment;
+use photocore::geometry::{self, ObjectSpace, RotationSense};
+use photocore::normals::{Equations, Factor, GroupRows, Layout, Normals, Ordering, Prior, System};
+use photocore::programs::block::{Block, Image, Options, Photo, Point, UnitVariance};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+const STRIPS: usize = 20;
+const PHOTOS_PER_STRIP: usize = 50;
+
+/// Wide-angle photographs from 4,500 m, 60 % forward and 30 % side overlap, a hundred points on each.
+const PRINCIPAL_DISTANCE: f64 = -152.74;
+const FLYING_HEIGHT: f64 = 4500.0;
+const HALF_FRAME: f64 = 115.0;
+const BASE: f64 = 2710.0;
+const SEPARATION: f64 = 4743.0;
+/// Between ground points: four columns to a base, seven rows to a separation.
+const SPACING: f64 = 677.5;
+const IMAGE_SD: f64 = 0.01;
+/// One point in so many is control.
+const CONTROL: usize = 50;
+const CONTROL_SD: f64 = 0.05;
+
+/// A flawless block, but for initial stations that lie off by some ten metres and some milliradians.
+fn strips(strips: usize, photos_per_strip: usize) -> Block {
+    let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
+    let true_photos: Vec<([f64; 3], [f64; 3])> = (0..strips * photos_per_strip)
+        .map(|photo| {
+            let (strip, number) = (photo / photos_per_strip, photo % photos_per_strip);
+            let wave = |k: usize| (photo as f64 * (0.7 + 0.1 * k as f64)).sin();
+            let position = [number as f64 * BASE, strip as f64 * SEPARATION, FLYING_HEIGHT + 20.0 * wave(0)];
+            (position, [0.01 * wave(1), 0.01 * wave(2), 0.03 * wave(3)])
+        })
+        .collect();
+    let mut block = Block { space, sense, photos: vec![], points: vec![], images: vec![] };
+    for (photo, (position, attitude)) in true_photos.iter().enumerate() {
+        let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();
+        block.photos.push(Photo {
+            position: std::array::from_fn(|k| position[k] + 15.0 * off(k)),
+            attitude: std::array::from_fn(|k| attitude[k] + 0.005 * off(3 + k)),
+            position_sd: [f64::INFINITY; 3],
+            attitude_sd: [f64::INFINITY; 3],
+            principal_distance: PRINCIPAL_DISTANCE,
+        });
+    }
+    let cameras: Vec<geometry::Photo> = true_photos
+        .iter()
+        .map(|&(position, attitude)| {
+            geometry::Photo::new(space, sense, position, attitude, PRINCIPAL_DISTANCE)
+        })
+        .collect();
+    let columns = (photos_per_strip as f64 * BASE / SPACING) as usize;
+    let rows = (strips as f64 * SEPARATION / SPACING) as usize;
+    for (column, row) in (0..columns).flat_map(|column| (0..rows).map(move |row| (column, row))) {
+        let height = 100.0 * (column as f64 * 0.3).sin() * (row as f64 * 0.2).cos();
+        let coordinates = [column as f64 * SPACING, row as f64 * SPACING, height];
+        let point = block.points.len();
+        let at = geometry::Point::new(space, coordinates);
+        let images: Vec<Image> = cameras
+            .iter()
+            .enumerate()
+            .map(|(photo, camera)| Image { photo, point, xy: camera.project(&at), sd: [IMAGE_SD; 2] })
+            .filter(|image| image.xy.iter().all(|value| value.abs() < HALF_FRAME))
+            .collect();
+        if images.len() >= 2 {
+            let sd = if point.is_multiple_of(CONTROL) { CONTROL_SD } else { f64::INFINITY };
+            block.points.push(Point { coordinates, sd: [sd; 3] });
+            block.images.extend(images);
+        }
+    }
+    block
+}
+
+/// The observation equations of a block, ready-made, so that the phases of the normal equations are timed without the model.
+struct Linear {
+    projections: Vec<geometry::Projection>,
+}
+
+impl Linear {
+    /// At the positions and attitudes that the block starts from and the true positions of its points.
+    fn new(block: &Block) -> Self {
+        let photos: Vec<geometry::Photo> = block
+            .photos
+            .iter()
+            .map(|p| {
+                geometry::Photo::new(block.space, block.sense, p.position, p.attitude, p.principal_distance)
+            })
+            .collect();
+        let linearize = |image: &Image| {
+            let point = geometry::Point::new(block.space, block.points[image.point].coordinates);
+            photos[image.photo].linearize(&point)
+        };
+        Self { projections: block.images.iter().map(linearize).collect() }
+    }
+}
+
+impl Equations for Linear {
+    fn write(&self, _: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let projection = &self.projections[group];
+        for row in 0..2 {
+            rows.constant[row] = projection.xy[row] / IMAGE_SD;
+            for k in 0..3 {
+                rows.local[3 * row + k] = projection.point[row][k] / IMAGE_SD;
+            }
+            for k in 0..6 {
+                rows.kept[6 * row + k] = projection.photo[row][k] / IMAGE_SD;
+            }
+        }
+    }
+}
+
+/// The normal equations of a block.
+struct Phases {
+    pool: ThreadPool,
+    system: System,
+    equations: Linear,
+    prior: Prior,
+}
+
+impl Phases {
+    fn new(block: &Block) -> Self {
+        let mut start = vec![0];
+        for (group, image) in block.images.iter().enumerate() {
+            // The images stand point by point.
+            start.resize(image.point + 1, group);
+        }
+        start.push(block.images.len());
+        let photos = block.images.iter().map(|image| image.photo as u32).collect();
+        let layout = Layout::new(2, 3, &vec![6; block.photos.len()], start, photos).expect("a layout");
+        let mut weight = vec![0.0; layout.unknowns()];
+        for (point, weight) in block.points.iter().zip(weight.as_chunks_mut::<3>().0) {
+            *weight = point.sd.map(|sd| (sd * sd).recip());
+        }
+        let prior = Prior { right: vec![0.0; weight.len()], weight };
+        let equations = Linear::new(block);
+        Self { pool: pool(), system: System::new(layout, Ordering::Auto), equations, prior }
+    }
+
+    fn form(&self) -> Normals {
+        done(self.system.form(&self.pool, &self.equations, &self.prior, 0.0, &mut go))
+    }
+
+    fn factor(&self) -> Factor {
+        self.form().factor(&self.pool).expect("a determined block")
+    }
+}
+
+fn pool() -> ThreadPool {
+    ThreadPoolBuilder::new().build().expect("threads")
+}
+
+fn go(_: usize) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn done<T>(flow: ControlFlow<(), T>) -> T {
+    match flow {
+        ControlFlow::Continue(value) => value,
+        ControlFlow::Break(()) => unreachable!("nothing interrupts"),
+    }
+}
+
+/// The whole adjustment, with all cofactors and redundancy numbers.
+fn adjust(criterion: &mut Criterion) {
+    let block = strips(STRIPS, PHOTOS_PER_STRIP);
+    let pool = pool();
+    let options = Options {
+        adjustment: adjustment::Options {
+            criterion: adjustment::Criterion::Fraction(1e-5),
+            max_iterations: 50,
+            covariance: true,
+        },
+        ordering: Ordering::Auto,
+        unit_variance: UnitVariance::Constrained,
+    };
+    let adjust =
+        || block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).expect("a determined block");
+    criterion.bench_function("block/adjust", |bencher| bencher.iter(|| black_box(adjust())));
+}
+
+/// The phases of the normal equations, each once.
+fn phases(criterion: &mut Criterion) {
+    let phases = Phases::new(&strips(STRIPS, PHOTOS_PER_STRIP));
+    let Phases { pool, system, equations, prior } = &phases;
+    let mut group = criterion.benchmark_group("normals");
+    group.bench_function("order", |bencher| {
+        let layout = || system.layout().clone();
+        bencher.iter_batched(layout, |layout| System::new(layout, Ordering::Auto), BatchSize::PerIteration);
+    });
+    group.bench_function("form", |bencher| bencher.iter(|| phases.form()));
+    group.bench_function("factor", |bencher| {
+        bencher.iter_batched(|| phases.form(), |normals| normals.factor(pool), BatchSize::PerIteration);
+    });
+    let factor = phases.factor();
+    group.bench_function("solve", |bencher| {
+        bencher.iter(|| done(system.solve(pool, &factor, equations, prior, 0.0, &mut go)));
+    });
+    group.bench_function("invert", |bencher| {
+        let invert = |factor: Factor| factor.into_selected_inverse(pool);
+        bencher.iter_batched(|| phases.factor(), invert, BatchSize::PerIteration);
+    });
+    let inverse = phases.factor().into_selected_inverse(pool);
+    group.bench_function("cofactors", |bencher| {
+        bencher.iter(|| done(system.cofactors(pool, &inverse, equations, prior, &mut go)));
+    });
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10);
+    targets = adjust, phases
+}
+criterion_main!(benches);
