@@ -225,9 +225,8 @@ def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankErr
             if len(each) == len(block.photo_ids) > 1
             else f"photos {_listed([block.photo_ids[photo] for photo in each])}"
         )
-        lines.append(
-            f"  {count} moving {moved}, which hold the points {_listed([block.point_ids[p] for p in on])}"
-        )
+        held = f"hold the points {_listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
+        lines.append(f"  {count} moving {moved}, which {held}")
     if not np.isfinite(block.point_sd).any():
         lines.append(
             "  there is no control; weights for the positions and attitudes of photos would give a datum"

@@ -281,6 +281,6 @@ fn layouts_that_contradict_themselves_are_refused() {
     assert!(Layout::new(2, 3, &[6], vec![1, 1], vec![0]).is_err());
     assert!(Layout::new(2, 3, &[6], vec![0, 1], vec![1]).is_err());
     let layout = Layout::new(2, 3, &[6], vec![0, 1], vec![0]).unwrap();
-    assert!(layout.clone().with_border(3, vec![1..4]).is_err());
+    assert!(layout.clone().with_border(3, std::iter::once(1..4).collect()).is_err());
     assert!(layout.with_border(3, vec![]).is_err());
 }
