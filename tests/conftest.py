@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from photogram import Block, simulate
@@ -30,10 +30,5 @@ def small_block() -> Block:
 
 @pytest.fixture
 def bad_block(small_block: Block) -> dict[str, object]:
-    """The arrays of the small block as keywords of Block, to be spoilt by a test."""
-    names = Block.__dataclass_fields__
-    values = {name: getattr(small_block, name) for name in names}
-    return {
-        name: value.copy() if isinstance(value, np.ndarray) else value[:] if isinstance(value, list) else value
-        for name, value in values.items()
-    }
+    """Return the arrays of the small block as keywords of Block, to be spoilt by a test."""
+    return copy.deepcopy({name: getattr(small_block, name) for name in Block.__dataclass_fields__})

@@ -46,35 +46,71 @@ def replace(name: str, change: Any):
 
 
 SPOILT = {
-    "photo positions too few": (replace("photo_positions", lambda a: a[1:]), r"photo_positions .*\(5, 3\), not \(6, 3\)"),
+    "photo positions too few": (
+        replace("photo_positions", lambda a: a[1:]),
+        r"photo_positions .*\(5, 3\), not \(6, 3\)",
+    ),
     "photo positions flat": (replace("photo_positions", np.ravel), r"photo_positions has the shape \(18,\)"),
-    "attitudes with two angles": (replace("photo_attitudes", lambda a: a[:, :2]), r"photo_attitudes has the shape"),
-    "distances too many": (replace("principal_distances", lambda a: np.append(a, 1.0)), r"principal_distances .*\(7,\)"),
+    "attitudes with two angles": (
+        replace("photo_attitudes", lambda a: a[:, :2]),
+        r"photo_attitudes has the shape",
+    ),
+    "distances too many": (
+        replace("principal_distances", lambda a: np.append(a, 1.0)),
+        r"principal_distances .*\(7,\)",
+    ),
     "image coordinates too few": (replace("image_xy", lambda a: a[1:]), r"image_xy has the shape"),
     "image sd too few": (replace("image_sd", lambda a: a[1:]), r"image_sd has the shape"),
     "point sd too few": (replace("point_sd", lambda a: a[1:]), r"point_sd has the shape"),
-    "words for numbers": (replace("image_xy", lambda a: [["one", "two"]] * len(a)), "image_xy is not an array of numbers"),
-    "ragged": (replace("photo_positions", lambda a: [[1.0, 2.0], [3.0]]), "photo_positions is not an array of numbers"),
-    "photo at NaN": (set_at("photo_positions", (2, 1), math.nan), "photo_positions of 0103 is not a finite number"),
-    "angle infinite": (set_at("photo_attitudes", (0, 0), math.inf), "photo_attitudes of 0101 is not a finite number"),
-    "distance NaN": (set_at("principal_distances", 1, math.nan), "principal_distances of 0102 is not a finite"),
+    "words for numbers": (
+        replace("image_xy", lambda a: [["one", "two"]] * len(a)),
+        "image_xy is not an array of numbers",
+    ),
+    "ragged": (
+        replace("photo_positions", lambda a: [[1.0, 2.0], [3.0]]),
+        "photo_positions is not an array of numbers",
+    ),
+    "photo at NaN": (
+        set_at("photo_positions", (2, 1), math.nan),
+        "photo_positions of 0103 is not a finite number",
+    ),
+    "angle infinite": (
+        set_at("photo_attitudes", (0, 0), math.inf),
+        "photo_attitudes of 0101 is not a finite number",
+    ),
+    "distance NaN": (
+        set_at("principal_distances", 1, math.nan),
+        "principal_distances of 0102 is not a finite",
+    ),
     "distance zero": (set_at("principal_distances", 1, 0.0), "principal_distances of 0102 is zero"),
-    "image NaN": (set_at("image_xy", (3, 0), math.nan), r"image_xy of \w+ on photo 0101 is not a finite number"),
+    "image NaN": (
+        set_at("image_xy", (3, 0), math.nan),
+        r"image_xy of \w+ on photo 0101 is not a finite number",
+    ),
     "point infinite": (set_at("point_positions", (4, 2), math.inf), "point_positions of .* is infinite"),
-    "sd negative": (set_at("photo_position_sd", (1, 0), -1.0), "photo_position_sd of 0102 is not a standard deviation"),
+    "sd negative": (
+        set_at("photo_position_sd", (1, 0), -1.0),
+        "photo_position_sd of 0102 is not a standard deviation",
+    ),
     "sd NaN": (set_at("photo_attitude_sd", (1, 0), math.nan), "photo_attitude_sd of 0102 is not a standard"),
     "point sd negative": (set_at("point_sd", (0, 0), -0.1), "point_sd of .* is not a standard deviation"),
-    "image sd zero": (set_at("image_sd", (0, 1), 0.0), "image_sd of .* on photo 0101 is not a positive, finite"),
+    "image sd zero": (
+        set_at("image_sd", (0, 1), 0.0),
+        "image_sd of .* on photo 0101 is not a positive, finite",
+    ),
     "image sd infinite": (set_at("image_sd", (0, 1), math.inf), "image_sd of .* is not a positive, finite"),
     "photo index too large": (set_at("image_photos", 5, 6), r"image_photos\[5\] is 6, outside 0 to 5"),
     "photo index negative": (set_at("image_photos", 5, -1), r"image_photos\[5\] is -1, outside"),
-    "point index too large": (set_at("image_points", 0, 10**12), r"image_points\[0\] is 1000000000000, outside"),
+    "point index too large": (
+        set_at("image_points", 0, 10**12),
+        r"image_points\[0\] is 1000000000000, outside",
+    ),
     "indices with fractions": (replace("image_points", lambda a: a + 0.5), "image_points is not an array of"),
     "indices too few": (replace("image_points", lambda a: a[1:]), "image_points is not an array of"),
     "photo twice": (set_at("photo_ids", 3, "0101"), "photo_ids: '0101' stands there more than once"),
     "point twice": (replace("point_ids", lambda ids: [*ids[:-1], ids[0]]), "point_ids: .* more than once"),
     "names too few": (replace("photo_ids", lambda ids: ids[1:]), r"photo_positions has the shape"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", SPOILT)
@@ -110,10 +146,16 @@ def tables() -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("table", "column"),
     [
-        ("photos", "photo"), ("photos", "Y"), ("photos", "kappa_deg"), ("images", "photo"), ("images", "point"),
-        ("images", "y_mm"), ("points", "point"), ("points", "Z"),
+        ("photos", "photo"),
+        ("photos", "Y"),
+        ("photos", "kappa_deg"),
+        ("images", "photo"),
+        ("images", "point"),
+        ("images", "y_mm"),
+        ("points", "point"),
+        ("points", "Z"),
     ],
-)  # fmt: skip
+)
 def test_columns_that_are_missing(tables, table, column):
     Block.from_tables(**tables)
     for form in (dict, pd.DataFrame):
@@ -138,9 +180,13 @@ def test_tables_that_cannot_be(tables):
         from_tables(points={name: values * 2 for name, values in tables["points"].items()})
     with pytest.raises(InputError, match="photos, column Z"):
         from_tables(photos={**tables["photos"], "Z": ["high", "low"]})
+    with pytest.raises(InputError, match=r"photos, column Z has the shape \(1,\), not \(2,\)"):
+        from_tables(photos={**tables["photos"], "Z": [1000.0]})
+    with pytest.raises(InputError, match=r"images, column y_mm has the shape \(3,\), not \(2,\)"):
+        from_tables(images={**tables["images"], "y_mm": [0.0, 0.0, 0.0]})
     with pytest.raises(InputError, match="image_xy of 1 on photo B is not a finite number"):
         from_tables(images={**tables["images"], "y_mm": [0.0, math.nan]})
-    with pytest.raises(InputError, match="photos has no column longitude_deg"):
+    with pytest.raises(InputError, match="points has no column longitude_deg"):
         from_tables(spheroid=Spheroid.wgs84())
 
 
@@ -366,7 +412,7 @@ def test_absurd_values_do_not_panic(small_block):
 
 
 def test_what_progress_raises_stops_the_run(small_block):
-    class Enough(Exception):
+    class EnoughError(Exception):
         pass
 
     heard: list[Progress] = []
@@ -374,9 +420,9 @@ def test_what_progress_raises_stops_the_run(small_block):
     def stop(progress: Progress) -> None:
         heard.append(progress)
         if progress.iteration is not None and progress.iteration.number == 2:
-            raise Enough
+            raise EnoughError
 
-    with pytest.raises(Enough):
+    with pytest.raises(EnoughError):
         adjust(small_block, progress=stop)
     assert [p.iteration.number for p in heard if p.iteration] == [1, 2]
 

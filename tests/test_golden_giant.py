@@ -1,4 +1,4 @@
-"""Golden cases of the GIANT guide: single points in fixed photos, degrees of freedom, scaling of covariances."""
+"""Golden cases of the GIANT guide: points in fixed photos, degrees of freedom, scaling of covariances."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_geometry import GIANT, GOLDEN, station
 
 from photogram import Block, Result, Spheroid, adjust, simulate
 from photogram.geometry import project
+from test_geometry import GIANT, GOLDEN, station
 
 ARCSEC = 180 * 3600 / math.pi
 UNIT_VARIANCE = GOLDEN["sample_block"]["unit_variance"]
@@ -58,7 +58,7 @@ def test_pass_point_on_two_photos():
     assert abs(longitude - radians(printed["lon"])) * ARCSEC < tolerance["lon_arcsec"]
     assert abs(latitude - radians(printed["lat"])) * ARCSEC < tolerance["lat_arcsec"]
     assert abs(height - printed["elev_m"]) < tolerance["elev_m"]
-    # An independent program starts from the same printed stations: the difference it finds, to its last digit.
+    # What an independent program finds from the same printed stations, to its last digit.
     computed = case["computed_minus_printed"]
     assert (longitude - radians(printed["lon"])) * ARCSEC == pytest.approx(computed["lon_arcsec"], abs=1e-6)
     assert (latitude - radians(printed["lat"])) * ARCSEC == pytest.approx(computed["lat_arcsec"], abs=1e-6)
@@ -93,8 +93,8 @@ def test_vertical_control_on_three_photos():
     assert abs(height - case["printed"]["elev_m"]) < case["tolerance_m"]
     assert abs(longitude - radians(case["printed"]["lon"])) * ARCSEC < 0.0003
     assert abs(latitude - radians(case["printed"]["lat"])) * ARCSEC < 0.0003
-    # Held much better than the rays can tell: the cofactor is all but the square of its standard deviation; the
-    # listing prints 0.921e-4 for that times the unit variance 0.921 (both rounded to three digits).
+    # Held much better than the rays can tell: the cofactor is all but the square of its standard deviation.
+    # The listing prints 0.921e-4 for that times the unit variance 0.921, both rounded to three digits.
     assert result.point_cofactors[0, 2, 2] * UNIT_VARIANCE == pytest.approx(0.921e-4, abs=0.001e-4)
 
 
@@ -136,7 +136,9 @@ def test_degrees_of_freedom_of_table_e1():
     assert np.bincount(block.image_photos).tolist() == table["images_per_photo"]
     assert len(block.point_ids) == table["points"]
     assert np.isfinite(block.point_sd).sum() == table["control_components"]
-    free, constrained, unity = (adjust(block, unit_variance=mode) for mode in ("free", "constrained", "unity"))
+    free, constrained, unity = (
+        adjust(block, unit_variance=mode) for mode in ("free", "constrained", "unity")
+    )
 
     assert free.degrees_of_freedom == table["case1_free"]["dof"] == 5
     sums = free.sums_of_squares

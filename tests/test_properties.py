@@ -1,4 +1,4 @@
-"""What holds for every block: counts, covariances, their Monte-Carlo coverage, limits of weights, invariance."""
+"""What holds for every block: counts, covariances and their coverage, limits of weights, invariance."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ random_blocks = st.fixed_dictionaries(
         "photo_to_ground": st.booleans(),
         "strips": st.integers(1, 3),
         "photos_per_strip": st.integers(2, 5),
-        "points_per_photo": st.integers(8, 25),
+        "points_per_photo": st.integers(10, 25),
         "control": st.sampled_from(["perimeter", "corners"]),
         "control_sd": st.sampled_from([0.0, 0.02, 0.5]),
         "position_sd": weights,
@@ -42,7 +42,7 @@ random_blocks = st.fixed_dictionaries(
 )
 # Derandomized: what a test run says of a commit does not depend on chance.
 some_blocks = settings(
-    max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 
 
@@ -56,7 +56,7 @@ def block_of(arguments: dict[str, Any]) -> Block:
 
 
 def jacobian(block: Block, result: Result) -> Floats:
-    """Partials of all image coordinates with respect to photos (6 each), then points (3 each), (2 m, u).
+    """Return partials of all image coordinates by photos (6 each), then points (3 each), (2 m, u).
 
     Fourth-order differences of `photogram.geometry.project`, which knows nothing of the engine's partials.
     """
@@ -92,7 +92,7 @@ def jacobian(block: Block, result: Result) -> Floats:
 
 
 def priors(block: Block, result: Result) -> tuple[Floats, Floats]:
-    """Standard deviations of all unknowns and observed minus adjusted (0 where not held), as in the Jacobian."""
+    """Return standard deviations of all unknowns, and observed minus adjusted (0 where not held)."""
     sd = np.concatenate(
         [np.hstack([block.photo_position_sd, block.photo_attitude_sd]).ravel(), block.point_sd.ravel()]
     )
@@ -108,8 +108,8 @@ def priors(block: Block, result: Result) -> tuple[Floats, Floats]:
 @some_blocks
 def test_redundancy_numbers_sum_to_the_degrees_of_freedom(arguments):
     block = block_of(arguments)
-    result = adjust(block)
-    assert result.converged, result.iterations
+    result = adjust(block, max_iterations=200)
+    assert result.converged
     assert result.used_points.all()
     sd, _ = priors(block, result)
     observations = block.image_xy.size + int((np.isfinite(sd) & (sd > 0)).sum())
@@ -126,7 +126,9 @@ def test_redundancy_numbers_sum_to_the_degrees_of_freedom(arguments):
 @some_blocks
 def test_the_solution_satisfies_its_normal_equations_and_the_inverse_is_theirs(arguments):
     block = block_of(arguments)
-    result = adjust(block, tolerance=1e-8)
+    # The weakest of these blocks bend so much within their standard deviations that the steps shrink by a fifth.
+    result = adjust(block, tolerance=1e-7, max_iterations=200)
+    assert result.converged
     sd, difference = priors(block, result)
     free = sd > 0
     weighted = jacobian(block, result)[:, free] / block.image_sd.reshape(-1, 1)
@@ -150,16 +152,15 @@ def test_the_solution_satisfies_its_normal_equations_and_the_inverse_is_theirs(a
         deviations = np.sqrt(np.diag(expected))
         # As correlations: the entries have different units. The differences leave six digits.
         assert (np.abs(found - expected) <= 1e-5 * np.outer(deviations, deviations)).all()
-        assert (np.abs(found - found.T) <= 1e-13 * np.outer(deviations, deviations)).all()
+        assert (np.abs(found - found.T) <= 1e-11 * np.outer(deviations, deviations)).all()
         np.testing.assert_array_equal(found[deviations == 0], 0.0)
 
     adjusted = np.einsum("ij,jk,ik->i", weighted, inverse[np.ix_(free, free)], weighted)
     np.testing.assert_allclose(result.redundancy.ravel(), 1 - adjusted, rtol=0, atol=1e-5)
-    np.testing.assert_allclose(
-        result.standardized,
-        result.residuals / (block.image_sd * np.sqrt(result.redundancy)),
-        rtol=1e-12,
-    )
+    tested = result.redundancy > 1e-10
+    expected = (result.residuals / block.image_sd)[tested] / np.sqrt(result.redundancy[tested])
+    np.testing.assert_allclose(result.standardized[tested], expected, rtol=1e-12)
+    assert np.isnan(result.standardized[~tested]).all()
 
 
 # Monte Carlo: one small block, measured 500 times
@@ -304,7 +305,7 @@ def block() -> Block:
 
 
 def with_weights(block: Block, sd: float) -> Result:
-    """Give one photo's position, another's attitude, and a pass point near the truth this standard deviation."""
+    """Give the position of a photo, the attitude of another and a pass point this standard deviation."""
     truth = adjust(block)
     positions = block.photo_positions.copy()
     positions[2] = truth.photo_positions[2] + [0.4, -0.3, 0.2]
@@ -336,7 +337,11 @@ def test_fixed_unknowns_stay_and_have_no_covariance(block):
     np.testing.assert_array_equal(result.photo_positions[2], given.photo_positions[2])
     np.testing.assert_array_equal(result.photo_attitudes[5], given.photo_attitudes[5])
     np.testing.assert_array_equal(result.point_positions[7], given.point_positions[7])
-    for cofactors in (result.photo_cofactors[2, :3], result.photo_cofactors[5, 3:], result.point_cofactors[7]):
+    for cofactors in (
+        result.photo_cofactors[2, :3],
+        result.photo_cofactors[5, 3:],
+        result.point_cofactors[7],
+    ):
         np.testing.assert_array_equal(cofactors, 0.0)
     assert (result.photo_cofactors[2].diagonal()[3:] > 0).all()
     for redundancy in (

@@ -142,7 +142,10 @@ def test_orientations_of_dbat(dbat_result, dbat):
             # Three digits are printed.
             deviation = photo[f"sd_{column}"]
             half_a_unit = 0.5 * 10.0 ** (np.floor(np.log10(deviation)) - 2)
-            assert table.loc[name, f"sd_{column}"] == pytest.approx(deviation, abs=half_a_unit), (name, column)
+            assert table.loc[name, f"sd_{column}"] == pytest.approx(deviation, abs=half_a_unit), (
+                name,
+                column,
+            )
 
 
 # The iteration of the 1987 program
@@ -230,7 +233,8 @@ def test_bits_do_not_depend_on_the_number_of_threads(block, threads):
 def test_the_order_of_photos_points_and_images_changes_nothing(block, result):
     random = np.random.default_rng(11)
     photos, points, images = (
-        random.permutation(count) for count in (len(block.photo_ids), len(block.point_ids), len(block.image_xy))
+        random.permutation(count)
+        for count in (len(block.photo_ids), len(block.point_ids), len(block.image_xy))
     )
     shuffled = adjust(
         block.replace(

@@ -265,19 +265,21 @@ def _columns(
     table: Mapping[str, Any], table_name: str, names: Sequence[str], default: float | None = None
 ) -> Floats:
     """Stack columns as (rows, len(names)), `_deg` ones in radians; absent ones get the default."""
+    rows = len(_column(table, table_name, "photo" if table_name == "photos" else "point"))
     columns = []
     for name in names:
         if name not in table and default is not None:
-            columns.append(np.asarray(default, dtype=np.float64))
+            columns.append(np.full(rows, default))
             continue
         values = _column(table, table_name, name)
         try:
             column = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise InputError(f"{table_name}, column {name}: {error}") from None
+        if column.shape != (rows,):
+            raise InputError(f"{table_name}, column {name} has the shape {column.shape}, not ({rows},)")
         columns.append(np.radians(column) if name.endswith("_deg") else column)
-    rows = len(_column(table, table_name, "photo" if table_name == "photos" else "point"))
-    return np.stack([np.broadcast_to(column, (rows,)) for column in columns], axis=1)
+    return np.stack(columns, axis=1)
 
 
 def _lookup(kind: str, ids: Sequence[str], names: Sequence[Any]) -> Indices:

@@ -112,7 +112,8 @@ fn hold(problem: &mut Problem<Frames>, unknowns: &[usize], sd: f64) {
     }
 }
 
-const STRICT: Options = Options { criterion: Criterion::Fraction(1e-8), max_iterations: 50, covariance: true };
+const STRICT: Options =
+    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 50, covariance: true };
 
 fn run(problem: &Problem<Frames>, options: &Options) -> Result<Adjustment, AdjustError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();

@@ -118,7 +118,12 @@ impl Solution {
         let layout = problem.layout();
         for (local, (&point, values)) in points.iter().zip(point_part.as_chunks::<3>().0).enumerate() {
             adjusted_points[point] = Some(AdjustedPoint {
-                coordinates: absolute(block.points[point].coordinates, block.points[point].sd, values, origin),
+                coordinates: absolute(
+                    block.points[point].coordinates,
+                    block.points[point].sd,
+                    values,
+                    origin,
+                ),
                 cofactors: square(cofactors.as_ref().map(|all| &all.local[9 * local..])),
                 redundancy: std::array::from_fn(|k| redundancy_of(3 * local + k)),
                 rays: layout.groups_of(local).len(),

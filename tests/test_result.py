@@ -1,0 +1,403 @@
+"""The result: arrays, tables, the report, the JSON document."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from photogram import Block, Result, Spheroid, adjust, simulate
+from photogram.geometry import project
+
+ARCSEC = 180 * 3600 / math.pi
+SPACES: dict[str, dict[str, Any]] = {
+    "rectangular": {},
+    "geographic": {"spheroid": Spheroid.wgs84(), "origin": (-1.65, 0.52, 10.0), "photo_to_ground": True},
+}
+
+
+@pytest.fixture(scope="module", params=SPACES)
+def result(request: pytest.FixtureRequest) -> Result:
+    """Adjust a block of each space with a blunder, check points and a point that is left out."""
+    block = simulate(
+        strips=2,
+        photos_per_strip=4,
+        points_per_photo=25,
+        control_spacing=2,
+        check_points=4,
+        blunders=1,
+        blunder_size=0.5,
+        seed=12,
+        **SPACES[request.param],
+    ).block
+    single = Block(
+        **{
+            **{name: getattr(block, name) for name in Block.__dataclass_fields__},
+            "title": "A BLOCK OF TWO STRIPS",
+            "point_ids": [*block.point_ids, "SINGLE"],
+            "point_positions": np.vstack([block.point_positions, np.full((1, 3), np.nan)]),
+            "point_sd": np.vstack([block.point_sd, np.full((1, 3), np.inf)]),
+            "image_photos": np.append(block.image_photos, 2),
+            "image_points": np.append(block.image_points, len(block.point_ids)),
+            "image_xy": np.vstack([block.image_xy, [[1.0, 2.0]]]),
+            "image_sd": np.vstack([block.image_sd, [[0.01, 0.01]]]),
+        }
+    )
+    return adjust(single)
+
+
+def outward(result: Result, positions: Any) -> Any:
+    """Longitudes and latitudes in degrees, as tables and the document have them."""
+    scale = 180 / math.pi if result.block.geographic else 1.0
+    return np.asarray(positions) * [scale, scale, 1.0]
+
+
+# Arrays
+
+
+def test_shapes(result):
+    photos, points, images = (
+        len(result.block.photo_ids), len(result.block.point_ids), len(result.block.image_xy)
+    )  # fmt: skip
+    for name, shape in {
+        "photo_positions": (photos, 3),
+        "photo_attitudes": (photos, 3),
+        "photo_cofactors": (photos, 6, 6),
+        "photo_covariances": (photos, 6, 6),
+        "photo_redundancy": (photos, 6),
+        "photo_sd": (photos, 6),
+        "point_positions": (points, 3),
+        "point_cofactors": (points, 3, 3),
+        "point_covariances": (points, 3, 3),
+        "point_redundancy": (points, 3),
+        "point_sd": (points, 3),
+        "point_differences": (points, 3),
+        "point_kinds": (points,),
+        "point_rays": (points,),
+        "used_points": (points,),
+        "residuals": (images, 2),
+        "redundancy": (images, 2),
+        "standardized": (images, 2),
+        "used_images": (images,),
+    }.items():
+        assert getattr(result, name).shape == shape, name
+    assert np.isfinite(result.residuals[:-1]).all()
+    assert np.isnan(result.residuals[-1]).all()
+    assert np.isnan(result.point_positions[-1]).all()
+
+
+def test_residuals_are_observed_minus_computed(result):
+    block, used = result.block, result.used_images
+    photos, points = block.image_photos[used], block.image_points[used]
+    computed = project(
+        result.point_positions[points],
+        result.photo_positions[photos],
+        result.photo_attitudes[photos],
+        block.principal_distances[photos],
+        spheroid=block.spheroid,
+        photo_to_ground=block.photo_to_ground,
+    )
+    np.testing.assert_allclose(result.residuals[used], block.image_xy[used] - computed, rtol=0, atol=1e-9)
+
+
+def test_kinds_and_rays(result):
+    kinds = dict(zip(result.block.point_ids, result.point_kinds, strict=True))
+    letters = {"C": "control", "K": "check", "P": "pass", "S": "pass"}
+    assert all(kind == letters[name[0]] for name, kind in kinds.items())
+    rays = np.bincount(result.block.image_points, minlength=len(result.block.point_ids))
+    rays[-1] = 0
+    np.testing.assert_array_equal(result.point_rays, rays)
+    assert dict(result.dropped) == {"SINGLE": "pass point on one photo"}
+
+
+def test_without_covariance(result):
+    bare = adjust(result.block, covariance=False)
+    np.testing.assert_array_equal(bare.photo_positions, result.photo_positions)
+    np.testing.assert_array_equal(bare.residuals, result.residuals)
+    for name in ("photo_cofactors", "point_cofactors", "redundancy", "standardized", "photo_sd"):
+        assert np.isnan(getattr(bare, name)).all(), name
+    assert bare.variance_of_unit_weight == result.variance_of_unit_weight
+    document = json.loads(bare.to_json())
+    assert document["photos"][0]["covariance"] == [[None] * 6] * 6
+    assert document["observations"][0]["redundancy"] == [None, None]
+    assert "nan" not in bare.to_json().decode().lower()
+    assert "Problems" in bare.report()
+
+
+# Tables
+
+
+def test_photo_table(result):
+    table = result.photo_table()
+    axes = ["longitude_deg", "latitude_deg", "height"] if result.block.geographic else ["X", "Y", "Z"]
+    names = [*axes, "omega_deg", "phi_deg", "kappa_deg"]
+    assert list(table) == ["photo", *names, *(f"sd_{name}" for name in names)]
+    assert table["photo"].tolist() == result.block.photo_ids
+    np.testing.assert_allclose(table[axes], outward(result, result.photo_positions), rtol=1e-15)
+    np.testing.assert_allclose(table[names[3:]], np.degrees(result.photo_attitudes), rtol=1e-15)
+    deviations = table[[f"sd_{name}" for name in names]].to_numpy()
+    np.testing.assert_allclose(deviations[:, :3], outward(result, result.photo_sd[:, :3]), rtol=1e-15)
+    np.testing.assert_allclose(deviations[:, 3:], np.degrees(result.photo_sd[:, 3:]), rtol=1e-15)
+
+
+def test_point_table(result):
+    table = result.point_table()
+    used = result.used_points
+    assert len(table) == used.sum() == len(used) - 1
+    assert "SINGLE" not in set(table["point"])
+    assert table["kind"].tolist() == result.point_kinds[used].tolist()
+    assert table["rays"].tolist() == result.point_rays[used].tolist()
+    np.testing.assert_allclose(
+        table.iloc[:, 3:6].to_numpy(), outward(result, result.point_positions[used]), rtol=1e-15
+    )
+    np.testing.assert_allclose(
+        table.iloc[:, 6:].to_numpy(), outward(result, result.point_sd[used]), rtol=1e-15
+    )
+    assert list(table.columns[6:]) == [f"sd_{name}" for name in table.columns[3:6]]
+
+
+def test_image_table(result):
+    table = result.image_table()
+    assert list(table) == [
+        "photo", "point", "residual_x_mm", "residual_y_mm", "redundancy_x", "redundancy_y", "standardized_x",
+        "standardized_y",
+    ]  # fmt: skip
+    assert len(table) == result.used_images.sum() == len(result.block.image_xy) - 1
+    np.testing.assert_array_equal(table[["residual_x_mm", "residual_y_mm"]], result.residuals[:-1])
+    np.testing.assert_array_equal(table[["standardized_x", "standardized_y"]], result.standardized[:-1])
+    row = table.iloc[17]
+    assert row["photo"] == result.block.photo_ids[result.block.image_photos[17]]
+    assert row["point"] == result.block.point_ids[result.block.image_points[17]]
+
+
+def test_check_table(result):
+    table = result.check_table()
+    assert len(table) == 4
+    check = result.point_kinds == "check"
+    differences = outward(result, result.point_differences[check])
+    np.testing.assert_allclose(table.iloc[:, 1:4].to_numpy(), differences, rtol=1e-12)
+    np.testing.assert_allclose(
+        table.iloc[:, 4:].to_numpy(), outward(result, result.point_sd[check]), rtol=1e-15
+    )
+    assert all(name.startswith("d_") for name in table.columns[1:4])
+
+
+def test_adjusted_tables_make_a_block_again(result):
+    block = result.block
+    images = result.image_table()
+    images["x_mm"], images["y_mm"] = block.image_xy[result.used_images].T
+    again = Block.from_tables(
+        result.photo_table().filter(regex="^(?!sd_)"),
+        images,
+        principal_distance=-152.74,
+        spheroid=block.spheroid,
+        photo_to_ground=block.photo_to_ground,
+    )
+    np.testing.assert_allclose(again.photo_positions, result.photo_positions, rtol=1e-15)
+    np.testing.assert_allclose(again.photo_attitudes, result.photo_attitudes, rtol=1e-15)
+    assert again.image_xy.shape == block.image_xy[:-1].shape
+
+
+# The report
+
+
+def sections(report: str) -> dict[str, list[str]]:
+    """Lines by title; titles are underlined."""
+    parts = re.split(r"\n\n(?=[^\n]+\n-+\n)", report)
+    return {part.split("\n")[0]: part.rstrip("\n").split("\n")[2:] for part in parts[1:]}
+
+
+def test_the_report_begins_with_the_problems(result):
+    report = result.report()
+    assert report.startswith("photogram ")
+    assert "A BLOCK OF TWO STRIPS" in report.split("\n")[0]
+    titles = list(sections(report))
+    assert titles[:3] == ["Problems", "Adjustment", "Residuals"]
+    problems = sections(report)["Problems"]
+    assert any("left out, pass point on one photo: SINGLE" in line for line in problems)
+
+
+def test_the_report_says_when_the_adjustment_failed(result):
+    early = adjust(result.block, max_iterations=1)
+    assert early.status == "not converged"
+    assert sections(early.report())["Problems"][0].startswith("the adjustment has not converged: do not use")
+    clean = simulate(strips=2, photos_per_strip=3, seed=1).block
+    assert sections(adjust(clean).report())["Problems"] == ["none"]
+
+
+def test_the_report_counts_and_weighs(result):
+    lines = "\n".join(sections(result.report())["Adjustment"])
+    for name, value in {
+        "status": "converged",
+        "degrees of freedom": str(result.degrees_of_freedom),
+        "variance of unit weight": f"{result.variance_of_unit_weight:.6f}",
+        "weighted sum of squares, camera": f"{result.sums_of_squares.camera:.6f}",
+        "weighted sum of squares, ground": f"{result.sums_of_squares.ground:.6f}",
+        "weighted sum of squares, plates": f"{result.sums_of_squares.plates:.6f}",
+        "weighted sum of squares, total": f"{result.sums_of_squares.total:.6f}",
+        "photos": "8",
+        "object space": "geographic" if result.block.geographic else "rectangular",
+        "rotation angles": "photo-to-ground" if result.block.photo_to_ground else "ground-to-photo",
+    }.items():
+        assert re.search(rf"^{name} +{re.escape(value)}", lines, re.MULTILINE), name
+
+
+def test_every_quantity_of_the_report_has_a_unit(result):
+    parts = sections(result.report())
+    unit = re.compile(r"\b(um|mm|m|deg|arcsec|s)\b")
+    for line in parts["Residuals"]:
+        if line.startswith("rms"):
+            assert unit.search(line), line
+    for title in ("Check points: adjusted minus supplied", "Control points: adjusted minus supplied"):
+        assert len(unit.findall(parts[title][0])) == 3, title
+    # Values and deviations stand on two lines under two headings.
+    assert len(unit.findall(parts["Photos"][0])) + (2 if result.block.geographic else 0) == 6
+    assert len(unit.findall(parts["Photos"][1])) == 6
+    assert len(unit.findall(parts["Points"][1])) == 3
+    assert all(line.endswith(" s") for line in parts["Work"] if line.startswith("seconds"))
+
+
+def test_the_report_names_the_blunder(result):
+    title = next(title for title in sections(result.report()) if title.startswith("Image coordinates"))
+    suspects = sections(result.report())[title]
+    image, axis = np.unravel_index(np.nanargmax(np.abs(result.standardized)), result.standardized.shape)
+    photo = result.block.photo_ids[result.block.image_photos[image]]
+    point = result.block.point_ids[result.block.image_points[image]]
+    assert suspects[1].split()[:3] == [photo, point, "xy"[axis]]
+    assert abs(result.standardized[image, axis]) > 10
+
+
+def test_values_of_the_report_are_those_of_the_arrays(result):
+    parts = sections(result.report())
+    photo = parts["Photos"][2:4]
+    assert photo[0].split()[0] == result.block.photo_ids[0]
+    angles = [float(value) for value in photo[0].split()[-3:]]
+    np.testing.assert_allclose(angles, np.degrees(result.photo_attitudes[0]), rtol=0, atol=0.51e-7)
+    deviations = [float(value) for value in photo[1].split()]
+    scale = [ARCSEC, ARCSEC, 1.0] if result.block.geographic else [1.0] * 3
+    expected = result.photo_sd[0] * [*scale, *[ARCSEC] * 3]
+    np.testing.assert_allclose(deviations, expected, rtol=0, atol=0.51e-3)
+    if result.block.geographic:
+        degrees, minutes, seconds = (float(part) for part in photo[0].split()[1:4])
+        longitude = -(abs(degrees) + minutes / 60 + seconds / 3600)
+        assert math.radians(longitude) == pytest.approx(result.photo_positions[0, 0], abs=1e-5 / ARCSEC)
+
+
+# The JSON document
+
+
+@pytest.fixture(scope="module")
+def document(result: Result) -> dict[str, Any]:
+    return json.loads(result.to_json())
+
+
+def test_members_of_the_document(result, document):
+    assert set(document) == {
+        "program", "title", "units", "conventions", "status", "messages", "initial_weighted_sum_of_squares",
+        "iterations", "weighted_sum_of_squares", "degrees_of_freedom", "unit_variance",
+        "variance_of_unit_weight", "covariance_scale", "photos", "points", "observations", "check_points",
+        "dropped_points", "ordering", "operations", "seconds",
+    }  # fmt: skip
+    assert document["status"] == "converged"
+    assert document["title"] == "A BLOCK OF TWO STRIPS"
+    assert document["degrees_of_freedom"] == result.degrees_of_freedom
+    assert document["variance_of_unit_weight"] == result.variance_of_unit_weight
+    assert document["covariance_scale"] == result.variance_of_unit_weight
+    assert document["unit_variance"] == "constrained"
+    sums = result.sums_of_squares
+    assert document["weighted_sum_of_squares"] == {
+        "camera": sums.camera, "ground": sums.ground, "plates": sums.plates, "total": sums.total
+    }  # fmt: skip
+    assert document["dropped_points"] == [{"id": "SINGLE", "reason": "pass point on one photo"}]
+    assert [iteration["number"] for iteration in document["iterations"]] == [
+        iteration.number for iteration in result.iterations
+    ]
+    assert document["iterations"][-1]["weighted_sum_of_squares"] == pytest.approx(sums.total, rel=1e-12)
+    assert set(document["operations"]) == {"reduction", "factor", "inverse"}
+    assert set(document["seconds"]) == {"form", "factor", "solve", "invert", "cofactors"}
+
+
+def test_units_and_conventions_of_the_document(result, document):
+    units, conventions = document["units"], document["conventions"]
+    assert set(units) == {
+        "position", "position_covariance", "attitude", "attitude_covariance", "covariance", "residual_mm",
+        "difference", "operations", "seconds",
+    }  # fmt: skip
+    assert units["residual_mm"] == "mm"
+    assert units["attitude"] == "rad"
+    assert ("longitude deg, latitude deg" in units["position"]) == result.block.geographic
+    assert conventions["object_space"] == ("geographic" if result.block.geographic else "rectangular")
+    assert conventions["rotation"].startswith("photo" if result.block.photo_to_ground else "ground")
+    assert "covariance_scale" in conventions["covariance"]
+
+
+def test_photos_of_the_document(result, document):
+    photos = document["photos"]
+    assert [photo["id"] for photo in photos] == result.block.photo_ids
+    np.testing.assert_allclose(
+        [photo["position"] for photo in photos], outward(result, result.photo_positions), rtol=1e-15
+    )
+    np.testing.assert_array_equal([photo["attitude_rad"] for photo in photos], result.photo_attitudes)
+    covariances = np.array([photo["covariance"] for photo in photos])
+    np.testing.assert_array_equal(covariances, result.photo_covariances)
+    positions = np.array([photo["position_covariance"] for photo in photos])
+    np.testing.assert_array_equal(positions, covariances[:, :3, :3])
+    attitudes = np.array([photo["attitude_covariance"] for photo in photos])
+    np.testing.assert_array_equal(attitudes, covariances[:, 3:, 3:])
+
+
+def test_points_of_the_document(result, document):
+    points, used = document["points"], result.used_points
+    assert [point["id"] for point in points] == [
+        name for name, use in zip(result.block.point_ids, used, strict=True) if use
+    ]
+    np.testing.assert_allclose(
+        [point["position"] for point in points], outward(result, result.point_positions[used]), rtol=1e-15
+    )
+    np.testing.assert_array_equal([point["covariance"] for point in points], result.point_covariances[used])
+    assert [point["rays"] for point in points] == result.point_rays[used].tolist()
+    assert {point["kind"] for point in points} == {"pass", "control", "check"}
+
+
+def test_observations_of_the_document(result, document):
+    observations = document["observations"]
+    assert len(observations) == result.used_images.sum()
+    assert set(observations[0]) == {"photo", "point", "residual_mm", "redundancy", "standardized"}
+    for member, values in {
+        "residual_mm": result.residuals, "redundancy": result.redundancy, "standardized": result.standardized
+    }.items():  # fmt: skip
+        found = np.array([each[member] for each in observations], dtype=float)
+        np.testing.assert_array_equal(found, values[result.used_images])
+
+
+def test_check_points_of_the_document(result, document):
+    check = result.point_kinds == "check"
+    assert len(document["check_points"]) == check.sum() == 4
+    np.testing.assert_allclose(
+        [point["difference"] for point in document["check_points"]],
+        outward(result, result.point_differences[check]),
+        rtol=1e-12,
+    )
+
+
+def test_what_is_no_number_is_null():
+    # Without redundancy there is no variance of unit weight, and no test value.
+    block = simulate(
+        strips=1, photos_per_strip=2, points_per_photo=6, control="none", position_sd=30.0, attitude_sd=0.01,
+        check_points=1, seed=3,
+    ).block  # fmt: skip
+    positions = block.point_positions.copy()
+    positions[np.isfinite(positions[:, 0]), 2] = np.nan
+    result = adjust(block.replace(point_positions=positions), unit_variance="free")
+    document = json.loads(result.to_json())
+    assert document["variance_of_unit_weight"] is None
+    assert document["covariance_scale"] == 1.0
+    assert document["check_points"][0]["difference"][2] is None
+    assert document["check_points"][0]["difference"][0] is not None
+    assert any("there is no control" in message for message in document["messages"])
+    assert "variance of unit weight             undefined" in result.report()
+    assert "covariances are scaled by 1" in result.report()
