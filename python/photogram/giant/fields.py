@@ -29,9 +29,6 @@ __all__ = [
 ARCSEC = math.pi / 648000.0
 """One second of arc in radians."""
 
-MOST_DECIMALS = 6
-"""Decimals of a number above 1 that has more digits than fit, unless it has fewer columns."""
-
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d{1,2}))?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 
@@ -137,7 +134,7 @@ def format_real(value: float, width: int, decimals: int) -> str:
 
 def _rounded(value: float, width: int) -> str:
     """Round to the decimals that fit; too long where not even the whole number and its point do."""
-    places, excess = (width if abs(value) < 1 else MOST_DECIMALS) + 1, 1
+    places, excess = width + 1, 1
     while excess > 0 and places > 0:
         places = max(0, places - excess)
         text = f"{value:#.{places}f}"
@@ -181,7 +178,7 @@ def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
     """Write radians as packed DMS with `least` to `most` decimals of the second, as far as they fit."""
     if not abs(value) <= 2 * math.pi:
         raise ValueError(f"{value} rad is beyond 360 degrees")
-    arcseconds = Decimal(repr(value / ARCSEC))
+    arcseconds = Decimal(repr(float(value) / ARCSEC))
     places, excess = min(most, width - 2) + 1, 1
     while excess > 0 and places > 0:
         places = max(0, places - excess)
