@@ -126,7 +126,7 @@ def test_redundancy_numbers_sum_to_the_degrees_of_freedom(arguments):
 @some_blocks
 def test_the_solution_satisfies_its_normal_equations_and_the_inverse_is_theirs(arguments):
     block = block_of(arguments)
-    # The weakest of these blocks bend so much within their standard deviations that the steps shrink by a fifth.
+    # The weakest of these blocks bend within their standard deviations: steps shrink by a fifth only.
     result = adjust(block, tolerance=1e-7, max_iterations=200)
     assert result.converged
     sd, difference = priors(block, result)
@@ -469,7 +469,32 @@ def test_step_control_converges_where_full_steps_diverge():
     sums = [controlled.initial_weighted_sum_of_squares]
     sums += [iteration.weighted_sum_of_squares for iteration in controlled.iterations]
     assert (np.diff(sums) <= 1e-9 * np.array(sums[:-1])).all()
-    # The same start without noise in it leads to the same place.
-    near = adjust(simulation.block.replace(photo_positions=truth.photo_positions,
-                                           photo_attitudes=truth.photo_attitudes))  # fmt: skip
+    near = adjust(
+        simulation.block.replace(photo_positions=truth.photo_positions, photo_attitudes=truth.photo_attitudes)
+    )
     np.testing.assert_allclose(controlled.photo_positions, near.photo_positions, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("degrees", [10, 20, 30])
+@pytest.mark.parametrize("seed", range(3))
+def test_hopeless_starts_end_in_good_order(degrees, seed):
+    simulation = simulate(
+        strips=2,
+        photos_per_strip=4,
+        points_per_photo=30,
+        attitude_error=math.radians(degrees),
+        position_error=200.0,
+        seed=seed,
+    )
+    block, truth = simulation.block, simulation.truth
+    best = adjust(
+        block.replace(photo_positions=truth.photo_positions, photo_attitudes=truth.photo_attitudes)
+    ).sums_of_squares.total
+    result = adjust(block)
+    sums = [result.initial_weighted_sum_of_squares]
+    sums += [iteration.weighted_sum_of_squares for iteration in result.iterations]
+    assert (np.diff(sums) <= 1e-9 * np.array(sums[:-1])).all()
+    assert result.sums_of_squares.total == pytest.approx(sums[-1], rel=1e-9)
+    # Nothing is called converged that is not the solution.
+    assert result.converged == (result.sums_of_squares.total < 1.001 * best)
+    assert result.status in ("converged", "not converged", "diverged")
