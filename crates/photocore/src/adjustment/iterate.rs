@@ -115,7 +115,7 @@ pub struct Adjustment {
     pub unknowns: Vec<f64>,
     /// Observed minus computed, in the order of groups and rows, in the units of the observations.
     pub residuals: Vec<f64>,
-    /// Cofactors (a priori unit weight), when asked for.
+    /// Cofactors (a priori unit weight), when asked for; none where a diverged adjustment has lost unknowns.
     pub cofactors: Option<Cofactors>,
     /// Redundancy number of each observation, when asked for.
     pub redundancy: Option<Vec<f64>>,
@@ -187,21 +187,27 @@ struct State<'a, M: Model> {
     sum_of_squares: f64,
 }
 
-/// Normal equations solved.
-struct Solved<'a, M: Model> {
-    unknowns: Vec<f64>,
+/// What cofactors are computed from: the factor of the normal equations, and what they were formed from.
+struct Basis<'a, M: Model> {
     equations: Linearized<'a, M>,
     prior: Prior,
     factor: Factor,
+}
+
+/// Normal equations solved.
+struct Solved<'a, M: Model> {
+    basis: Basis<'a, M>,
     step: Vec<f64>,
     change: f64,
 }
 
-/// Where the iterations ended: the cofactors hold at the values of the last state; its step is the last to be applied.
+/// Where the iterations ended. There are no cofactors where the last values leave unknowns undetermined.
 struct End<'a, M: Model> {
     status: Status,
-    state: Solved<'a, M>,
-    last: Option<Iteration>,
+    unknowns: Vec<f64>,
+    basis: Option<Basis<'a, M>>,
+    /// The last iteration and its step, still to be applied: the cofactors hold before it.
+    last: Option<(Iteration, Vec<f64>)>,
 }
 
 struct Run<'a, 'w, M: Model> {
@@ -234,18 +240,21 @@ impl<'a, M: Model> Run<'a, '_, M> {
     fn strictly(&mut self, start: State<'a, M>, fraction: f64) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
         let mut best = state.sum_of_squares;
-        let mut number = 0;
-        loop {
-            number += 1;
+        while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
             let (unknowns, damping) = (state.unknowns.clone(), state.damping);
-            let solved = self.solve(state)?;
-            let converged = damping == 0.0 && solved.change <= fraction;
-            if converged {
-                let iteration =
-                    Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
-                return Ok(End { status: Status::Converged, state: solved, last: Some(iteration) });
+            let harder = (10.0 * damping).max(FIRST_DAMPING);
+            let Some(solved) = self.solve_unless_lost(state)? else {
+                state = self.form(unknowns, harder)?;
+                continue;
+            };
+            let number = self.iterations.len() + 1;
+            let iteration =
+                Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
+            if damping == 0.0 && solved.change <= fraction {
+                let last = Some((iteration, solved.step));
+                return Ok(End { status: Status::Converged, unknowns, basis: Some(solved.basis), last });
             }
-            let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
+            let trial = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
             let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
             let next = self.form(trial, relaxed)?;
             let negligible = damping == 0.0 && solved.change <= NEGLIGIBLE;
@@ -253,60 +262,65 @@ impl<'a, M: Model> Run<'a, '_, M> {
             // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
             if next.sum_of_squares <= highest && next.normals.deficient_locals.is_empty() {
                 best = next.sum_of_squares;
-                let iteration =
-                    Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
-                self.tell(iteration)?;
+                self.tell(Iteration { sum_of_squares: best, ..iteration })?;
                 state = next;
             } else {
-                state = self.form(unknowns, (10.0 * damping).max(FIRST_DAMPING))?;
-            }
-            let diverged = state.damping > MOST_DAMPING;
-            if diverged || number >= self.options.max_iterations {
-                let status = if diverged { Status::Diverged } else { Status::NotConverged };
-                return self.stay(state, status);
+                state = self.form(unknowns, harder)?;
             }
         }
+        let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
+        self.stay(state, status)
     }
 
     /// The iteration of the 1987 program: full steps until the sum of squares changes by less than `percent`.
     fn as_published(&mut self, start: State<'a, M>, percent: f64) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
         let mut previous: Option<f64> = None;
-        let mut status = Status::NotConverged;
         for number in 1..=self.options.max_iterations {
             let unknowns = state.unknowns.clone();
-            let solved = self.solve(state)?;
+            let Some(solved) = self.solve_unless_lost(state)? else {
+                return Ok(End { status: Status::Diverged, unknowns, basis: None, last: None });
+            };
             let values = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
             state = self.form(values, 0.0)?;
-            if !state.sum_of_squares.is_finite() {
-                state = self.form(unknowns, 0.0)?;
-                status = Status::Diverged;
-                break;
-            }
             let sum_of_squares = state.sum_of_squares;
-            self.tell(Iteration { number, sum_of_squares, largest_change: solved.change, damping: 0.0 })?;
-            let change = previous.map(|before| (sum_of_squares - before) / before * 100.0);
-            status = match change {
-                Some(change) if change.abs() < percent => Status::Converged,
-                Some(change) if change >= percent => Status::Diverged,
-                _ => Status::NotConverged,
-            };
-            if status != Status::NotConverged {
-                break;
+            if !sum_of_squares.is_finite() {
+                return Ok(End { status: Status::Diverged, unknowns, basis: Some(solved.basis), last: None });
             }
-            previous = Some(sum_of_squares);
+            self.tell(Iteration { number, sum_of_squares, largest_change: solved.change, damping: 0.0 })?;
+            match previous.map(|before| (sum_of_squares - before) / before * 100.0) {
+                Some(change) if change.abs() < percent => return self.stay(state, Status::Converged),
+                Some(change) if change >= percent => return self.stay(state, Status::Diverged),
+                _ => previous = Some(sum_of_squares),
+            }
         }
-        self.stay(state, status)
+        self.stay(state, Status::NotConverged)
     }
 
     /// Ends at the values reached, without a further step.
     fn stay(&mut self, state: State<'a, M>, status: Status) -> Result<End<'a, M>, AdjustError> {
+        let unknowns = state.unknowns.clone();
         let state = if state.damping == 0.0 { state } else { self.form(state.unknowns, 0.0)? };
-        let step = vec![0.0; state.unknowns.len()];
-        let factor = self.factor(state.normals)?;
-        let (unknowns, equations, prior) = (state.unknowns, state.equations, state.prior);
-        let state = Solved { unknowns, equations, prior, factor, step, change: 0.0 };
-        Ok(End { status, state, last: None })
+        let basis = match self.factor(state.normals) {
+            Ok(factor) => Some(Basis { equations: state.equations, prior: state.prior, factor }),
+            Err(AdjustError::Interrupted) => return Err(AdjustError::Interrupted),
+            Err(_) => None,
+        };
+        let status = if basis.is_some() { status } else { Status::Diverged };
+        Ok(End { status, unknowns, basis, last: None })
+    }
+
+    /// Solves; None where an earlier step has led to values that leave unknowns undetermined. That the initial values do is an
+    /// error: then the observations do.
+    fn solve_unless_lost(&mut self, state: State<'a, M>) -> Result<Option<Solved<'a, M>>, AdjustError> {
+        match self.solve(state) {
+            Err(AdjustError::UndeterminedLocals(_) | AdjustError::Undetermined(_))
+                if !self.iterations.is_empty() =>
+            {
+                Ok(None)
+            }
+            solved => solved.map(Some),
+        }
     }
 
     fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
@@ -345,10 +359,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let ControlFlow::Continue(solution) = solved else { return Err(AdjustError::Interrupted) };
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(Solved {
-            unknowns: state.unknowns,
-            equations: state.equations,
-            prior: state.prior,
-            factor,
+            basis: Basis { equations: state.equations, prior: state.prior, factor },
             step: solution.values,
             change: (local_decrease + solution.decrease).sqrt(),
         })
@@ -356,15 +367,19 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     fn finish(mut self, end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
         let problem = self.problem;
-        let Solved { mut unknowns, equations, prior, factor, step, .. } = end.state;
-        unknowns.iter_mut().zip(&step).for_each(|(x, dx)| *x += dx);
+        let mut unknowns = end.unknowns;
+        if let Some((_, step)) = &end.last {
+            unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+        }
         let residuals = problem.residuals(self.pool, &unknowns);
-        if let Some(last) = end.last {
+        if let Some((last, _)) = end.last {
             let sum_of_squares = problem.sum_of_squares(&residuals) + problem.prior_sum_of_squares(&unknowns);
             self.tell(Iteration { sum_of_squares, ..last })?;
         }
-        let cofactors =
-            if self.options.covariance { Some(self.cofactors(factor, &equations, &prior)?) } else { None };
+        let cofactors = match end.basis {
+            Some(basis) if self.options.covariance => Some(self.cofactors(basis)?),
+            _ => None,
+        };
         let redundancy =
             |cofactors: &Cofactors| cofactors.equations.iter().map(|share| 1.0 - share).collect();
         Ok(Adjustment {
@@ -384,19 +399,15 @@ impl<'a, M: Model> Run<'a, '_, M> {
         })
     }
 
-    fn cofactors(
-        &mut self,
-        factor: Factor,
-        equations: &Linearized<'a, M>,
-        prior: &Prior,
-    ) -> Result<Cofactors, AdjustError> {
+    fn cofactors(&mut self, basis: Basis<'a, M>) -> Result<Cofactors, AdjustError> {
+        let Basis { equations, prior, factor } = basis;
         let start = Instant::now();
         self.enter(Phase::Invert)?;
         let inverse = factor.into_selected_inverse(self.pool);
         self.seconds.invert = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Cofactors, self.problem.layout().locals());
-        let found = self.problem.system.cofactors(self.pool, &inverse, equations, prior, &mut between);
+        let found = self.problem.system.cofactors(self.pool, &inverse, &equations, &prior, &mut between);
         let ControlFlow::Continue(mut cofactors) = found else { return Err(AdjustError::Interrupted) };
         self.problem.clear_fixed(&mut cofactors);
         self.seconds.cofactors = start.elapsed().as_secs_f64();

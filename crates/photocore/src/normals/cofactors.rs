@@ -91,9 +91,10 @@ impl System {
             let mut unit = [0.0; 3];
             unit[a] = 1.0;
             e.solve_normal(&mut unit, l);
-            for b in 0..l {
+            for b in 0..=a {
                 let row = &h[b * others.width..][..others.width];
                 local[a * l + b] = unit[b] + dot(&hq[a * others.width..][..others.width], row);
+                local[b * l + a] = local[a * l + b];
             }
         }
         let mut wide = vec![0.0; others.width];
