@@ -48,10 +48,8 @@ class Agreement:
         )
 
     def __bool__(self) -> bool:
-        return (
-            max(self.start, self.end) <= SUM_OF_SQUARES
-            and max(self.photos, self.points) <= STANDARD_DEVIATIONS
-        )
+        sums = all(difference <= SUM_OF_SQUARES for difference in (self.start, self.end))
+        return sums and all(difference <= STANDARD_DEVIATIONS for difference in (self.photos, self.points))
 
 
 def _relative(value: float, reference: float) -> float:
