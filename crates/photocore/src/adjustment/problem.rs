@@ -79,6 +79,7 @@ impl<'a, M: Model> Linearized<'a, M> {
 }
 
 impl<M: Model> Equations for Linearized<'_, M> {
+    #[inline(always)]
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let layout = self.problem.layout();
         self.problem.model.observe(&self.prepared, local, group, rows);

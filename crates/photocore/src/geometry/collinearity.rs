@@ -143,7 +143,7 @@ impl Photo {
 
     /// The image position of a point and its partials; not finite for a point in the plane u3 = 0 of the
     /// projection centre.
-    #[inline]
+    #[inline(always)]
     pub fn linearize(&self, point: &Point) -> Projection {
         let u = apply(&self.to_photo, &difference(&point.position, &self.centre));
         let scale = self.principal_distance / u[2];
@@ -156,7 +156,7 @@ impl Photo {
     /// Partials of one image coordinate, given its gradient g with respect to u.
     ///
     /// du = G dP - G dC + w x u dq, and g . (w x u) = (u x g) . w.
-    #[inline]
+    #[inline(always)]
     fn partials(&self, g: &Vector3, u: &Vector3, point: &Point) -> ([f64; 6], Vector3) {
         let in_object_space = apply_transposed(&self.to_photo, g);
         let by_point = apply_transposed(&point.partials, &in_object_space);

@@ -9,43 +9,43 @@ pub type Matrix3 = [[f64; 3]; 3];
 pub const IDENTITY: Matrix3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// a . b
-#[inline]
+#[inline(always)]
 pub fn dot(a: &Vector3, b: &Vector3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// a x b
-#[inline]
+#[inline(always)]
 pub fn cross(a: &Vector3, b: &Vector3) -> Vector3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// a - b
-#[inline]
+#[inline(always)]
 pub fn difference(a: &Vector3, b: &Vector3) -> Vector3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// A v
-#[inline]
+#[inline(always)]
 pub fn apply(matrix: &Matrix3, v: &Vector3) -> Vector3 {
     [dot(&matrix[0], v), dot(&matrix[1], v), dot(&matrix[2], v)]
 }
 
 /// A^T v, the row v^T A
-#[inline]
+#[inline(always)]
 pub fn apply_transposed(matrix: &Matrix3, v: &Vector3) -> Vector3 {
     std::array::from_fn(|j| matrix[0][j] * v[0] + matrix[1][j] * v[1] + matrix[2][j] * v[2])
 }
 
 /// A B
-#[inline]
+#[inline(always)]
 pub fn product(a: &Matrix3, b: &Matrix3) -> Matrix3 {
     std::array::from_fn(|i| apply_transposed(b, &a[i]))
 }
 
 /// A^T
-#[inline]
+#[inline(always)]
 pub fn transposed(a: &Matrix3) -> Matrix3 {
     std::array::from_fn(|i| [a[0][i], a[1][i], a[2][i]])
 }

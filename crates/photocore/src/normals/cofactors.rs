@@ -1,11 +1,12 @@
 //! Cofactors of every unknown and of every adjusted equation, from the selected inverse.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
+use pulp::Arch;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::elimination::{Elimination, Equations, dot};
+use super::elimination::{Elimination, Equations, LocalPrior, dot};
 use super::floors::skip;
 use super::form::{Between, Prior, System};
 use super::invert::SelectedInverse;
@@ -45,17 +46,31 @@ impl System {
             equations: vec![0.0; layout.groups() * rows],
         };
         let (mut local_rest, mut rest) = (&mut result.local[..], &mut result.equations[..]);
-        let done = self.eliminate_all(pool, equations, prior, 0.0, between, |first, batch| {
+        let eliminate = |e: &mut Elimination, prior: LocalPrior<'_>| match l {
+            3 => e.eliminate::<3>(layout, prior, 0.0),
+            2 => e.eliminate::<2>(layout, prior, 0.0),
+            _ => e.eliminate::<1>(layout, prior, 0.0),
+        };
+        let arch = Arch::new();
+        let done = self.for_locals(pool, equations, prior, between, eliminate, |first, batch| {
             let mut work = Vec::with_capacity(batch.len());
             for (i, elimination) in batch.iter().enumerate() {
                 let groups = layout.groups_of(first + i);
                 let own = (skip(&mut local_rest, l * l), skip(&mut rest, groups.len() * rows));
-                work.push((elimination, groups, own));
+                work.push((elimination, groups.start, own.0, own.1));
             }
             pool.install(|| {
-                work.into_par_iter().with_min_len(32).for_each(
-                    |(elimination, groups, (local, equations))| {
-                        self.cofactors_of_local(elimination, inverse, groups, local, equations);
+                work.into_par_iter().with_min_len(32).for_each_init(
+                    Others::default,
+                    |others, (elimination, first_group, local, equations)| {
+                        arch.dispatch(|| {
+                            others.gather(self, elimination, inverse);
+                            match l {
+                                3 => others.cofactors::<3>(self, elimination, first_group, local, equations),
+                                2 => others.cofactors::<2>(self, elimination, first_group, local, equations),
+                                _ => others.cofactors::<1>(self, elimination, first_group, local, equations),
+                            }
+                        });
                     },
                 );
             });
@@ -71,130 +86,128 @@ impl System {
         }
         ControlFlow::Continue(result)
     }
+}
 
-    /// With H = N_ll^-1 N_lo (o: the kept blocks and the border that the local block is tied to) and Q_oo from the inverse:
-    /// Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and a Q a^T for each equation.
-    fn cofactors_of_local(
-        &self,
+/// Everything that one local block is tied to: its kept blocks in the order of its slots, then the border.
+#[derive(Default)]
+struct Others {
+    positions: Vec<usize>,
+    /// Where each of them starts; one more at the end, the width.
+    start: Vec<usize>,
+    /// The inverse over them, full square.
+    inverse: Vec<f64>,
+    /// H = N_ll^-1 N_lo, row by row.
+    h: Vec<f64>,
+    /// H times the inverse, row by row.
+    hq: Vec<f64>,
+}
+
+impl Others {
+    /// Collects the inverse over everything that a local block is tied to.
+    #[inline(always)]
+    fn gather(&mut self, system: &System, e: &Elimination, inverse: &SelectedInverse) {
+        let border = system.layout.border_dim();
+        self.positions.clear();
+        self.start.clear();
+        let mut width = 0;
+        for slot in &e.slots {
+            self.positions.push(slot.position);
+            self.start.push(width);
+            width += slot.dim;
+        }
+        if border > 0 {
+            self.positions.push(system.symbolic.blocks() - 1);
+            self.start.push(width);
+            width += border;
+        }
+        self.start.push(width);
+        self.inverse.resize(width * width, 0.0);
+        inverse.gather(&self.positions, &self.start, &mut self.inverse);
+    }
+
+    fn width(&self) -> usize {
+        self.start[self.positions.len()]
+    }
+
+    /// With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and
+    /// a Q a^T for each equation.
+    #[inline(always)]
+    fn cofactors<const L: usize>(
+        &mut self,
+        system: &System,
         e: &Elimination,
-        inverse: &SelectedInverse,
-        groups: Range<usize>,
+        first_group: usize,
         local: &mut [f64],
         equations: &mut [f64],
     ) {
-        let (rows, l) = (self.layout.rows(), self.layout.local_dim());
-        let others = Others::new(self, e, inverse);
-        let h = others.coupling(self, e);
-        let hq: Vec<f64> =
-            (0..l).flat_map(|a| others.times(&h[a * others.width..][..others.width])).collect();
-        for a in 0..l {
-            let mut unit = [0.0; 3];
+        self.multiply::<L>(system, e);
+        let width = self.width();
+        let mut own = [[0.0; L]; L];
+        for a in 0..L {
+            let mut unit = [0.0; L];
             unit[a] = 1.0;
-            e.solve_normal(&mut unit, l);
+            e.triangle.forward::<L>(&mut unit, 1);
+            e.triangle.backward::<L>(&mut unit, 1);
             for b in 0..=a {
-                let row = &h[b * others.width..][..others.width];
-                local[a * l + b] = unit[b] + dot(&hq[a * others.width..][..others.width], row);
-                local[b * l + a] = local[a * l + b];
+                let value = unit[b] + dot(&self.hq[a * width..][..width], &self.h[b * width..][..width]);
+                (own[a][b], own[b][a]) = (value, value);
             }
         }
-        let mut wide = vec![0.0; others.width];
-        for (index, slot) in e.slots.iter().enumerate() {
+        local.copy_from_slice(own.as_flattened());
+        let rows = system.layout.rows();
+        let border = width - system.layout.border_dim();
+        for (slot, &start) in e.slots.iter().zip(&self.start) {
             for place in &e.groups[slot.first..slot.end] {
                 for row in 0..rows {
-                    let own = &e.local_rows[place.local + row * l..][..l];
-                    let kept = &e.kept_rows[place.kept + row * slot.dim..][..slot.dim];
+                    let a = &e.local_rows[place.local + row * L..][..L];
+                    let kept = (start, &e.kept_rows[place.kept + row * slot.dim..][..slot.dim]);
                     let common =
                         &e.border_rows[place.border + row * place.border_width..][..place.border_width];
-                    wide.fill(0.0);
-                    wide[others.start[index]..][..slot.dim].copy_from_slice(kept);
-                    wide[others.border_start() + place.border_first..][..place.border_width]
-                        .copy_from_slice(common);
-                    let mut q = others.quadratic(&wide, others.start[index]..others.start[index] + slot.dim);
-                    for a in 0..l {
-                        q -= 2.0 * own[a] * dot(&hq[a * others.width..][..others.width], &wide);
-                        q += own[a] * dot(&local[a * l..][..l], own);
+                    let common = (border + place.border_first, common);
+                    let mut q = self.product(kept, kept) + self.product(common, common);
+                    q += 2.0 * self.product(kept, common);
+                    for d in 0..L {
+                        let hq = &self.hq[d * width..][..width];
+                        let tied = dot(&hq[kept.0..], kept.1) + dot(&hq[common.0..], common.1);
+                        q += a[d] * (dot(&own[d], a) - 2.0 * tied);
                     }
-                    equations[(place.group - groups.start) * rows + row] = q;
+                    equations[(place.group - first_group) * rows + row] = q;
                 }
             }
         }
     }
-}
 
-/// The inverse over everything that one local block is tied to: its kept blocks in the order of its slots, then the border.
-struct Others {
-    start: Vec<usize>,
-    width: usize,
-    border: usize,
-    inverse: Vec<f64>,
-}
-
-impl Others {
-    fn new(system: &System, e: &Elimination, inverse: &SelectedInverse) -> Self {
-        let border = system.layout.border_dim();
-        let mut start = Vec::with_capacity(e.slots.len() + 1);
-        let mut blocks = Vec::with_capacity(e.slots.len() + 1);
-        let mut width = 0;
-        for slot in &e.slots {
-            start.push(width);
-            blocks.push(system.symbolic.block(slot.position));
-            width += slot.dim;
-        }
-        if border > 0 {
-            start.push(width);
-            blocks.push(system.layout.kept());
-        }
-        width += border;
-        let mut values = vec![0.0; width * width];
-        for (&row_start, &row) in start.iter().zip(&blocks) {
-            for (&column_start, &column) in start.iter().zip(&blocks) {
-                inverse.write_block(row, column, &mut values[row_start * width + column_start..], width);
-            }
-        }
-        Self { start, width, border, inverse: values }
-    }
-
-    fn border_start(&self) -> usize {
-        self.width - self.border
-    }
-
-    /// H = L^-T V, row by row.
-    fn coupling(&self, system: &System, e: &Elimination) -> Vec<f64> {
-        let l = system.layout.local_dim();
-        let mut h = vec![0.0; l * self.width];
-        for d in 0..l {
+    /// Computes H = L^-T V and its product with the inverse.
+    #[inline(always)]
+    fn multiply<const L: usize>(&mut self, system: &System, e: &Elimination) {
+        let (width, border) = (self.width(), system.layout.border_dim());
+        self.h.resize(L * width, 0.0);
+        for d in 0..L {
+            let row = &mut self.h[d * width..][..width];
             for (slot, &start) in e.slots.iter().zip(&self.start) {
-                let values = &e.coupling[slot.coupling + d * slot.dim..][..slot.dim];
-                h[d * self.width + start..][..slot.dim].copy_from_slice(values);
+                row[start..][..slot.dim]
+                    .copy_from_slice(&e.coupling[slot.coupling + d * slot.dim..][..slot.dim]);
             }
-            let values = &e.border_coupling[d * self.border..][..self.border];
-            h[d * self.width + self.border_start()..][..self.border].copy_from_slice(values);
+            row[width - border..].copy_from_slice(&e.border_coupling[d * border..][..border]);
         }
-        for column in 0..self.width {
-            let mut values = [0.0; 3];
-            (0..l).for_each(|d| values[d] = h[d * self.width + column]);
-            e.solve_transposed(&mut values, l);
-            (0..l).for_each(|d| h[d * self.width + column] = values[d]);
+        e.triangle.backward::<L>(&mut self.h, width);
+        self.hq.clear();
+        self.hq.resize(L * width, 0.0);
+        for d in 0..L {
+            let sums = &mut self.hq[d * width..][..width];
+            for (value, row) in
+                self.h[d * width..][..width].iter().zip(self.inverse.chunks_exact(width.max(1)))
+            {
+                sums.iter_mut().zip(row).for_each(|(sum, q)| *sum += value * q);
+            }
         }
-        h
     }
 
-    /// The row vector x Q.
-    fn times(&self, x: &[f64]) -> Vec<f64> {
-        let mut product = vec![0.0; self.width];
-        for (value, row) in x.iter().zip(self.inverse.chunks_exact(self.width.max(1))) {
-            product.iter_mut().zip(row).for_each(|(sum, q)| *sum += value * q);
-        }
-        product
-    }
-
-    /// x Q x^T for a vector that is zero outside `kept` and the border.
-    fn quadratic(&self, x: &[f64], kept: Range<usize>) -> f64 {
-        let border = self.border_start()..self.width;
-        let part = |i: usize| {
-            let row = &self.inverse[i * self.width..][..self.width];
-            x[i] * (dot(&row[kept.clone()], &x[kept.clone()]) + dot(&row[border.clone()], &x[border.clone()]))
-        };
-        kept.clone().map(part).sum::<f64>() + border.clone().map(part).sum::<f64>()
+    /// x Q y^T for two vectors that are zero but for the given elements from the given places on.
+    #[inline(always)]
+    fn product(&self, x: (usize, &[f64]), y: (usize, &[f64])) -> f64 {
+        let width = self.width();
+        let row = |i: usize| &self.inverse[(x.0 + i) * width + y.0..][..y.1.len()];
+        x.1.iter().enumerate().map(|(i, value)| value * dot(row(i), y.1)).sum()
     }
 }

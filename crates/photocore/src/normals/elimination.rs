@@ -9,7 +9,7 @@ use super::symbolic::Symbolic;
 ///
 /// The equations are `A x = l` with unit weight (each row divided by the standard deviation of its observation).
 pub trait Equations: Sync {
-    /// Writes the equations of one group of a local block; `rows` is zero on entry.
+    /// Writes the equations of one group of a local block, every element of `rows`.
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>);
 }
 
@@ -78,7 +78,7 @@ pub(crate) struct GroupPlace {
 /// The equations of one local block and what its elimination leaves:
 /// with N = L L^T its normal matrix, v = L^-1 n and V = L^-1 N_local,other.
 ///
-/// The reduced normal equations lose V^T V, their right-hand side V^T v; the solution is x = L^-T (v - V x_other).
+/// The reduced normal equations lose V^T V, their right-hand side V^T v.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Elimination {
     pub groups: Vec<GroupPlace>,
@@ -87,40 +87,55 @@ pub(crate) struct Elimination {
     pub local_rows: Vec<f64>,
     pub kept_rows: Vec<f64>,
     pub border_rows: Vec<f64>,
-    /// L, row by row in a 3 x 3 frame.
-    pub factor: [[f64; 3]; 3],
+    pub triangle: Triangle,
+    /// v.
     pub reduced: [f64; 3],
     pub coupling: Vec<f64>,
     pub border_coupling: Vec<f64>,
     pub sum_of_squares: f64,
     pub deficient: bool,
+    /// The unknowns of the local block, after [`Elimination::solve`].
+    pub solution: [f64; 3],
 }
 
 /// A pivot smaller than this fraction of its diagonal element before elimination is rounding error: the unknown is not determined.
-pub(crate) const PIVOT_TOLERANCE: f64 = 64.0 * f64::EPSILON;
+/// What rounding leaves of a zero pivot is some tens of units in the last place; weights that alone make a datum (GIANT's default
+/// of 60000 m for a station) leave ten times this and more.
+pub(crate) const PIVOT_TOLERANCE: f64 = 512.0 * f64::EPSILON;
+
+/// Weight and right-hand side of the prior equations of each unknown of a local block.
+pub(crate) type LocalPrior<'a> = (&'a [f64], &'a [f64]);
 
 impl Elimination {
-    /// Gathers the equations of local block `local` and eliminates its unknowns.
-    ///
-    /// `prior` holds weight and right-hand side of each of its unknowns; `damping` is added to the diagonal as a fraction of it.
-    pub fn run(
+    /// Gathers the equations of a local block.
+    #[inline(always)]
+    pub fn gather(
         &mut self,
         layout: &Layout,
         incidence: &Incidence,
         equations: &impl Equations,
         local: usize,
-        prior: (&[f64], &[f64]),
-        damping: f64,
     ) {
-        self.gather(layout, incidence, equations, local);
-        match layout.local_dim() {
-            3 => self.eliminate::<3>(layout, prior, damping),
-            2 => self.eliminate::<2>(layout, prior, damping),
-            _ => self.eliminate::<1>(layout, prior, damping),
+        let (rows, l) = (layout.rows(), layout.local_dim());
+        self.place(layout, incidence, local);
+        for slot in &self.slots {
+            for place in &self.groups[slot.first..slot.end] {
+                equations.write(
+                    local,
+                    place.group,
+                    &mut GroupRows {
+                        constant: &mut self.constants[place.constant..][..rows],
+                        local: &mut self.local_rows[place.local..][..rows * l],
+                        kept: &mut self.kept_rows[place.kept..][..rows * slot.dim],
+                        border: &mut self.border_rows[place.border..][..rows * place.border_width],
+                    },
+                );
+            }
         }
     }
 
-    fn gather(&mut self, layout: &Layout, incidence: &Incidence, equations: &impl Equations, local: usize) {
+    /// Finds the slots of a local block and the places of its groups in the buffers.
+    fn place(&mut self, layout: &Layout, incidence: &Incidence, local: usize) {
         let (rows, l) = (layout.rows(), layout.local_dim());
         self.groups.clear();
         self.slots.clear();
@@ -152,35 +167,24 @@ impl Elimination {
             kept += rows * dim;
             border += rows * border_width;
         }
-        for (buffer, length) in [
-            (&mut self.constants, constant),
-            (&mut self.local_rows, constant * l),
-            (&mut self.kept_rows, kept),
-            (&mut self.border_rows, border),
-            (&mut self.coupling, coupling),
-            (&mut self.border_coupling, l * layout.border_dim()),
-        ] {
-            buffer.clear();
-            buffer.resize(length, 0.0);
-        }
-        for slot in &self.slots {
-            for place in &self.groups[slot.first..slot.end] {
-                equations.write(
-                    local,
-                    place.group,
-                    &mut GroupRows {
-                        constant: &mut self.constants[place.constant..][..rows],
-                        local: &mut self.local_rows[place.local..][..rows * l],
-                        kept: &mut self.kept_rows[place.kept..][..rows * slot.dim],
-                        border: &mut self.border_rows[place.border..][..rows * place.border_width],
-                    },
-                );
-            }
-        }
+        self.constants.resize(constant, 0.0);
+        self.local_rows.resize(constant * l, 0.0);
+        self.kept_rows.resize(kept, 0.0);
+        self.border_rows.resize(border, 0.0);
+        self.coupling.resize(coupling, 0.0);
+        self.border_coupling.resize(l * layout.border_dim(), 0.0);
     }
 
-    fn eliminate<const L: usize>(&mut self, layout: &Layout, prior: (&[f64], &[f64]), damping: f64) {
-        let rows = layout.rows();
+    /// Eliminates the unknowns of the local block.
+    #[inline(always)]
+    pub fn eliminate<const L: usize>(&mut self, layout: &Layout, prior: LocalPrior<'_>, damping: f64) {
+        self.factor::<L>(prior, damping);
+        self.couple::<L>(layout);
+    }
+
+    /// Factors the normal matrix of the local block; `damping` is added to its diagonal as a fraction of it.
+    #[inline(always)]
+    pub fn factor<const L: usize>(&mut self, prior: LocalPrior<'_>, damping: f64) {
         let mut normal = [[0.0; L]; L];
         let mut right = [0.0; L];
         for d in 0..L {
@@ -188,7 +192,7 @@ impl Elimination {
             right[d] = prior.1[d];
         }
         self.sum_of_squares = 0.0;
-        for (row, constant) in self.local_rows.chunks_exact(L).zip(&self.constants) {
+        for (row, constant) in self.local_rows.as_chunks::<L>().0.iter().zip(&self.constants) {
             for a in 0..L {
                 right[a] += row[a] * constant;
                 for b in 0..=a {
@@ -200,122 +204,144 @@ impl Elimination {
         for d in 0..L {
             normal[d][d] *= 1.0 + damping;
         }
-        self.deficient = !cholesky(&mut normal);
-        let solve = |column: &mut [f64; L]| {
-            for a in 0..L {
-                for b in 0..a {
-                    column[a] -= normal[a][b] * column[b];
-                }
-                column[a] /= normal[a][a];
-            }
-        };
-        solve(&mut right);
-        for a in 0..L {
-            self.reduced[a] = right[a];
-            for b in 0..L {
-                self.factor[a][b] = normal[a][b];
-            }
-        }
+        self.deficient = !self.triangle.factor(&normal);
+        self.triangle.forward::<L>(&mut right, 1);
+        self.reduced[..L].copy_from_slice(&right);
+    }
+
+    /// Computes the coupling V to the kept blocks and the border.
+    #[inline(always)]
+    pub fn couple<const L: usize>(&mut self, layout: &Layout) {
+        let rows = layout.rows();
+        self.coupling.fill(0.0);
         for slot in &self.slots {
             let coupling = &mut self.coupling[slot.coupling..][..L * slot.dim];
             for place in &self.groups[slot.first..slot.end] {
                 let local = &self.local_rows[place.local..][..rows * L];
                 let kept = &self.kept_rows[place.kept..][..rows * slot.dim];
-                add_product::<L>(coupling, slot.dim, 0, local, kept, slot.dim);
+                match slot.dim {
+                    6 => add_product::<L>(coupling, 6, 0, local, kept, 6),
+                    dim => add_product::<L>(coupling, dim, 0, local, kept, dim),
+                }
             }
-            for column in 0..slot.dim {
-                let mut values = std::array::from_fn(|d| coupling[d * slot.dim + column]);
-                solve(&mut values);
-                (0..L).for_each(|d| coupling[d * slot.dim + column] = values[d]);
+            match slot.dim {
+                6 => self.triangle.forward::<L>(coupling, 6),
+                dim => self.triangle.forward::<L>(coupling, dim),
             }
         }
         let border = layout.border_dim();
+        self.border_coupling.fill(0.0);
         for place in self.groups.iter().filter(|place| place.border_width > 0) {
             let local = &self.local_rows[place.local..][..rows * L];
             let common = &self.border_rows[place.border..][..rows * place.border_width];
-            add_product::<L>(
-                &mut self.border_coupling,
-                border,
-                place.border_first,
-                local,
-                common,
-                place.border_width,
-            );
+            let (first, width) = (place.border_first, place.border_width);
+            add_product::<L>(&mut self.border_coupling, border, first, local, common, width);
         }
-        for column in 0..border {
-            let mut values = std::array::from_fn(|d| self.border_coupling[d * border + column]);
-            solve(&mut values);
-            (0..L).for_each(|d| self.border_coupling[d * border + column] = values[d]);
-        }
+        self.triangle.forward::<L>(&mut self.border_coupling, border);
     }
 
-    /// x = L^-T (v - V x_other) for the unknowns of the local block; `solution` is in the order of elimination.
-    pub fn back_substitute(&self, layout: &Layout, symbolic: &Symbolic, solution: &[f64], x: &mut [f64]) {
-        let l = layout.local_dim();
-        let mut right = self.reduced;
+    /// Solves for the local block with the others in place: N x = A^T (l - A_other x_other), without the coupling.
+    /// `solution` is in the order of elimination.
+    #[inline(always)]
+    pub fn solve<const L: usize>(
+        &mut self,
+        layout: &Layout,
+        symbolic: &Symbolic,
+        prior: LocalPrior<'_>,
+        damping: f64,
+        solution: &[f64],
+    ) {
+        self.factor::<L>(prior, damping);
+        let mut right: [f64; L] = std::array::from_fn(|d| prior.1[d]);
+        let border = &solution[solution.len() - layout.border_dim()..];
         for slot in &self.slots {
             let other = &solution[symbolic.range(slot.position)];
-            for d in 0..l {
-                right[d] -= dot(&self.coupling[slot.coupling + d * slot.dim..][..slot.dim], other);
+            for place in &self.groups[slot.first..slot.end] {
+                let common = &border[place.border_first..][..place.border_width];
+                for row in 0..layout.rows() {
+                    let kept = &self.kept_rows[place.kept + row * slot.dim..][..slot.dim];
+                    let common_row = &self.border_rows[place.border + row * place.border_width..];
+                    let left =
+                        self.constants[place.constant + row] - dot(kept, other) - dot(common_row, common);
+                    let own = &self.local_rows[place.local + row * L..][..L];
+                    (0..L).for_each(|d| right[d] += own[d] * left);
+                }
             }
         }
-        let border = layout.border_dim();
-        let common = &solution[solution.len() - border..];
-        for d in 0..l {
-            right[d] -= dot(&self.border_coupling[d * border..][..border], common);
+        self.triangle.forward::<L>(&mut right, 1);
+        self.triangle.backward::<L>(&mut right, 1);
+        self.solution[..L].copy_from_slice(&right);
+    }
+}
+
+/// The Cholesky factor L of a small matrix, with the reciprocals of its diagonal.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Triangle {
+    values: [[f64; 3]; 3],
+}
+
+impl Triangle {
+    /// Factors the lower triangle of a matrix; false when a pivot is lost in rounding (one then stands in its place).
+    #[inline(always)]
+    fn factor<const N: usize>(&mut self, matrix: &[[f64; N]; N]) -> bool {
+        let mut regular = true;
+        let l = &mut self.values;
+        for j in 0..N {
+            let mut pivot = matrix[j][j];
+            for k in 0..j {
+                pivot -= l[j][k] * l[j][k];
+            }
+            if !matches!(pivot.partial_cmp(&(PIVOT_TOLERANCE * matrix[j][j])), Some(Greater)) {
+                regular = false;
+                pivot = 1.0;
+            }
+            l[j][j] = pivot.sqrt().recip();
+            for i in j + 1..N {
+                let mut value = matrix[i][j];
+                for k in 0..j {
+                    value -= l[i][k] * l[j][k];
+                }
+                l[i][j] = value * l[j][j];
+            }
         }
-        self.solve_transposed(&mut right, l);
-        x.copy_from_slice(&right[..l]);
+        regular
     }
 
-    /// Replaces x by N^-1 x = L^-T L^-1 x.
-    pub fn solve_normal(&self, x: &mut [f64; 3], l: usize) {
-        for a in 0..l {
+    /// Replaces a matrix of N rows of the given width by L^-1 times it.
+    #[inline(always)]
+    pub fn forward<const N: usize>(&self, matrix: &mut [f64], width: usize) {
+        for a in 0..N {
+            let (above, row) = matrix[..(a + 1) * width].split_at_mut(a * width);
             for b in 0..a {
-                x[a] -= self.factor[a][b] * x[b];
+                subtract_row(row, self.values[a][b], &above[b * width..][..width]);
             }
-            x[a] /= self.factor[a][a];
+            row.iter_mut().for_each(|value| *value *= self.values[a][a]);
         }
-        self.solve_transposed(x, l);
     }
 
-    /// Replaces x by L^-T x.
-    pub fn solve_transposed(&self, x: &mut [f64; 3], l: usize) {
-        for a in (0..l).rev() {
-            for b in a + 1..l {
-                x[a] -= self.factor[b][a] * x[b];
+    /// Replaces a matrix of N rows of the given width by L^-T times it.
+    #[inline(always)]
+    pub fn backward<const N: usize>(&self, matrix: &mut [f64], width: usize) {
+        for a in (0..N).rev() {
+            let (row, below) = matrix[a * width..].split_at_mut(width);
+            for b in a + 1..N {
+                subtract_row(row, self.values[b][a], &below[(b - a - 1) * width..][..width]);
             }
-            x[a] /= self.factor[a][a];
+            row.iter_mut().for_each(|value| *value *= self.values[a][a]);
         }
     }
 }
 
-/// Cholesky factor in place of the lower triangle; false when a pivot is lost in rounding (it is then replaced by one).
-fn cholesky<const L: usize>(n: &mut [[f64; L]; L]) -> bool {
-    let mut regular = true;
-    for j in 0..L {
-        let diagonal = n[j][j];
-        for k in 0..j {
-            n[j][j] -= n[j][k] * n[j][k];
-        }
-        let lost = !matches!(n[j][j].partial_cmp(&(PIVOT_TOLERANCE * diagonal)), Some(Greater));
-        if lost {
-            regular = false;
-            n[j][j] = 1.0;
-        }
-        n[j][j] = n[j][j].sqrt();
-        for i in j + 1..L {
-            for k in 0..j {
-                n[i][j] -= n[i][k] * n[j][k];
-            }
-            n[i][j] /= n[j][j];
-        }
+/// row -= factor * other.
+#[inline(always)]
+fn subtract_row(row: &mut [f64], factor: f64, other: &[f64]) {
+    for (value, other) in row.iter_mut().zip(other) {
+        *value -= factor * other;
     }
-    regular
 }
 
 /// target[d][first + c] += sum over rows of local[row][d] * other[row][c].
-#[inline]
+#[inline(always)]
 fn add_product<const L: usize>(
     target: &mut [f64],
     stride: usize,
@@ -333,6 +359,7 @@ fn add_product<const L: usize>(
     }
 }
 
+#[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -3,10 +3,11 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use pulp::Arch;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::elimination::{Elimination, Equations, Incidence, Slot};
+use super::elimination::{Elimination, Equations, Incidence, LocalPrior, Slot};
 use super::floors::skip;
 use super::layout::Layout;
 use super::panels::Panels;
@@ -41,6 +42,8 @@ pub type Between<'a> = &'a mut dyn FnMut(usize) -> ControlFlow<()>;
 
 /// Local blocks worked on at a time: enough to keep all processors busy, few enough to stay in the cache.
 const BATCH: usize = 1024;
+/// Local blocks that a thread takes at a time.
+const CHUNK: usize = 32;
 
 /// A system ready to be formed again and again: the pattern and the order are found once.
 #[derive(Debug)]
@@ -68,31 +71,37 @@ impl System {
         &self.symbolic
     }
 
-    /// Eliminates every local block, batch by batch, and hands each batch on in order.
+    /// Gathers every local block, batch by batch, has `each` worked on, on several threads, and hands the batches on in order.
     ///
     /// Stops early when `between`, called before each batch with the number of local blocks done, breaks.
-    pub(crate) fn eliminate_all<E: Equations>(
+    pub(crate) fn for_locals<E: Equations>(
         &self,
         pool: &ThreadPool,
         equations: &E,
         prior: &Prior,
-        damping: f64,
         between: Between<'_>,
+        each: impl Fn(&mut Elimination, LocalPrior<'_>) + Sync,
         mut batch_done: impl FnMut(usize, &[Elimination]),
     ) -> ControlFlow<()> {
         let layout = &self.layout;
+        let arch = Arch::new();
         let mut batch: Vec<Elimination> = vec![Elimination::default(); BATCH.min(layout.locals())];
         for first in (0..layout.locals()).step_by(BATCH) {
             between(first)?;
             let count = BATCH.min(layout.locals() - first);
-            let eliminations = &mut batch[..count];
-            pool.install(|| {
-                eliminations.par_iter_mut().with_min_len(32).enumerate().for_each(|(i, elimination)| {
-                    let range = layout.local_range(first + i);
-                    let prior = (&prior.weight[range.clone()], &prior.right[range]);
-                    elimination.run(layout, &self.incidence, equations, first + i, prior, damping);
+            let work = |(chunk, eliminations): (usize, &mut [Elimination])| {
+                // Compiled for the vector instructions of the machine that it runs on.
+                arch.dispatch(|| {
+                    for (i, elimination) in eliminations.iter_mut().enumerate() {
+                        let local = first + chunk * CHUNK + i;
+                        let range = layout.local_range(local);
+                        elimination.gather(layout, &self.incidence, equations, local);
+                        each(elimination, (&prior.weight[range.clone()], &prior.right[range]));
+                    }
                 });
-            });
+            };
+            let eliminations = &mut batch[..count];
+            pool.install(|| eliminations.par_chunks_mut(CHUNK).enumerate().for_each(work));
             batch_done(first, eliminations);
         }
         ControlFlow::Continue(())
@@ -117,7 +126,12 @@ impl System {
             local_decrease: 0.0,
             deficient_locals: Vec::new(),
         };
-        let formed = self.eliminate_all(pool, equations, prior, damping, between, |first, batch| {
+        let eliminate = |e: &mut Elimination, prior: LocalPrior<'_>| match self.layout.local_dim() {
+            3 => e.eliminate::<3>(&self.layout, prior, damping),
+            2 => e.eliminate::<2>(&self.layout, prior, damping),
+            _ => e.eliminate::<1>(&self.layout, prior, damping),
+        };
+        let formed = self.for_locals(pool, equations, prior, between, eliminate, |first, batch| {
             for (i, elimination) in batch.iter().enumerate() {
                 normals.sum_of_squares += elimination.sum_of_squares;
                 normals.local_decrease += elimination.reduced.iter().map(|v| v * v).sum::<f64>();
@@ -154,10 +168,13 @@ impl System {
                 list.push(if index % tasks == task { columns.take() } else { None });
             }
         }
+        let arch = Arch::new();
         let accumulate = |columns: &mut Vec<Option<Columns<'_>>>| {
-            for elimination in batch {
-                self.add_elimination(elimination, columns);
-            }
+            arch.dispatch(|| {
+                for elimination in batch {
+                    self.add_elimination(elimination, columns);
+                }
+            });
         };
         if tasks == 1 {
             owned.iter_mut().for_each(accumulate);
@@ -167,6 +184,7 @@ impl System {
     }
 
     /// Adds what one eliminated local block leaves to the columns that a task owns.
+    #[inline(always)]
     fn add_elimination(&self, e: &Elimination, columns: &mut [Option<Columns<'_>>]) {
         let symbolic = &*self.symbolic;
         let l = self.layout.local_dim();
@@ -237,6 +255,7 @@ struct Columns<'a> {
 
 impl Columns<'_> {
     /// Adds A^T A and A^T l of the groups of a slot, A being the coefficients of its kept block.
+    #[inline(always)]
     fn add_own_block(&mut self, e: &Elimination, slot: &Slot, rows: usize, height: usize, first: usize) {
         for place in &e.groups[slot.first..slot.end] {
             let kept = &e.kept_rows[place.kept..][..rows * slot.dim];
@@ -273,8 +292,16 @@ impl Columns<'_> {
 }
 
 /// target[i, j] += sum over rows of a[row][i] b[row][j]; the target is column by column with the given stride.
-#[inline]
+#[inline(always)]
 fn add(target: &mut [f64], stride: usize, a: &[f64], na: usize, b: &[f64], nb: usize) {
+    match (na, nb) {
+        (6, 6) => add_sized(target, stride, a, 6, b, 6),
+        _ => add_sized(target, stride, a, na, b, nb),
+    }
+}
+
+#[inline(always)]
+fn add_sized(target: &mut [f64], stride: usize, a: &[f64], na: usize, b: &[f64], nb: usize) {
     for (row_a, row_b) in a.chunks_exact(na).zip(b.chunks_exact(nb)) {
         for (j, value) in row_b.iter().enumerate() {
             for (sum, x) in target[j * stride..][..na].iter_mut().zip(row_a) {
@@ -285,7 +312,7 @@ fn add(target: &mut [f64], stride: usize, a: &[f64], na: usize, b: &[f64], nb: u
 }
 
 /// target[i, j] -= sum over d of a[d][i] b[d][j]: the 108 multiply-adds of each pair of photographs that share a point.
-#[inline]
+#[inline(always)]
 fn subtract(target: &mut [f64], stride: usize, a: &[f64], na: usize, b: &[f64], nb: usize, depth: usize) {
     // The common sizes are compiled for themselves: constant bounds let the compiler unroll and vectorise.
     match (depth, na, nb) {

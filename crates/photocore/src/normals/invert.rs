@@ -30,9 +30,31 @@ impl SelectedInverse {
         self.panels.for_block(row, column, |i, j, value| values[i * columns + j] = value).then_some(values)
     }
 
-    /// Writes block (row, column) into a larger matrix, row by row with the given stride.
-    pub(crate) fn write_block(&self, row: usize, column: usize, target: &mut [f64], stride: usize) {
-        self.panels.for_block(row, column, |i, j, value| target[i * stride + j] = value);
+    /// Writes the inverse over blocks at ascending positions, all coupled to each other, into a full square matrix in which
+    /// they begin at `start` (one more at the end, its width).
+    #[inline(always)]
+    pub(crate) fn gather(&self, positions: &[usize], start: &[usize], target: &mut [f64]) {
+        let symbolic = &*self.panels.symbolic;
+        let width = start[positions.len()];
+        for (column, &position) in positions.iter().enumerate() {
+            let supernode = symbolic.supernode_of(position);
+            let s = &symbolic.supernodes()[supernode];
+            let panel = &self.panels.values[s.panel.clone()];
+            let first = symbolic.range(position).start - symbolic.first_unknown(supernode);
+            for row in column..positions.len() {
+                // Every pair that shares a local block is in the pattern.
+                let Some(from) = symbolic.panel_row(supernode, positions[row]) else { continue };
+                for j in 0..start[column + 1] - start[column] {
+                    let values = &panel[(first + j) * s.height() + from..][..start[row + 1] - start[row]];
+                    let skip = if row == column { j } else { 0 };
+                    for (i, &value) in values.iter().enumerate().skip(skip) {
+                        let (low, high) = (start[row] + i, start[column] + j);
+                        target[low * width + high] = value;
+                        target[high * width + low] = value;
+                    }
+                }
+            }
+        }
     }
 }
 

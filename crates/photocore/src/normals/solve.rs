@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use rayon::ThreadPool;
 
-use super::elimination::{Equations, dot};
+use super::elimination::{Elimination, Equations, LocalPrior, dot};
 use super::factor::Factor;
 use super::form::{Between, Prior, System};
 
@@ -37,11 +37,16 @@ impl System {
             let range = symbolic.unknowns_at(layout, position);
             values[range].copy_from_slice(&reduced[symbolic.range(position)]);
         }
+        let back_substitute = |e: &mut Elimination, prior: LocalPrior<'_>| match layout.local_dim() {
+            3 => e.solve::<3>(layout, symbolic, prior, damping, &reduced),
+            2 => e.solve::<2>(layout, symbolic, prior, damping, &reduced),
+            _ => e.solve::<1>(layout, symbolic, prior, damping, &reduced),
+        };
         let locals = &mut values[layout.all_locals()];
-        self.eliminate_all(pool, equations, prior, damping, between, |first, batch| {
-            let own = &mut locals[first * layout.local_dim()..];
-            for (elimination, x) in batch.iter().zip(own.chunks_exact_mut(layout.local_dim())) {
-                elimination.back_substitute(layout, symbolic, &reduced, x);
+        self.for_locals(pool, equations, prior, between, back_substitute, |first, batch| {
+            let own = locals[first * layout.local_dim()..].chunks_exact_mut(layout.local_dim());
+            for (elimination, x) in batch.iter().zip(own) {
+                x.copy_from_slice(&elimination.solution[..x.len()]);
             }
         })?;
         ControlFlow::Continue(Solution { values, decrease })

@@ -40,6 +40,7 @@ impl Model for CentralPerspective {
         Stations { photos: photos.collect(), points: points.collect() }
     }
 
+    #[inline(always)]
     fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let image = &self.images[group];
         let projection = stations.photos[image.photo].linearize(&stations.points[local]);
