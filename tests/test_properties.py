@@ -450,14 +450,24 @@ def test_turning_the_earth_changes_nothing(turn):
 # Coarse starts
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_starts_fifteen_degrees_off_converge(seed):
+    start = {"attitude_error": math.radians(15), "position_error": 200.0}
+    simulation = simulate(strips=2, photos_per_strip=4, points_per_photo=30, seed=seed, **start)
+    result = adjust(simulation.block)
+    assert result.converged
+    errors = np.abs(result.photo_positions - simulation.truth.photo_positions) / result.photo_sd[:, :3]
+    assert errors.max() < 5
+
+
 def test_step_control_converges_where_full_steps_diverge():
     simulation = simulate(
         strips=2,
         photos_per_strip=4,
         points_per_photo=30,
-        attitude_error=math.radians(15),
+        attitude_error=math.radians(20),
         position_error=200.0,
-        seed=2,
+        seed=5,
     )
     truth = simulation.truth
     controlled = adjust(simulation.block)

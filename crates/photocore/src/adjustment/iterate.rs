@@ -226,6 +226,9 @@ const ROUNDING: f64 = 1e-12;
 /// it lowers the sum of squares by less than the square of this, which may drown in the rounding errors of the computed
 /// observations (geocentric coordinates are good to a nanometre only).
 const NEGLIGIBLE: f64 = 1e-3;
+/// A step that changes the unknowns by more than this multiple of their standard deviations, in the mean, is so long that local
+/// unknowns are better computed afresh than linearized.
+const FAR: f64 = 30.0;
 /// First damping after a step that failed; it falls by ten after a success, and below [`LEAST_DAMPING`] to zero.
 const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-5;
@@ -254,9 +257,10 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 let last = Some((iteration, solved.step));
                 return Ok(End { status: Status::Converged, unknowns, basis: Some(solved.basis), last });
             }
-            let trial = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
+            let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
             let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
-            let next = self.form(trial, relaxed)?;
+            let far = solved.change > FAR * (unknowns.len() as f64).sqrt();
+            let next = self.form(if far { self.relocated(trial) } else { trial }, relaxed)?;
             let negligible = damping == 0.0 && solved.change <= NEGLIGIBLE;
             let highest = if negligible { f64::MAX } else { best * (1.0 + ROUNDING) };
             // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
@@ -270,6 +274,17 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
         let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
         self.stay(state, status)
+    }
+
+    /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.
+    fn relocated(&self, unknowns: Vec<f64>) -> Vec<f64> {
+        let mut other = unknowns.clone();
+        let sum = |values: &[f64]| {
+            let residuals = self.problem.residuals(self.pool, values);
+            self.problem.sum_of_squares(&residuals) + self.problem.prior_sum_of_squares(values)
+        };
+        let lower = self.problem.model.relocate(&mut other) && sum(&other) < sum(&unknowns);
+        if lower { other } else { unknowns }
     }
 
     /// The iteration of the 1987 program: full steps until the sum of squares changes by less than `percent`.

@@ -13,6 +13,12 @@ pub trait Model: Sync {
     /// Writes observed minus computed, and the partials of the computed values, of one group of observations of a local
     /// block, in the units of observations and unknowns.
     fn observe(&self, prepared: &Self::Prepared, local: usize, group: usize, rows: &mut GroupRows<'_>);
+
+    /// Computes the local unknowns afresh from the others, where the model knows how; false where it does not. Far from the
+    /// solution this often leads back into the region where linearized steps do.
+    fn relocate(&self, _unknowns: &mut [f64]) -> bool {
+        false
+    }
 }
 
 /// A model with everything that is known beforehand.

@@ -1,6 +1,6 @@
-//! Initial coordinates of points: the intersection of their rays from the initial photographs.
+//! Coordinates of points by intersection of their rays from given photographs.
 
-use super::{Block, BlockError, PointImages};
+use super::model::CentralPerspective;
 use crate::geometry::vector::{difference, dot, solve};
 use crate::geometry::{Photo, Point, Ray, Vector3};
 
@@ -8,30 +8,24 @@ use crate::geometry::{Photo, Point, Ray, Vector3};
 /// (about a hundredth of a degree between two rays).
 const PARALLEL: f64 = 1e-8;
 
-impl Block {
-    /// Initial coordinates of the points that take part: held components as they are, the others where the rays meet.
+impl CentralPerspective {
+    /// Coordinates of all points from given photographs: held components as they are, the others where the rays meet.
     ///
-    /// Rays from coarse photographs may be parallel or meet behind a camera; such a point starts on its first ray, as far out
+    /// Rays from coarse photographs may be parallel or meet behind a camera; such a point stands on its first ray, as far out
     /// as the median of the others.
-    pub(super) fn initial_coordinates(
-        &self,
-        points: &[usize],
-        images: &PointImages,
-    ) -> Result<Vec<Vector3>, BlockError> {
-        let photos: Vec<Photo> = self
-            .photos
-            .iter()
-            .map(|p| Photo::new(self.space, self.sense, p.position, p.attitude, p.principal_distance))
-            .collect();
-        let rays_of = |index: usize| -> Vec<Ray> {
-            let own = &images.order[images.start[index]..images.start[index + 1]];
-            own.iter().map(|&image| photos[self.images[image].photo].ray(self.images[image].xy)).collect()
+    ///
+    /// # Errors
+    /// The point whose rays give it no place.
+    pub fn intersect(&self, photos: &[Photo]) -> Result<Vec<Vector3>, usize> {
+        let rays_of = |point: usize| -> Vec<Ray> {
+            let own = &self.images[self.start[point]..self.start[point + 1]];
+            own.iter().map(|image| photos[image.photo].ray(image.xy)).collect()
         };
-        let met: Vec<Option<Vector3>> = (0..points.len()).map(|index| meet(&rays_of(index))).collect();
+        let met: Vec<Option<Vector3>> = (0..self.points.len()).map(|point| meet(&rays_of(point))).collect();
         let distance = median_distance(&met, rays_of);
-        let mut coordinates = Vec::with_capacity(points.len());
-        for (index, (&point, met)) in points.iter().zip(met).enumerate() {
-            let rays = rays_of(index);
+        let mut coordinates = Vec::with_capacity(self.points.len());
+        for (point, met) in met.into_iter().enumerate() {
+            let rays = rays_of(point);
             let start = match (met, distance) {
                 (Some(position), _) => self.space.coordinates(position),
                 (None, Some(distance)) => self.space.coordinates(along(&rays[0], distance)),
@@ -39,7 +33,7 @@ impl Block {
             };
             let placed = self.hold(point, start, &rays);
             if placed.iter().any(|value| !value.is_finite()) {
-                return Err(BlockError::NoIntersection(point));
+                return Err(point);
             }
             coordinates.push(placed);
         }
@@ -51,10 +45,12 @@ impl Block {
     fn hold(&self, point: usize, start: Vector3, rays: &[Ray]) -> Vector3 {
         let point = &self.points[point];
         let held = point.held();
+        // One ray and two held components need no start for the third.
+        let unknown = if held.contains(&true) { 0.0 } else { f64::NAN };
         let mut coordinates = std::array::from_fn(|k| match (held[k], start[k].is_finite()) {
             (true, _) => point.coordinates[k],
             (false, true) => start[k],
-            (false, false) => 0.0,
+            (false, false) => unknown,
         });
         if held == [false; 3] || held == [true; 3] {
             return coordinates;

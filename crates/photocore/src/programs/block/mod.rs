@@ -157,9 +157,8 @@ impl Block {
         if points.is_empty() {
             return Err(BlockError::Empty);
         }
-        let coordinates = self.initial_coordinates(&points, &images)?;
         let origin = self.origin();
-        let problem = self.problem(options, &points, &images, &coordinates, origin)?;
+        let problem = self.problem(options, &points, images, origin)?;
         let adjusted =
             adjustment::adjust(&problem, &options.adjustment, pool, watch).map_err(|error| match error {
                 AdjustError::UndeterminedLocals(locals) => {
@@ -191,38 +190,43 @@ impl Block {
         &self,
         options: &Options,
         points: &[usize],
-        images: &PointImages,
-        coordinates: &[Vector3],
+        images: PointImages,
         origin: Vector3,
     ) -> Result<Problem<CentralPerspective>, BlockError> {
-        let photo_of = images.order.iter().map(|&image| self.images[image].photo as u32).collect();
-        let layout = Layout::new(2, 3, &vec![6; self.photos.len()], images.start.clone(), photo_of)?;
-        let (mut initial, mut prior, mut sd) = (Vec::new(), Vec::new(), Vec::new());
-        for (&point, start) in points.iter().zip(coordinates) {
-            for k in 0..3 {
-                initial.push(start[k] - origin[k]);
-                prior.push(self.points[point].coordinates[k] - origin[k]);
-                sd.push(self.points[point].sd[k]);
-            }
-        }
-        for photo in &self.photos {
-            let values = (0..3).map(|k| photo.position[k] - origin[k]).chain(photo.attitude);
-            initial.extend(values.clone());
-            prior.extend(values);
-            sd.extend(photo.position_sd.into_iter().chain(photo.attitude_sd));
-        }
-        let own: Vec<Image> = images.order.iter().map(|&image| self.images[image]).collect();
-        let observation_sd = own.iter().flat_map(|image| image.sd).collect();
+        let PointImages { start, order } = images;
+        let local = |values: Vector3| -> Vector3 { std::array::from_fn(|k| values[k] - origin[k]) };
+        let local_point = |&point: &usize| {
+            let Point { coordinates, sd } = self.points[point];
+            Point { coordinates: local(coordinates), sd }
+        };
         let model = CentralPerspective {
             space: self.space,
             sense: self.sense,
             principal_distances: self.photos.iter().map(|photo| photo.principal_distance).collect(),
-            points: points.len(),
-            images: own,
-            order: images.order.clone(),
+            points: points.iter().map(local_point).collect(),
+            images: order.iter().map(|&image| self.images[image]).collect(),
+            start,
+            order,
         };
-        let system = System::new(layout, options.ordering);
-        Ok(Problem { model, system, observation_sd, initial, prior, sd })
+        let photo_values = |photo: &Photo| [local(photo.position), photo.attitude];
+        let photo_sd = |photo: &Photo| [photo.position_sd, photo.attitude_sd];
+        let photos =
+            self.photos.iter().map(photo_values).collect::<Vec<_>>().into_flattened().into_flattened();
+        let met = model.intersect(&model.photos(&photos));
+        let coordinates = met.map_err(|point| BlockError::NoIntersection(points[point]))?;
+        let own: Vec<Vector3> = model.points.iter().map(|point| point.coordinates).collect();
+        let own_sd = model.points.iter().map(|point| point.sd);
+        let sd = own_sd.chain(self.photos.iter().flat_map(photo_sd)).flatten().collect();
+        let photo_of = model.images.iter().map(|image| image.photo as u32).collect();
+        let layout = Layout::new(2, 3, &vec![6; self.photos.len()], model.start.clone(), photo_of)?;
+        Ok(Problem {
+            observation_sd: model.images.iter().flat_map(|image| image.sd).collect(),
+            system: System::new(layout, options.ordering),
+            initial: [coordinates.into_flattened(), photos.clone()].concat(),
+            prior: [own.into_flattened(), photos].concat(),
+            sd,
+            model,
+        })
     }
 }
 

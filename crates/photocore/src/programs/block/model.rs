@@ -12,10 +12,12 @@ pub struct CentralPerspective {
     pub sense: RotationSense,
     /// Of each photograph, in millimetres.
     pub principal_distances: Vec<f64>,
-    /// Number of points, the local blocks.
-    pub points: usize,
+    /// The points, the local blocks; coordinates counted from the local origin.
+    pub points: Vec<super::Point>,
     /// The images, point by point: the groups of observations.
     pub images: Vec<Image>,
+    /// The images of point i are `images[start[i]..start[i + 1]]`.
+    pub start: Vec<usize>,
     /// Index of each of them in the block.
     pub order: Vec<usize>,
 }
@@ -27,17 +29,32 @@ pub struct Stations {
     points: Vec<Point>,
 }
 
+impl CentralPerspective {
+    /// The photographs at given values of their unknowns, six each.
+    pub fn photos(&self, unknowns: &[f64]) -> Vec<Photo> {
+        let photos = unknowns.as_chunks().0.iter().zip(&self.principal_distances);
+        let photo = |(&[x, y, z, omega, phi, kappa], &principal_distance): (&[f64; 6], &f64)| {
+            Photo::new(self.space, self.sense, [x, y, z], [omega, phi, kappa], principal_distance)
+        };
+        photos.map(photo).collect()
+    }
+}
+
 impl Model for CentralPerspective {
     type Prepared = Stations;
 
     fn prepare(&self, unknowns: &[f64]) -> Stations {
-        let (points, photos) = unknowns.split_at(3 * self.points);
+        let (points, photos) = unknowns.split_at(3 * self.points.len());
         let points = points.as_chunks().0.iter().map(|&coordinates| Point::new(self.space, coordinates));
-        let photos = photos.as_chunks().0.iter().zip(&self.principal_distances);
-        let photos = photos.map(|(&[x, y, z, omega, phi, kappa], &principal_distance)| {
-            Photo::new(self.space, self.sense, [x, y, z], [omega, phi, kappa], principal_distance)
-        });
-        Stations { photos: photos.collect(), points: points.collect() }
+        Stations { photos: self.photos(photos), points: points.collect() }
+    }
+
+    /// Intersects the points anew.
+    fn relocate(&self, unknowns: &mut [f64]) -> bool {
+        let (points, photos) = unknowns.split_at_mut(3 * self.points.len());
+        let Ok(coordinates) = self.intersect(&self.photos(photos)) else { return false };
+        points.copy_from_slice(coordinates.as_flattened());
+        true
     }
 
     #[inline(always)]
