@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::elimination::{Elimination, Equations, LocalPrior, dot};
 use super::floors::skip;
-use super::form::{Between, Prior, System};
 use super::invert::SelectedInverse;
+use super::system::{Between, Prior, System};
 
 /// Cofactors: the inverse normal matrix where it is needed. All blocks are square, row by row.
 #[derive(Debug, Clone)]
@@ -46,11 +46,7 @@ impl System {
             equations: vec![0.0; layout.groups() * rows],
         };
         let (mut local_rest, mut rest) = (&mut result.local[..], &mut result.equations[..]);
-        let eliminate = |e: &mut Elimination, prior: LocalPrior<'_>| match l {
-            3 => e.eliminate::<3>(layout, prior, 0.0),
-            2 => e.eliminate::<2>(layout, prior, 0.0),
-            _ => e.eliminate::<1>(layout, prior, 0.0),
-        };
+        let eliminate = |e: &mut Elimination, prior: LocalPrior<'_>| e.eliminate(layout, prior, 0.0);
         let arch = Arch::new();
         let done = self.for_locals(pool, equations, prior, between, eliminate, |first, batch| {
             let mut work = Vec::with_capacity(batch.len());
@@ -65,11 +61,7 @@ impl System {
                     |others, (elimination, first_group, local, equations)| {
                         arch.dispatch(|| {
                             others.gather(self, elimination, inverse);
-                            match l {
-                                3 => others.cofactors::<3>(self, elimination, first_group, local, equations),
-                                2 => others.cofactors::<2>(self, elimination, first_group, local, equations),
-                                _ => others.cofactors::<1>(self, elimination, first_group, local, equations),
-                            }
+                            others.cofactors(self, elimination, first_group, local, equations);
                         });
                     },
                 );
@@ -132,7 +124,23 @@ impl Others {
     /// With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and
     /// a Q a^T for each equation.
     #[inline(always)]
-    fn cofactors<const L: usize>(
+    fn cofactors(
+        &mut self,
+        system: &System,
+        e: &Elimination,
+        first_group: usize,
+        local: &mut [f64],
+        equations: &mut [f64],
+    ) {
+        match system.layout.local_dim() {
+            3 => self.cofactors_sized::<3>(system, e, first_group, local, equations),
+            2 => self.cofactors_sized::<2>(system, e, first_group, local, equations),
+            _ => self.cofactors_sized::<1>(system, e, first_group, local, equations),
+        }
+    }
+
+    #[inline(always)]
+    fn cofactors_sized<const L: usize>(
         &mut self,
         system: &System,
         e: &Elimination,

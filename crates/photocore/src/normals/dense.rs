@@ -8,7 +8,7 @@ use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
-use super::elimination::PIVOT_TOLERANCE;
+use super::triangle::PIVOT_TOLERANCE;
 
 /// Columns factored at a time.
 const STEP: usize = 48;

@@ -1,9 +1,8 @@
 //! One local block: its equations gathered, its unknowns eliminated.
 
-use std::cmp::Ordering::Greater;
-
 use super::layout::Layout;
 use super::symbolic::Symbolic;
+use super::triangle::Triangle;
 
 /// Where the equations of a system come from.
 ///
@@ -98,11 +97,6 @@ pub(crate) struct Elimination {
     pub solution: [f64; 3],
 }
 
-/// A pivot smaller than this fraction of its diagonal element before elimination is rounding error: the unknown is not determined.
-/// What rounding leaves of a zero pivot is some tens of units in the last place; weights that alone make a datum (GIANT's default
-/// of 60000 m for a station) leave ten times this and more.
-pub(crate) const PIVOT_TOLERANCE: f64 = 512.0 * f64::EPSILON;
-
 /// Weight and right-hand side of the prior equations of each unknown of a local block.
 pub(crate) type LocalPrior<'a> = (&'a [f64], &'a [f64]);
 
@@ -177,14 +171,26 @@ impl Elimination {
 
     /// Eliminates the unknowns of the local block.
     #[inline(always)]
-    pub fn eliminate<const L: usize>(&mut self, layout: &Layout, prior: LocalPrior<'_>, damping: f64) {
-        self.factor::<L>(prior, damping);
-        self.couple::<L>(layout);
+    pub fn eliminate(&mut self, layout: &Layout, prior: LocalPrior<'_>, damping: f64) {
+        match layout.local_dim() {
+            3 => {
+                self.factor::<3>(prior, damping);
+                self.couple::<3>(layout);
+            }
+            2 => {
+                self.factor::<2>(prior, damping);
+                self.couple::<2>(layout);
+            }
+            _ => {
+                self.factor::<1>(prior, damping);
+                self.couple::<1>(layout);
+            }
+        }
     }
 
     /// Factors the normal matrix of the local block; `damping` is added to its diagonal as a fraction of it.
     #[inline(always)]
-    pub fn factor<const L: usize>(&mut self, prior: LocalPrior<'_>, damping: f64) {
+    fn factor<const L: usize>(&mut self, prior: LocalPrior<'_>, damping: f64) {
         let mut normal = [[0.0; L]; L];
         let mut right = [0.0; L];
         for d in 0..L {
@@ -211,7 +217,7 @@ impl Elimination {
 
     /// Computes the coupling V to the kept blocks and the border.
     #[inline(always)]
-    pub fn couple<const L: usize>(&mut self, layout: &Layout) {
+    fn couple<const L: usize>(&mut self, layout: &Layout) {
         let rows = layout.rows();
         self.coupling.fill(0.0);
         for slot in &self.slots {
@@ -243,7 +249,23 @@ impl Elimination {
     /// Solves for the local block with the others in place: N x = A^T (l - A_other x_other), without the coupling.
     /// `solution` is in the order of elimination.
     #[inline(always)]
-    pub fn solve<const L: usize>(
+    pub fn solve(
+        &mut self,
+        layout: &Layout,
+        symbolic: &Symbolic,
+        prior: LocalPrior<'_>,
+        damping: f64,
+        solution: &[f64],
+    ) {
+        match layout.local_dim() {
+            3 => self.solve_sized::<3>(layout, symbolic, prior, damping, solution),
+            2 => self.solve_sized::<2>(layout, symbolic, prior, damping, solution),
+            _ => self.solve_sized::<1>(layout, symbolic, prior, damping, solution),
+        }
+    }
+
+    #[inline(always)]
+    fn solve_sized<const L: usize>(
         &mut self,
         layout: &Layout,
         symbolic: &Symbolic,
@@ -271,72 +293,6 @@ impl Elimination {
         self.triangle.forward::<L>(&mut right, 1);
         self.triangle.backward::<L>(&mut right, 1);
         self.solution[..L].copy_from_slice(&right);
-    }
-}
-
-/// The Cholesky factor L of a small matrix, with the reciprocals of its diagonal.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Triangle {
-    values: [[f64; 3]; 3],
-}
-
-impl Triangle {
-    /// Factors the lower triangle of a matrix; false when a pivot is lost in rounding (one then stands in its place).
-    #[inline(always)]
-    fn factor<const N: usize>(&mut self, matrix: &[[f64; N]; N]) -> bool {
-        let mut regular = true;
-        let l = &mut self.values;
-        for j in 0..N {
-            let mut pivot = matrix[j][j];
-            for k in 0..j {
-                pivot -= l[j][k] * l[j][k];
-            }
-            if !matches!(pivot.partial_cmp(&(PIVOT_TOLERANCE * matrix[j][j])), Some(Greater)) {
-                regular = false;
-                pivot = 1.0;
-            }
-            l[j][j] = pivot.sqrt().recip();
-            for i in j + 1..N {
-                let mut value = matrix[i][j];
-                for k in 0..j {
-                    value -= l[i][k] * l[j][k];
-                }
-                l[i][j] = value * l[j][j];
-            }
-        }
-        regular
-    }
-
-    /// Replaces a matrix of N rows of the given width by L^-1 times it.
-    #[inline(always)]
-    pub fn forward<const N: usize>(&self, matrix: &mut [f64], width: usize) {
-        for a in 0..N {
-            let (above, row) = matrix[..(a + 1) * width].split_at_mut(a * width);
-            for b in 0..a {
-                subtract_row(row, self.values[a][b], &above[b * width..][..width]);
-            }
-            row.iter_mut().for_each(|value| *value *= self.values[a][a]);
-        }
-    }
-
-    /// Replaces a matrix of N rows of the given width by L^-T times it.
-    #[inline(always)]
-    pub fn backward<const N: usize>(&self, matrix: &mut [f64], width: usize) {
-        for a in (0..N).rev() {
-            let (row, below) = matrix[a * width..].split_at_mut(width);
-            for b in a + 1..N {
-                subtract_row(row, self.values[b][a], &below[(b - a - 1) * width..][..width]);
-            }
-            row.iter_mut().for_each(|value| *value *= self.values[a][a]);
-        }
-    }
-}
-
-/// row -= factor * other.
-#[inline(always)]
-fn subtract_row(row: &mut [f64], factor: f64, other: &[f64]) {
-    for (value, other) in row.iter_mut().zip(other) {
-        *value -= factor * other;
     }
 }
 

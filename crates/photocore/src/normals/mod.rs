@@ -22,13 +22,16 @@ mod ordering;
 mod panels;
 mod solve;
 mod symbolic;
+mod system;
+mod triangle;
 
 pub use cofactors::Cofactors;
 pub use elimination::{Equations, GroupRows};
 pub use factor::{Deficiency, Factor};
-pub use form::{Between, Normals, Prior, System};
+pub use form::Normals;
 pub use invert::SelectedInverse;
 pub use layout::{Layout, LayoutError};
 pub use ordering::{Graph, Ordering};
 pub use solve::Solution;
 pub use symbolic::{Operations, Symbolic};
+pub use system::{Between, Prior, System};

@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 
 use super::elimination::{Elimination, Equations, LocalPrior, dot};
 use super::factor::Factor;
-use super::form::{Between, Prior, System};
+use super::system::{Between, Prior, System};
 
 /// A solution of the normal equations.
 #[derive(Debug)]
@@ -37,10 +37,8 @@ impl System {
             let range = symbolic.unknowns_at(layout, position);
             values[range].copy_from_slice(&reduced[symbolic.range(position)]);
         }
-        let back_substitute = |e: &mut Elimination, prior: LocalPrior<'_>| match layout.local_dim() {
-            3 => e.solve::<3>(layout, symbolic, prior, damping, &reduced),
-            2 => e.solve::<2>(layout, symbolic, prior, damping, &reduced),
-            _ => e.solve::<1>(layout, symbolic, prior, damping, &reduced),
+        let back_substitute = |e: &mut Elimination, prior: LocalPrior<'_>| {
+            e.solve(layout, symbolic, prior, damping, &reduced);
         };
         let locals = &mut values[layout.all_locals()];
         self.for_locals(pool, equations, prior, between, back_substitute, |first, batch| {
