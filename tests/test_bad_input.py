@@ -251,7 +251,7 @@ def test_no_control_and_no_weights(small_block):
     with pytest.raises(RankError, match="all 6 photos together") as caught:
         adjust(free)
     assert "leave 7 combinations of unknowns undetermined" in str(caught.value)
-    assert "there is no control; weights" in str(caught.value)
+    assert "there is no control; standard deviations for the positions" in str(caught.value)
     assert "datum" in str(caught.value)
     assert caught.value.photos == small_block.photo_ids
 

@@ -315,3 +315,18 @@ def test_simulate_refuses_impossible_blocks(run, tmp_path):
     assert result.exit_code == 1
     assert "is fixed" in result.stderr
     assert names(tmp_path) == set()
+
+
+def test_weights_too_weak_for_a_datum_are_an_error_with_the_remark_that_explains_it(run, tmp_path):
+    low = ["--flying-height", "300", "--relief", "10", "--points-per-photo", "200", "--position-error", "3"]
+    assert (
+        run(
+            "simulate", "block", "--strips", "1", "--photos-per-strip", "3", *low, "--control", "none"
+        ).exit_code
+        == 0
+    )
+    result = run("giant", "block")
+    assert result.exit_code == 3
+    assert "GROUND holds no component of a photographed point" in result.stderr
+    assert "the standard deviations of the photos are too large to give a datum" in result.stderr
+    assert names(tmp_path) == {"block"}

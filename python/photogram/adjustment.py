@@ -228,9 +228,13 @@ def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankErr
         held = f"hold the points {_listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
         lines.append(f"  {count} moving {moved}, which {held}")
     if not np.isfinite(block.point_sd).any():
-        lines.append(
-            "  there is no control; weights for the positions and attitudes of photos would give a datum"
+        weighted = np.isfinite(block.photo_position_sd).any()
+        remedy = (
+            "the standard deviations of the photos are too large to give a datum in double precision"
+            if weighted
+            else "standard deviations for the positions and attitudes of photos would give a datum"
         )
+        lines.append(f"  there is no control; {remedy}")
     return RankError("\n".join(lines), names, point_names)
 
 

@@ -93,6 +93,7 @@ def giant(
     if example == (directory is not None):
         raise typer.BadParameter("give a directory, or --example", param_hint="DIR")
     with failures(), ExitStack() as resources:
+        from photogram.errors import AdjustmentError
         from photogram.files import write_whole
         from photogram.giant import read_project
 
@@ -102,7 +103,13 @@ def giant(
         out = _output_directory(directory, out, overwrite)
         project = read_project(directory)
         block = project.to_block()
-        result = _adjust(project, block, as_published, ordering, threads, quiet)
+        try:
+            result = _adjust(project, block, as_published, ordering, threads, quiet)
+        except AdjustmentError:
+            # What was remarked on while reading is often the reason.
+            for message in project.messages[:SHOWN]:
+                errors.print(escape(str(message)))
+            raise
         written = _result_files(project, block, result, out)
         if json is not None:
             written[json] = result.to_json()
