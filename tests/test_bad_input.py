@@ -434,8 +434,10 @@ def test_progress_tells_of_every_iteration(small_block):
 
 
 LARGE = """
-import sys
+import signal
 from photogram import adjust, simulate
+# A shell that starts a job in the background makes it ignore SIGINT.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 block = simulate(strips=30, photos_per_strip=50, points_per_photo=100, attitude_error=0.02).block
 def tell(progress):
     if progress.phase == "{phase}":
