@@ -401,3 +401,10 @@ def test_what_is_no_number_is_null():
     assert any("there is no control" in message for message in document["messages"])
     assert "variance of unit weight             undefined" in result.report()
     assert "covariances are scaled by 1" in result.report()
+
+
+def test_report_and_document_name_the_linear_unit(small_block):
+    result = adjust(small_block.replace(linear_unit="ft"))
+    assert "X ft" in result.report()
+    assert " m\n" not in result.report()
+    assert json.loads(result.to_json())["units"]["position"] == "ft"

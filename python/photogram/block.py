@@ -61,6 +61,8 @@ class Block:
         The sense of the attitude angles: False (ground-to-photo) turns object vectors into photo vectors.
     title
         One line for the report.
+    linear_unit
+        The linear unit of the object space, for the report.
 
     Raises
     ------
@@ -84,6 +86,7 @@ class Block:
     spheroid: Spheroid | None = None
     photo_to_ground: bool = False
     title: str = ""
+    linear_unit: str = "m"
 
     def __post_init__(self) -> None:
         self.photo_ids = _names("photo_ids", self.photo_ids)
@@ -149,6 +152,7 @@ class Block:
         spheroid: Spheroid | None = None,
         photo_to_ground: bool = False,
         title: str = "",
+        linear_unit: str = "m",
     ) -> Block:
         """Build a block from tables: pandas or polars data frames, or any mapping of column names to columns.
 
@@ -168,7 +172,7 @@ class Block:
             Millimetres, signed, for all photos, when the column is not there.
         image_sd
             Millimetres, for image coordinates without a column of their own.
-        spheroid, photo_to_ground, title
+        spheroid, photo_to_ground, title, linear_unit
             As in the class.
 
         Raises
@@ -209,6 +213,7 @@ class Block:
             spheroid=spheroid,
             photo_to_ground=photo_to_ground,
             title=title,
+            linear_unit=linear_unit,
         )
 
     def replace(self, **changes: Any) -> Block:

@@ -69,18 +69,18 @@ def _document(result: AdjustedBlock) -> dict[str, Any]:
 
 
 def _units(result: AdjustedBlock) -> dict[str, str]:
-    linear = "linear unit of the object space"
+    linear = result.block.linear_unit
     geographic = result.block.geographic
     return {
-        "position": f"longitude deg, latitude deg, height in the {linear}" if geographic else linear,
-        "position_covariance": f"longitude rad, latitude rad, height in the {linear}; products"
+        "position": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "position_covariance": f"longitude rad, latitude rad, height {linear}; products"
         if geographic
-        else f"square of the {linear}",
+        else f"{linear}^2",
         "attitude": "rad",
         "attitude_covariance": "rad^2",
         "covariance": "products of the units of position_covariance and rad",
         "residual_mm": "mm",
-        "difference": f"longitude deg, latitude deg, height in the {linear}" if geographic else linear,
+        "difference": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
         "operations": "multiply-adds, each time the phase is carried out",
         "seconds": "s",
     }

@@ -230,7 +230,8 @@ def _outward(result: AdjustedBlock) -> Floats:
 
 
 def _difference_units(result: AdjustedBlock) -> tuple[str, str, str]:
-    return ("arcsec", "arcsec", "m") if result.block.geographic else ("m", "m", "m")
+    unit = result.block.linear_unit
+    return ("arcsec", "arcsec", unit) if result.block.geographic else (unit, unit, unit)
 
 
 def _differences(result: AdjustedBlock, values: Iterable[float]) -> list[str]:
@@ -241,7 +242,9 @@ def _differences(result: AdjustedBlock, values: Iterable[float]) -> list[str]:
 
 
 def _position_head(result: AdjustedBlock) -> str:
-    names = ("longitude", "latitude", "height m") if result.block.geographic else ("X m", "Y m", "Z m")
+    unit = result.block.linear_unit
+    planimetry = ("longitude", "latitude") if result.block.geographic else (f"X {unit}", f"Y {unit}")
+    names = (*planimetry, f"height {unit}" if result.block.geographic else f"Z {unit}")
     return "".join(f"{name:>20}" for name in names)
 
 

@@ -24,6 +24,9 @@ __all__ = ["assemble"]
 
 Floats = NDArray[np.float64]
 
+LONGEST_METRES = 1e7
+"""No semi-major axis in metres is longer than this; in feet all are."""
+
 
 def assemble(project: Contents) -> tuple[Block, list[Message]]:
     """Return the block of a project, and the remarks on what was left out or deserves a look.
@@ -65,6 +68,7 @@ def assemble(project: Contents) -> tuple[Block, list[Message]]:
             spheroid=_spheroid(common),
             photo_to_ground=common.photo_to_ground,
             title=common.title,
+            linear_unit=_linear_unit(common),
         ),
         messages,
     )
@@ -186,6 +190,11 @@ def _longitudes(positions: Floats, geographic: bool) -> Floats:
             np.abs(longitude) > math.pi, longitude - np.copysign(2 * math.pi, longitude), longitude
         )
     return positions
+
+
+def _linear_unit(common: Common) -> str:
+    """Tell feet from metres by the axes of the spheroid, which fix the linear unit of the job."""
+    return "ft" if common.geographic and common.semi_major > LONGEST_METRES else "m"
 
 
 def _spheroid(common: Common) -> Spheroid | None:
