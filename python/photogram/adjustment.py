@@ -20,6 +20,9 @@ __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
 UnitVariance = Literal["free", "constrained", "unity"]
 Ordering = Literal["auto", "input", "rcm"]
 
+MOST_NAMES = 12
+"""Names that an error message lists at most."""
+
 
 @dataclass(frozen=True)
 class AsPublished:
@@ -122,10 +125,6 @@ def adjust(
     if fix_photos:
         block = block.replace(photo_position_sd=np.array(0.0), photo_attitude_sd=np.array(0.0))
 
-    def report(phase: str, done: int, total: int, iteration: _photocore.IterationRow | None) -> None:
-        if progress is not None:
-            progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
-
     try:
         solution = _photocore.adjust_block(
             block.photo_positions,
@@ -148,11 +147,22 @@ def adjust(
             ordering=ordering,
             unit_variance=unit_variance,
             threads=threads or 0,
-            progress=report if progress is not None else None,
+            progress=None if progress is None else _teller(progress),
         )
     except _photocore.BlockError as error:
         raise _named(block, *error.args) from None
     return Result.from_solution(block, solution, unit_variance, _messages(block, solution))
+
+
+def _teller(
+    progress: Callable[[Progress], None],
+) -> Callable[[str, int, int, _photocore.IterationRow | None], None]:
+    """Return what the core calls: it tells `progress`."""
+
+    def tell(phase: str, done: int, total: int, iteration: _photocore.IterationRow | None) -> None:
+        progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
+
+    return tell
 
 
 def _check_options(
@@ -182,10 +192,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     by_reason: dict[str, list[str]] = {}
     for point, reason in solution.dropped:
         by_reason.setdefault(reason, []).append(block.point_ids[point])
-    messages = [
-        Message(f"left out, {reason}: {_listed(names, most=len(names))}")
-        for reason, names in by_reason.items()
-    ]
+    messages = [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
     held = np.isfinite(block.point_sd) & (solution.point_rays > 0)[:, np.newaxis]
     if not held.any() and not (block.photo_position_sd == 0).all():
         messages.insert(
@@ -238,6 +245,6 @@ def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankErr
     return RankError("\n".join(lines), names, point_names)
 
 
-def _listed(names: list[str], most: int = 12) -> str:
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+def _listed(names: list[str]) -> str:
+    shown = ", ".join(names[:MOST_NAMES])
+    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"

@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 
 use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Criterion, Event, Options as AdjustmentOptions, Phase};
-use photocore::geometry::RotationSense;
 use photocore::normals::Ordering;
 use photocore::programs::block::{Block, BlockError as Failure, Image, Options, Photo, Point, UnitVariance};
 use pyo3::create_exception;
@@ -13,7 +12,7 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{check_lengths, indices, numbers, rows};
-use crate::geometry::object_space;
+use crate::geometry::{object_space, rotation_sense};
 use crate::solution::{BlockSolution, iteration_row};
 
 create_exception!(
@@ -95,7 +94,7 @@ fn adjust_block(
     let image = |i: usize| Image { photo: photos_of[i], point: points_of[i], xy: xy[i], sd: xy_sd[i] };
     let block = Block {
         space: object_space(spheroid)?,
-        sense: if photo_to_ground { RotationSense::PhotoToGround } else { RotationSense::GroundToPhoto },
+        sense: rotation_sense(photo_to_ground),
         photos: (0..positions.len()).map(photo).collect(),
         points: (0..sd.len()).map(|i| Point { coordinates: coordinates[i], sd: sd[i] }).collect(),
         images: (0..xy.len()).map(image).collect(),

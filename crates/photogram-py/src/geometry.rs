@@ -83,7 +83,7 @@ fn project<'py>(
         ],
     )?;
     let space = object_space(spheroid)?;
-    let sense = if photo_to_ground { RotationSense::PhotoToGround } else { RotationSense::GroundToPhoto };
+    let sense = rotation_sense(photo_to_ground);
     let image = |i: usize| {
         let photo = Photo::new(space, sense, positions[i], attitudes[i], principal_distances[i]);
         photo.project(&Point::new(space, points[i]))
@@ -98,4 +98,9 @@ fn ellipsoid((a, b): (f64, f64)) -> PyResult<Ellipsoid> {
 /// The object space: geographic when a spheroid is given by its semi-axes.
 pub fn object_space(spheroid: Option<(f64, f64)>) -> PyResult<ObjectSpace> {
     spheroid.map_or(Ok(ObjectSpace::Rectangular), |axes| ellipsoid(axes).map(ObjectSpace::Geographic))
+}
+
+/// The sense of the angles.
+pub fn rotation_sense(photo_to_ground: bool) -> RotationSense {
+    if photo_to_ground { RotationSense::PhotoToGround } else { RotationSense::GroundToPhoto }
 }

@@ -149,7 +149,7 @@ def _adjust(
     from photogram import AsPublished, adjust
 
     common = project.common
-    with errors.status("reading", spinner="line") if not quiet else nullcontext() as status:
+    with errors.status("adjusting", spinner="line") if not quiet else nullcontext() as status:
         result = adjust(
             block,
             unit_variance=common.unit_variance,

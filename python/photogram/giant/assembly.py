@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.block import Block
 from photogram.errors import InputError
+from photogram.geometry import Spheroid
 from photogram.giant.frames import ATTITUDE_SD, Frame
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.records import Record
 from photogram.messages import Message
 
 if TYPE_CHECKING:
-    from photogram.geometry import Spheroid
     from photogram.giant.common import Common
     from photogram.giant.contents import Contents
 
@@ -198,8 +198,4 @@ def _linear_unit(common: Common) -> str:
 
 
 def _spheroid(common: Common) -> Spheroid | None:
-    if not common.geographic:
-        return None
-    from photogram.geometry import Spheroid
-
-    return Spheroid(common.semi_major, common.semi_minor)
+    return Spheroid(common.semi_major, common.semi_minor) if common.geographic else None

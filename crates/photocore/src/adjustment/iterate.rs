@@ -395,6 +395,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             Some(basis) if self.options.covariance => Some(self.cofactors(basis)?),
             _ => None,
         };
+        let (cofactors, prior_redundancy) = cofactors.unzip();
         let redundancy =
             |cofactors: &Cofactors| cofactors.equations.iter().map(|share| 1.0 - share).collect();
         Ok(Adjustment {
@@ -404,7 +405,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             unknowns,
             residuals,
             redundancy: cofactors.as_ref().map(redundancy),
-            prior_redundancy: cofactors.as_ref().map(|cofactors| problem.prior_redundancy(cofactors)),
+            prior_redundancy,
             cofactors,
             counts: problem.counts(),
             operations: problem.system.symbolic().operations(problem.layout()),
@@ -414,7 +415,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
         })
     }
 
-    fn cofactors(&mut self, basis: Basis<'a, M>) -> Result<Cofactors, AdjustError> {
+    /// Cofactors, and the redundancy number of each unknown as an observation of itself.
+    fn cofactors(&mut self, basis: Basis<'a, M>) -> Result<(Cofactors, Vec<f64>), AdjustError> {
         let Basis { equations, prior, factor } = basis;
         let start = Instant::now();
         self.enter(Phase::Invert)?;
@@ -424,9 +426,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut between = between(&mut *self.watch, Phase::Cofactors, self.problem.layout().locals());
         let found = self.problem.system.cofactors(self.pool, &inverse, &equations, &prior, &mut between);
         let ControlFlow::Continue(mut cofactors) = found else { return Err(AdjustError::Interrupted) };
-        self.problem.clear_fixed(&mut cofactors);
+        let prior_redundancy = self.problem.finish_cofactors(&mut cofactors);
         self.seconds.cofactors = start.elapsed().as_secs_f64();
-        Ok(cofactors)
+        Ok((cofactors, prior_redundancy))
     }
 
     fn enter(&mut self, phase: Phase) -> Result<(), AdjustError> {

@@ -90,16 +90,14 @@ impl<M: Model> Equations for Linearized<'_, M> {
         let layout = self.problem.layout();
         self.problem.model.observe(&self.prepared, local, group, rows);
         let count = layout.rows();
-        let parts = [&mut *rows.local, &mut *rows.kept, &mut *rows.border];
-        for part in parts {
-            let width = part.len() / count;
-            for row in 0..count {
-                let weight = self.problem.observation_sd[group * count + row].recip();
+        for row in 0..count {
+            let sd = self.problem.observation_sd[group * count + row];
+            rows.constant[row] /= sd;
+            let weight = sd.recip();
+            for part in [&mut *rows.local, &mut *rows.kept, &mut *rows.border] {
+                let width = part.len() / count;
                 part[row * width..][..width].iter_mut().for_each(|value| *value *= weight);
             }
-        }
-        for row in 0..count {
-            rows.constant[row] /= self.problem.observation_sd[group * count + row];
         }
         if self.any_fixed {
             let start = layout.border_range().start;

@@ -1,5 +1,7 @@
 //! Counts, residuals and redundancy numbers.
 
+use std::ops::Range;
+
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -27,54 +29,37 @@ impl<M> Problem<M> {
         }
     }
 
-    /// Redundancy number of each unknown as an observation of itself, 1 - w q; zero unless it is weighted.
-    pub(super) fn prior_redundancy(&self, cofactors: &Cofactors) -> Vec<f64> {
+    /// Redundancy number of each unknown as an observation of itself, 1 - w q; zero unless it is weighted. The cofactors of
+    /// fixed unknowns, which stand in the normal equations with unit weight, are set to zero on the way.
+    pub(super) fn finish_cofactors(&self, cofactors: &mut Cofactors) -> Vec<f64> {
         let mut redundancy = vec![0.0; self.sd.len()];
         self.for_diagonal(cofactors, |unknown, q| {
             if self.is_weighted(unknown) {
-                redundancy[unknown] = 1.0 - q / (self.sd[unknown] * self.sd[unknown]);
+                redundancy[unknown] = 1.0 - *q / (self.sd[unknown] * self.sd[unknown]);
+            } else if self.sd[unknown] == 0.0 {
+                *q = 0.0;
             }
         });
         redundancy
     }
 
-    /// Sets the cofactors of fixed unknowns, which stand in the normal equations with unit weight, to zero.
-    pub(super) fn clear_fixed(&self, cofactors: &mut Cofactors) {
-        let layout = self.layout();
-        let l = layout.local_dim();
-        let clear = |block: &mut [f64], first: usize, dim: usize| {
-            (0..dim).filter(|d| self.sd[first + d] == 0.0).for_each(|d| block[d * dim + d] = 0.0);
-        };
-        for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
-            clear(block, local * l, l);
-        }
-        let mut start = 0;
-        for kept in 0..layout.kept() {
-            let dim = layout.kept_dim(kept);
-            clear(&mut cofactors.kept[start..], layout.kept_range(kept).start, dim);
-            start += dim * dim;
-        }
-        clear(&mut cofactors.border, layout.border_range().start, layout.border_dim());
-    }
-
     /// Hands out the cofactor of every unknown.
-    fn for_diagonal(&self, cofactors: &Cofactors, mut take: impl FnMut(usize, f64)) {
+    fn for_diagonal(&self, cofactors: &mut Cofactors, mut take: impl FnMut(usize, &mut f64)) {
         let layout = self.layout();
+        let mut diagonal = |block: &mut [f64], unknowns: Range<usize>| {
+            let dim = unknowns.len();
+            unknowns.enumerate().for_each(|(d, unknown)| take(unknown, &mut block[d * (dim + 1)]));
+        };
         let l = layout.local_dim();
-        for unknown in layout.all_locals() {
-            take(unknown, cofactors.local[unknown / l * l * l + unknown % l * (l + 1)]);
+        for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
+            diagonal(block, layout.local_range(local));
         }
         let mut start = 0;
         for kept in 0..layout.kept() {
-            let dim = layout.kept_dim(kept);
-            for (d, unknown) in layout.kept_range(kept).enumerate() {
-                take(unknown, cofactors.kept[start + d * (dim + 1)]);
-            }
-            start += dim * dim;
+            diagonal(&mut cofactors.kept[start..], layout.kept_range(kept));
+            start += layout.kept_dim(kept).pow(2);
         }
-        for (d, unknown) in layout.border_range().enumerate() {
-            take(unknown, cofactors.border[d * (layout.border_dim() + 1)]);
-        }
+        diagonal(&mut cofactors.border, layout.border_range());
     }
 }
 
@@ -104,7 +89,7 @@ impl<M: Model> Problem<M> {
     }
 
     /// Weighted sum of squares of the given residuals.
-    pub(super) fn sum_of_squares(&self, residuals: &[f64]) -> f64 {
+    pub fn sum_of_squares(&self, residuals: &[f64]) -> f64 {
         residuals.iter().zip(&self.observation_sd).map(|(residual, sd)| (residual / sd).powi(2)).sum()
     }
 

@@ -10,6 +10,7 @@ use super::elimination::{Elimination, Equations, LocalPrior, dot};
 use super::floors::skip;
 use super::invert::SelectedInverse;
 use super::system::{Between, Prior, System};
+use super::triangle::for_local_dim;
 
 /// Cofactors: the inverse normal matrix where it is needed. All blocks are square, row by row.
 #[derive(Debug, Clone)]
@@ -61,7 +62,9 @@ impl System {
                     |others, (elimination, first_group, local, equations)| {
                         arch.dispatch(|| {
                             others.gather(self, elimination, inverse);
-                            others.cofactors(self, elimination, first_group, local, equations);
+                            for_local_dim!(l, L => {
+                                others.cofactors::<L>(self, elimination, first_group, local, equations);
+                            });
                         });
                     },
                 );
@@ -124,23 +127,7 @@ impl Others {
     /// With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and
     /// a Q a^T for each equation.
     #[inline(always)]
-    fn cofactors(
-        &mut self,
-        system: &System,
-        e: &Elimination,
-        first_group: usize,
-        local: &mut [f64],
-        equations: &mut [f64],
-    ) {
-        match system.layout.local_dim() {
-            3 => self.cofactors_sized::<3>(system, e, first_group, local, equations),
-            2 => self.cofactors_sized::<2>(system, e, first_group, local, equations),
-            _ => self.cofactors_sized::<1>(system, e, first_group, local, equations),
-        }
-    }
-
-    #[inline(always)]
-    fn cofactors_sized<const L: usize>(
+    fn cofactors<const L: usize>(
         &mut self,
         system: &System,
         e: &Elimination,

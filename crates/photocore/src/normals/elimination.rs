@@ -2,7 +2,7 @@
 
 use super::layout::Layout;
 use super::symbolic::Symbolic;
-use super::triangle::Triangle;
+use super::triangle::{Triangle, for_local_dim};
 
 /// Where the equations of a system come from.
 ///
@@ -172,20 +172,10 @@ impl Elimination {
     /// Eliminates the unknowns of the local block.
     #[inline(always)]
     pub fn eliminate(&mut self, layout: &Layout, prior: LocalPrior<'_>, damping: f64) {
-        match layout.local_dim() {
-            3 => {
-                self.factor::<3>(prior, damping);
-                self.couple::<3>(layout);
-            }
-            2 => {
-                self.factor::<2>(prior, damping);
-                self.couple::<2>(layout);
-            }
-            _ => {
-                self.factor::<1>(prior, damping);
-                self.couple::<1>(layout);
-            }
-        }
+        for_local_dim!(layout.local_dim(), L => {
+            self.factor::<L>(prior, damping);
+            self.couple::<L>(layout);
+        });
     }
 
     /// Factors the normal matrix of the local block; `damping` is added to its diagonal as a fraction of it.
@@ -249,23 +239,7 @@ impl Elimination {
     /// Solves for the local block with the others in place: N x = A^T (l - A_other x_other), without the coupling.
     /// `solution` is in the order of elimination.
     #[inline(always)]
-    pub fn solve(
-        &mut self,
-        layout: &Layout,
-        symbolic: &Symbolic,
-        prior: LocalPrior<'_>,
-        damping: f64,
-        solution: &[f64],
-    ) {
-        match layout.local_dim() {
-            3 => self.solve_sized::<3>(layout, symbolic, prior, damping, solution),
-            2 => self.solve_sized::<2>(layout, symbolic, prior, damping, solution),
-            _ => self.solve_sized::<1>(layout, symbolic, prior, damping, solution),
-        }
-    }
-
-    #[inline(always)]
-    fn solve_sized<const L: usize>(
+    pub fn solve<const L: usize>(
         &mut self,
         layout: &Layout,
         symbolic: &Symbolic,

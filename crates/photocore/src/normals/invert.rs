@@ -25,9 +25,18 @@ impl SelectedInverse {
     /// border is the block after the last.
     pub fn block(&self, row: usize, column: usize) -> Option<Vec<f64>> {
         let symbolic = &*self.panels.symbolic;
-        let columns = symbolic.dim(symbolic.position(column));
-        let mut values = vec![0.0; symbolic.dim(symbolic.position(row)) * columns];
-        self.panels.for_block(row, column, |i, j, value| values[i * columns + j] = value).then_some(values)
+        let (p, q) = (symbolic.position(row), symbolic.position(column));
+        let (first, last) = (p.min(q), p.max(q));
+        symbolic.panel_row(symbolic.supernode_of(first), last)?;
+        let mut positions = vec![first, last];
+        positions.dedup();
+        let start = [0, symbolic.dim(first), symbolic.dim(first) + symbolic.dim(last)];
+        let width = start[positions.len()];
+        let mut both = vec![0.0; width * width];
+        self.gather(&positions, &start, &mut both);
+        let (top, left) = (start[usize::from(p > q)], start[usize::from(q > p)]);
+        let rows = both.chunks_exact(width).skip(top).take(symbolic.dim(p));
+        Some(rows.flat_map(|values| &values[left..][..symbolic.dim(q)]).copied().collect())
     }
 
     /// Writes the inverse over blocks at ascending positions, all coupled to each other, into a full square matrix in which

@@ -35,24 +35,4 @@ impl Panels {
             }
         }
     }
-
-    /// Block (row, column) by kept blocks, in either triangle, handed out entry by entry as `(i, j, value)`;
-    /// nothing if it is outside the pattern.
-    pub fn for_block(&self, row: usize, column: usize, mut take: impl FnMut(usize, usize, f64)) -> bool {
-        let (p, q) = (self.symbolic.position(row), self.symbolic.position(column));
-        let (low, high) = (p.max(q), p.min(q));
-        let supernode = self.symbolic.supernode_of(high);
-        let Some(start) = self.symbolic.panel_row(supernode, low) else { return false };
-        let s = &self.symbolic.supernodes()[supernode];
-        let panel = &self.values[s.panel.clone()];
-        let first = self.symbolic.range(high).start - self.symbolic.first_unknown(supernode);
-        for j in 0..self.symbolic.dim(high) {
-            for i in 0..self.symbolic.dim(low) {
-                let (i_low, j_low) = if p == q && i < j { (j, i) } else { (i, j) };
-                let value = panel[(first + j_low) * s.height() + start + i_low];
-                if p >= q { take(i, j, value) } else { take(j, i, value) }
-            }
-        }
-        true
-    }
 }

@@ -7,6 +7,7 @@ use rayon::ThreadPool;
 use super::elimination::{Elimination, Equations, LocalPrior, dot};
 use super::factor::Factor;
 use super::system::{Between, Prior, System};
+use super::triangle::for_local_dim;
 
 /// A solution of the normal equations.
 #[derive(Debug)]
@@ -38,7 +39,7 @@ impl System {
             values[range].copy_from_slice(&reduced[symbolic.range(position)]);
         }
         let back_substitute = |e: &mut Elimination, prior: LocalPrior<'_>| {
-            e.solve(layout, symbolic, prior, damping, &reduced);
+            for_local_dim!(layout.local_dim(), L => e.solve::<L>(layout, symbolic, prior, damping, &reduced));
         };
         let locals = &mut values[layout.all_locals()];
         self.for_locals(pool, equations, prior, between, back_substitute, |first, batch| {

@@ -17,21 +17,17 @@ impl CentralPerspective {
     /// # Errors
     /// The point whose rays give it no place.
     pub fn intersect(&self, photos: &[Photo]) -> Result<Vec<Vector3>, usize> {
-        let rays_of = |point: usize| -> Vec<Ray> {
-            let own = &self.images[self.start[point]..self.start[point + 1]];
-            own.iter().map(|image| photos[image.photo].ray(image.xy)).collect()
-        };
-        let met: Vec<Option<Vector3>> = (0..self.points.len()).map(|point| meet(&rays_of(point))).collect();
-        let distance = median_distance(&met, rays_of);
+        let points = 0..self.points.len();
+        let met: Vec<Option<Vector3>> = points.clone().map(|point| meet(&self.rays(photos, point))).collect();
+        let distance = self.median_distance(photos, &met);
         let mut coordinates = Vec::with_capacity(self.points.len());
-        for (point, met) in met.into_iter().enumerate() {
-            let rays = rays_of(point);
-            let start = match (met, distance) {
-                (Some(position), _) => self.space.coordinates(position),
-                (None, Some(distance)) => self.space.coordinates(along(&rays[0], distance)),
-                (None, None) => self.points[point].coordinates,
+        for (point, met) in points.zip(met) {
+            let position = met.or_else(|| Some(along(self.rays(photos, point).first()?, distance?)));
+            let start = match position {
+                Some(position) => self.space.coordinates(position),
+                None => self.points[point].coordinates,
             };
-            let placed = self.hold(point, start, &rays);
+            let placed = self.hold(photos, point, start);
             if placed.iter().any(|value| !value.is_finite()) {
                 return Err(point);
             }
@@ -40,27 +36,43 @@ impl CentralPerspective {
         Ok(coordinates)
     }
 
+    fn rays(&self, photos: &[Photo], point: usize) -> Vec<Ray> {
+        let own = &self.images[self.start[point]..self.start[point + 1]];
+        own.iter().map(|image| photos[image.photo].ray(image.xy)).collect()
+    }
+
+    /// Median distance of the intersected points from their first photographs.
+    fn median_distance(&self, photos: &[Photo], met: &[Option<Vector3>]) -> Option<f64> {
+        let distance = |(&first, met): (&usize, &Option<Vector3>)| {
+            let offset = difference(met.as_ref()?, &photos[self.images[first].photo].centre());
+            Some(dot(&offset, &offset).sqrt())
+        };
+        let mut distances: Vec<f64> = self.start.iter().zip(met).filter_map(distance).collect();
+        distances.sort_unstable_by(f64::total_cmp);
+        distances.get(distances.len() / 2).copied()
+    }
+
     /// Puts the held components in place and moves the others to where the rays then pass nearest: least squares of the distances
     /// from the rays, linear in rectangular space and all but linear in geographic space.
-    fn hold(&self, point: usize, start: Vector3, rays: &[Ray]) -> Vector3 {
-        let point = &self.points[point];
-        let held = point.held();
+    fn hold(&self, photos: &[Photo], point: usize, start: Vector3) -> Vector3 {
+        let (held, given) = (self.points[point].held(), self.points[point].coordinates);
         // One ray and two held components need no start for the third.
         let unknown = if held.contains(&true) { 0.0 } else { f64::NAN };
         let mut coordinates = std::array::from_fn(|k| match (held[k], start[k].is_finite()) {
-            (true, _) => point.coordinates[k],
+            (true, _) => given[k],
             (false, true) => start[k],
             (false, false) => unknown,
         });
         if held == [false; 3] || held == [true; 3] {
             return coordinates;
         }
+        let rays = self.rays(photos, point);
         for _ in 0..3 {
             let at = Point::new(self.space, coordinates);
             let column = |k: usize| -> Vector3 { std::array::from_fn(|i| at.partials()[i][k]) };
             let mut normal = [[0.0; 3]; 3];
             let mut right = [0.0; 3];
-            for ray in rays {
+            for ray in &rays {
                 let offset = across(&difference(&ray.origin, &at.position()), ray);
                 for i in (0..3).filter(|&i| !held[i]) {
                     right[i] += dot(&column(i), &offset);
@@ -106,15 +118,4 @@ fn meet(rays: &[Ray]) -> Option<Vector3> {
     let position = std::array::from_fn(|k| first[k] + from_first[k]);
     let in_front = |ray: &Ray| dot(&difference(&position, &ray.origin), &ray.direction) > 0.0;
     rays.iter().all(in_front).then_some(position)
-}
-
-/// Median distance of the intersected points from their first photographs.
-fn median_distance(met: &[Option<Vector3>], rays_of: impl Fn(usize) -> Vec<Ray>) -> Option<f64> {
-    let distance = |(index, met): (usize, &Option<Vector3>)| {
-        let offset = difference(&(*met)?, &rays_of(index).first()?.origin);
-        Some(dot(&offset, &offset).sqrt())
-    };
-    let mut distances: Vec<f64> = met.iter().enumerate().filter_map(distance).collect();
-    distances.sort_unstable_by(f64::total_cmp);
-    distances.get(distances.len() / 2).copied()
 }

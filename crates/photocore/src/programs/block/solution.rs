@@ -161,11 +161,10 @@ fn statistics(
 ) -> (SumsOfSquares, i64) {
     let layout = problem.layout();
     let squares = |range: std::ops::Range<usize>| range.map(|i| problem.prior_square(i, unknowns[i])).sum();
-    let residuals = adjustment.residuals.iter().zip(&problem.observation_sd);
     let sums = SumsOfSquares {
         camera: squares(layout.all_kept()),
         ground: squares(layout.all_locals()),
-        plates: residuals.map(|(residual, sd)| (residual / sd).powi(2)).sum(),
+        plates: problem.sum_of_squares(&adjustment.residuals),
     };
     let counts = adjustment.counts;
     let weighted_cameras = layout.all_kept().filter(|&unknown| problem.is_weighted(unknown)).count();
