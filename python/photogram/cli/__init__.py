@@ -13,6 +13,7 @@ import typer
 
 from photogram.cli import giant, simulate
 from photogram.cli.console import output
+from photogram.cli.groups import GroupWithMain
 
 __all__ = ["app", "main"]
 
@@ -24,7 +25,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command()(giant.giant)
+giant_app = typer.Typer(name="giant", cls=GroupWithMain, help="Adjust or check a GIANT project.")
+giant_app.command("adjust")(giant.giant)
+app.add_typer(giant_app)
 app.command()(simulate.simulate)
 
 

@@ -1,0 +1,26 @@
+"""A command with side commands: `photogram giant DIR` beside `photogram giant check DIR`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from typer.core import TyperGroup
+
+__all__ = ["GroupWithMain"]
+
+
+class GroupWithMain(TyperGroup):
+    """A group whose first command is run when the first word names none.
+
+    The job that people come for needs no name; a directory with the name of a side command is `./check`.
+    """
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the commands in the order in which they were added."""
+        return list(self.commands)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the main command before arguments that name no command."""
+        if not args or args[0] not in self.commands:
+            args = [next(iter(self.commands)), *args]
+        return list(super().parse_args(ctx, args))
