@@ -2,18 +2,23 @@
 
 from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
+from photogram.giant.diagnostics import ErrorWarning, error_warnings
 from photogram.giant.frames import Frame
 from photogram.giant.ground import GroundPoint
 from photogram.giant.images import ImageFrame
+from photogram.giant.limits import Limits
 from photogram.giant.project import Project, read_project, write_project
 
 __all__ = [
     "Camera",
     "Common",
+    "ErrorWarning",
     "Frame",
     "GroundPoint",
     "ImageFrame",
+    "Limits",
     "Project",
+    "error_warnings",
     "read_project",
     "write_project",
 ]
