@@ -306,6 +306,10 @@ class BlockSolution:
         """`input` or `rcm`."""
 
     @property
+    def photo_order(self) -> _Indices:
+        """(P,) indices of the photos in the order of their elimination."""
+
+    @property
     def operations(self) -> dict[str, float]:
         """Predicted multiply-adds of `reduction`, `factor` and `inverse`, each time they are carried out."""
 

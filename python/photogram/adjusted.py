@@ -114,9 +114,11 @@ class AdjustedBlock:
         NaN without redundancy.
     dropped
         Points left out, with the reason.
-    ordering, operations, formations, seconds
-        The ordering of photos in force, predicted multiply-adds of each phase, the number of formations of
-        the normal equations, and seconds spent in each phase.
+    ordering, photo_order
+        The ordering of photos in force, and (P,) the indices of the photos as they were eliminated.
+    operations, formations, seconds
+        Predicted multiply-adds of each phase, the number of formations of the normal equations, and seconds
+        spent in each phase.
     """
 
     block: Block
@@ -141,6 +143,7 @@ class AdjustedBlock:
     standardized: Floats
     dropped: Mapping[str, str]
     ordering: str
+    photo_order: NDArray[np.int64]
     operations: Mapping[str, float]
     formations: int
     seconds: Mapping[str, float]
@@ -173,6 +176,7 @@ class AdjustedBlock:
             standardized=solution.standardized,
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
             ordering=solution.ordering,
+            photo_order=solution.photo_order,
             operations=solution.operations,
             formations=solution.formations,
             seconds=solution.seconds,

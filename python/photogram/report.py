@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram import _photocore
+from photogram.structuring import structure
 
 if TYPE_CHECKING:
     from photogram.adjusted import AdjustedBlock, Floats
 
-__all__ = ["report", "summary"]
+__all__ = ["bandwidths", "report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
@@ -215,8 +216,22 @@ def _points(result: AdjustedBlock) -> list[str]:
 def _work(result: AdjustedBlock) -> list[str]:
     order = {"input": "in input order", "rcm": "by reverse Cuthill-McKee"}[result.ordering]
     lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
+    lines += bandwidths(result)
     lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
     lines += [f"{f'seconds in {name}':<36}{seconds:.3f} s" for name, seconds in result.seconds.items()]
+    return lines
+
+
+def bandwidths(result: AdjustedBlock) -> list[str]:
+    """Return what the 1987 program would have needed, for the order of the input and for the one chosen."""
+    images = result.block.image_photos, result.block.image_points
+    lines = ["bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)"]
+    for name, order in (("of the input", None), ("chosen", result.photo_order)):
+        structured = structure(*images, order)
+        lines.append(
+            f"{f'  in the order {name}':<36}{structured.effective_bandwidth} effective,"
+            f" {structured.naive_bandwidth} without sharing"
+        )
     return lines
 
 

@@ -131,6 +131,8 @@ pub struct Adjustment {
     pub seconds: Seconds,
     /// The ordering in force.
     pub ordering: Ordering,
+    /// Kept blocks (the border is the block after the last) in the order of their elimination.
+    pub order: Vec<usize>,
 }
 
 /// Why there is no adjustment.
@@ -412,6 +414,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             formations: self.formations,
             seconds: self.seconds,
             ordering: problem.system.symbolic().ordering(),
+            order: problem.system.symbolic().order().to_vec(),
         })
     }
 
