@@ -17,6 +17,7 @@ from photogram.errors import InputError
 
 __all__ = [
     "Spheroid",
+    "east_north_up",
     "geocentric_to_geographic",
     "geographic_to_geocentric",
     "project",
@@ -104,6 +105,20 @@ def geocentric_to_geographic(xyz: ArrayLike, spheroid: Spheroid) -> Floats:
         Another shape.
     """
     return _photocore.geocentric_to_geographic(_floats(xyz), spheroid.a, spheroid.b)
+
+
+def east_north_up(positions: ArrayLike) -> Floats:
+    """Rows east, north and up of the local vertical frames, (n, 3, 3), in geocentric axes.
+
+    Parameters
+    ----------
+    positions
+        (n, 2 or 3) longitude and latitude in radians; a height does not matter.
+    """
+    longitude, latitude = _floats(positions)[:, :2].T
+    (sl, cl), (sp, cp) = ((np.sin(angle), np.cos(angle)) for angle in (longitude, latitude))
+    rows = [[-sl, cl, np.zeros_like(sl)], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]]
+    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def project(

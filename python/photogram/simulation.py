@@ -398,7 +398,8 @@ def _into_object_space(
     """Positions and, given the rotations from the plan to the photos, attitudes in the object space."""
     positions = plan_positions + np.asarray(origin)
     if spheroid is not None:
-        frame, tangent_point = _east_north_up(origin[0], origin[1]), np.array([[origin[0], origin[1], 0.0]])
+        tangent_point = np.array([[origin[0], origin[1], 0.0]])
+        (frame,) = geometry.east_north_up(tangent_point)
         plane = plan_positions * [1.0, 1.0, 0.0]
         xyz = geometry.geographic_to_geocentric(tangent_point, spheroid) + plane @ frame
         positions = geometry.geocentric_to_geographic(xyz, spheroid)
@@ -414,12 +415,6 @@ def _into_object_space(
         convergence[:, 2] = -np.arctan2(in_plan[:, 1], in_plan[:, 0])
         rotations = rotations @ geometry.rotation_matrix(convergence)
     return positions, geometry.rotation_angles(rotations.transpose(0, 2, 1) if photo_to_ground else rotations)
-
-
-def _east_north_up(longitude: float, latitude: float) -> Floats:
-    """Rows east, north and up of the local vertical frame."""
-    (sl, cl), (sp, cp) = ((math.sin(angle), math.cos(angle)) for angle in (longitude, latitude))
-    return np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
 
 
 def _metres_per_unit(positions: Floats, spheroid: Spheroid | None) -> Floats:
