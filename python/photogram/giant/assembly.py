@@ -15,6 +15,7 @@ from photogram.giant.frames import ATTITUDE_SD, Frame
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.limits import Limits, allowed_images, check_bandwidth, check_files, check_points
 from photogram.giant.records import error_at, message_at
+from photogram.giant.remarks import remarks
 from photogram.messages import Message
 from photogram.structuring import structure
 
@@ -59,28 +60,27 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
         structured = structure(image_photos[kept], image_points[kept])
         check_bandwidth(structured, frames, list(index), limits.bandwidth, common.intersection_only, messages)
     position, sd = _control(project, index, messages)
-    return (
-        Block(
-            photo_ids=[frame.name for frame in frames],
-            photo_positions=_longitudes(np.array([frame.position for frame in frames]), common.geographic),
-            photo_attitudes=np.array([frame.attitude for frame in frames]),
-            principal_distances=_principal_distances(project, images),
-            point_ids=list(index),
-            point_positions=_longitudes(position, common.geographic),
-            image_photos=image_photos[kept],
-            image_points=image_points[kept],
-            image_xy=np.concatenate([each.xy for each in images])[kept],
-            image_sd=_or_default([each.sd for each in images], IMAGE_SD)[image_photos[kept]],
-            photo_position_sd=_or_default([frame.position_sd for frame in frames], common.default_station_sd),
-            photo_attitude_sd=_or_default([frame.attitude_sd for frame in frames], ATTITUDE_SD),
-            point_sd=sd,
-            spheroid=_spheroid(common),
-            photo_to_ground=common.photo_to_ground,
-            title=common.title,
-            linear_unit=_linear_unit(common),
-        ),
-        messages,
+    block = Block(
+        photo_ids=[frame.name for frame in frames],
+        photo_positions=_longitudes(np.array([frame.position for frame in frames]), common.geographic),
+        photo_attitudes=np.array([frame.attitude for frame in frames]),
+        principal_distances=_principal_distances(project, images),
+        point_ids=list(index),
+        point_positions=_longitudes(position, common.geographic),
+        image_photos=image_photos[kept],
+        image_points=image_points[kept],
+        image_xy=np.concatenate([each.xy for each in images])[kept],
+        image_sd=_or_default([each.sd for each in images], IMAGE_SD)[image_photos[kept]],
+        photo_position_sd=_or_default([frame.position_sd for frame in frames], common.default_station_sd),
+        photo_attitude_sd=_or_default([frame.attitude_sd for frame in frames], ATTITUDE_SD),
+        point_sd=sd,
+        spheroid=_spheroid(common),
+        photo_to_ground=common.photo_to_ground,
+        title=common.title,
+        linear_unit=_linear_unit(common),
     )
+    messages += remarks(block, frames)
+    return block, messages
 
 
 def _unsupported(common: Common) -> list[Message]:

@@ -29,8 +29,8 @@ NAMES_ON_A_LINE = 4
 def check(project: Project, *, limits: Limits | None = None, threads: int | None = None) -> Check:
     """Check a project as Appendix H of the guide teaches: first by intersection, then by adjustment.
 
-    Nothing is changed or written. What an earlier step explains (a wrong sign, a turned photo) is put right for
-    the later ones, and what it finds wrong is left out of them, so that every error shows by itself.
+    Nothing is changed or written. What an earlier step explains (a wrong sign, a turned photo) is put right
+    for the later ones, and what it finds wrong is left out of them, so that every error shows by itself.
 
     Parameters
     ----------

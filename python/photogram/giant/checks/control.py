@@ -83,7 +83,8 @@ def key_numbers(edited: Edited) -> Section:
         variance = result.variance_of_unit_weight
         shown = f"{variance:.4f}" if variance is not None else "undefined"
         section.lines.append(
-            f"{f'variance of unit weight, {name}':<50}{shown} ({result.degrees_of_freedom} degrees of freedom)"
+            f"{f'variance of unit weight, {name}':<50}{shown}"
+            f" ({result.degrees_of_freedom} degrees of freedom)"
         )
     _variance(last, section)
     section.lines.append(
@@ -112,13 +113,10 @@ def _variance(result: Result, section: Section) -> None:
     if variance is None:
         section.findings.append(Finding("no-redundancy", "grave", "there are no degrees of freedom"))
     elif not VARIANCE[0] < variance < VARIANCE[1] and result.unit_variance != "unity":
-        factor = math.sqrt(variance)
         text = (
-            f"the variance of unit weight is {variance:.3f}: the standard deviations are {factor:.2f} times what the"
-            " residuals say, if no gross or systematic error is left"
+            f"the variance of unit weight is {variance:.3f}: if no gross or systematic error is left, the"
+            f" standard deviations should be {math.sqrt(variance):.2f} times what they are"
         )
-        if factor > 1:
-            text = text.replace(f"are {factor:.2f} times", f"should be about {factor:.2f} times larger, by")
         section.findings.append(
             Finding("weights", "look", text, values={"variance_of_unit_weight": variance})
         )

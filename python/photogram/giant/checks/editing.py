@@ -177,7 +177,7 @@ def _snoop(
 
 
 def tests(result: Result) -> dict[str, Floats]:
-    """Test values by kind, in standard deviations of the residuals; 0 where nothing checks the observation."""
+    """Test values by kind, in standard deviations of the residuals; 0 where nothing checks."""
     block = result.block
     images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
     stations = np.hstack(
@@ -306,10 +306,10 @@ def _list(result: Result, spread: float, section: Section) -> None:
     tested = int((values > 0).sum())
     images, axes = np.nonzero(values > BLUNDER)
     section.lines.append(
-        f"{'robust spread of the test values':<44}{spread:.3f} (1 when the weights are right)"
+        f"{'robust spread of the test values':<50}{spread:.3f} (1 when the weights are right)"
     )
     section.lines.append(
-        f"{f'image coordinates beyond {BLUNDER:g} times the spread':<44}{len(images)} of {tested} tested"
+        f"{f'image coordinates beyond {BLUNDER:g} times the spread':<50}{len(images)} of {tested} tested"
         f" ({0.0027 * tested:.0f} to be expected)"
     )
     if not len(images):

@@ -77,7 +77,7 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Mask]:
         known = np.flatnonzero(medians > 0)
         if step == 0 and known.size:
             usual = float(np.median(medians[known]))
-            section.lines.append(f"{'median residual of a photo':<44}{usual:.4f} mm")
+            section.lines.append(f"{'median residual of a photo':<50}{usual:.4f} mm")
         if len(known) < 4 or step == MOST_PHOTOS:
             break
         logs = np.log(medians[known])
@@ -271,7 +271,7 @@ def _control_component(
     unit, middle = block.linear_unit, float(np.median(differences[known]))
     spread = mad_sd(differences - middle)
     section.lines.append(
-        f"{f'control, intersected minus given, {name}':<44}median {middle:.3f} {unit},"
+        f"{f'control, intersected minus given, {name}':<50}median {middle:.3f} {unit},"
         f" spread {spread:.3f} {unit} ({len(known)} points)"
     )
     if len(known) < FEWEST_CONTROL or spread == 0:

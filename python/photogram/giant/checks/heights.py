@@ -43,9 +43,9 @@ def two_ray_heights(result: Result) -> Section:
     spread = MAD_TO_SD * float(np.median(np.abs(departures)))
     unit = block.linear_unit
     section.lines += [
-        f"{'two-ray points':<44}{len(two)} of {len(known)}",
-        f"{'spread about the planes of their neighbours':<44}{spread:.3f} {unit}",
-        f"{'median standard deviation of their heights':<44}{float(np.median(own_sd)):.3f} {unit}",
+        f"{'two-ray points':<50}{len(two)} of {len(known)}",
+        f"{'spread about the planes of their neighbours':<50}{spread:.3f} {unit}",
+        f"{'median standard deviation of their heights':<50}{float(np.median(own_sd)):.3f} {unit}",
     ]
     scale = np.maximum(spread, own_sd)
     for row in np.flatnonzero(np.abs(departures) > DEPARTURE * scale).tolist():

@@ -21,8 +21,8 @@ SUSPICIOUS = 0.25
 """Cost above which an orientation is doubted: 0 for rays that meet in front, 1 for rays that miss."""
 BETTER = 0.5
 """An explanation must lower the cost to this part of what it was."""
-DOWN = -0.8
-"""Vertical component of the axis of a near-vertical photo that looks down, at most."""
+UPRIGHT = 0.8
+"""Vertical component of the z axis of a near-vertical photo, at least; it looks along its negative z axis."""
 MOST = 20
 """Photos that are turned one by one, at most."""
 TURNS = {"by 180 degrees": math.pi, "by 90 degrees": math.pi / 2, "by -90 degrees": -math.pi / 2}
@@ -50,12 +50,12 @@ def orientation(block: Block) -> tuple[Section, Block]:
         block = turned
     known = np.isfinite(met.sizes)
     behind = int((known & ~met.in_front).sum())
-    section.lines.append(f"{'rays that meet behind their camera':<44}{behind} of {int(known.sum())}")
-    section.lines.append(f"{'median residual of intersection':<44}{_median(met.sizes):.3f} mm")
+    section.lines.append(f"{'rays that meet behind their camera':<50}{behind} of {int(known.sum())}")
+    section.lines.append(f"{'median residual of intersection':<50}{_median(met.sizes):.3f} mm")
     if block is not rays.block:
         after = Rays.of(block).intersect()
         section.lines.append(
-            f"{'median residual with these explanations':<44}{_median(after.sizes):.3f} mm;"
+            f"{'median residual with these explanations':<50}{_median(after.sizes):.3f} mm;"
             " the sections below hold with them"
         )
     return section, block
@@ -70,7 +70,8 @@ def _above(rays: Rays, met: Intersection) -> list[Finding]:
     """Name control points computed above a camera that looks down."""
     block = rays.block
     given = np.isfinite(block.point_sd).any(axis=1)[block.image_points]
-    looks_down = -rays.cameras[:, 2, 2][block.image_photos] < DOWN
+    upright = np.asarray(rays.cameras[:, 2, 2] > UPRIGHT, dtype=np.bool_)
+    looks_down = upright[block.image_photos]
     heights, stations = met.positions[block.image_points, 2], rays.centres[block.image_photos, 2]
     rows = np.flatnonzero(given & looks_down & (heights > stations))
     points, first = np.unique(block.image_points[rows], return_index=True)

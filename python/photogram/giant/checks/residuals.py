@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,12 @@ from photogram.result import Result
 __all__ = ["residuals"]
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 FEWEST = 20
 """Images of a photo that a test of its pattern needs."""
 WORTH = 0.3
 """A pattern of all photos matters from this part of the standard deviation of an image coordinate on."""
-UNBALANCED = 4.0
-"""Sums of the residuals of a point beyond so many of their standard deviations."""
 SHOWN = 5
 
 
@@ -36,8 +36,8 @@ def residuals(result: Result, spread: float) -> Section:
     """
     section = Section(
         "Patterns of the residuals",
-        "Residuals should be as large as their standard deviations, whatever the photo and the place in it; they"
-        " grow with the number of rays, because two rays leave the x parallax to the height.",
+        "Residuals should have no pattern. They grow with the number of rays: two rays leave all parallax"
+        " along the flight line to the height.",
     )
     _by_rays(result, section)
     _sums(result, section)
@@ -58,7 +58,7 @@ def _by_rays(result: Result, section: Section) -> None:
 
 
 def _sums(result: Result, section: Section) -> None:
-    """The residuals of a point should balance."""
+    """Look for points whose residuals do not balance."""
     block, used = result.block, result.used_images
     count = len(block.point_ids)
     points = block.image_points[used]
@@ -77,14 +77,15 @@ def _sums(result: Result, section: Section) -> None:
     if not several.any():
         return
     rms = 1000 * np.sqrt((sums[several] ** 2).mean())
-    section.lines.append(f"{'rms of the sums of the residuals of a point':<44}{rms:.2f} um (3 and more rays)")
+    section.lines.append(f"{'rms of the sums of the residuals of a point':<50}{rms:.2f} um (3 and more rays)")
     sizes = np.abs(sums) / np.sqrt(np.maximum(variances, 1e-300)) * several[:, np.newaxis]
+    limit = critical(2 * int(several.sum()))
     for point in np.argsort(-sizes.max(axis=1), kind="stable")[:SHOWN].tolist():
-        if sizes[point].max() > UNBALANCED:
+        if sizes[point].max() > limit:
             x, y = 1000 * sums[point]
             text = (
-                f"the residuals of point {block.point_ids[point]} do not balance: they sum to {x:.1f} um in x and"
-                f" {y:.1f} um in y; is its control, or one of its images, wrong?"
+                f"the residuals of point {block.point_ids[point]} do not balance: they sum to {x:.1f} um in x"
+                f" and {y:.1f} um in y; is its control, or one of its images, wrong?"
             )
             section.findings.append(Finding("unbalanced-point", "look", text, [], [block.point_ids[point]]))
 
@@ -119,13 +120,13 @@ def _frame_pattern(result: Result, spread: float, section: Section) -> None:
         amplitude = float((design * (result.residuals[used] / sd)).sum()) / norm
         significance = abs(amplitude) * math.sqrt(norm) / spread
         section.lines.append(
-            f"{f'pattern of all photos, {name}':<44}{1000 * amplitude:8.2f} um at {size:.0f} mm from the centre"
-            f" ({significance:.1f} standard deviations)"
+            f"{f'pattern of all photos, {name}':<50}{1000 * amplitude:.2f} um at {size:.0f} mm from the"
+            f" centre ({significance:.1f} standard deviations)"
         )
         if significance > limit and abs(amplitude) > WORTH * usual:
             text = (
-                f"all photos share a pattern: {name}, {1000 * amplitude:.1f} um at {size:.0f} mm from the centre;"
-                " is the lens, the film or the refraction corrected?"
+                f"all photos share a pattern: {name}, {1000 * amplitude:.1f} um at {size:.0f} mm from the"
+                " centre; is the lens, the film or the refraction corrected?"
             )
             values = {"amplitude_um": 1000 * amplitude, "significance_sd": significance}
             section.findings.append(Finding("systematic-pattern", "look", text, values=values))
@@ -139,39 +140,43 @@ def _photo_patterns(result: Result, spread: float, section: Section) -> None:
     bounds = np.searchsorted(block.image_photos[rows], np.arange(len(block.photo_ids) + 1)).tolist()
     size = float(np.quantile(np.abs(block.image_xy), 0.99))
     limit, tested = critical(len(block.photo_ids)), 0
-    for photo, (first, last) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
+    for photo, (first, last) in enumerate(pairwise(bounds)):
         own = rows[first:last]
         if len(own) < FEWEST:
             continue
         tested += 1
-        _, terms = _terms(block.image_xy[own], size)
-        means = np.broadcast_to(np.eye(2), (len(own), 2, 2))
-        design = np.concatenate([means, terms], axis=1) / block.image_sd[own][:, np.newaxis]
-        design = design.transpose(0, 2, 1).reshape(2 * len(own), -1)
-        observed = (result.residuals[own] / block.image_sd[own]).ravel() / spread
-        solved = np.linalg.lstsq(design, observed, rcond=None)[0]
-        explained = float(((design @ solved) ** 2).sum())
-        significance = _normal_of_chi_square(explained, design.shape[1])
+        significance = _own_pattern(result, own, size, spread)
         if significance > limit:
-            mean = 1000 * result.residuals[own].mean(axis=0)
+            name, mean = block.photo_ids[photo], 1000 * result.residuals[own].mean(axis=0)
             text = (
-                f"the residuals of photo {block.photo_ids[photo]} have a pattern (mean {mean[0]:.1f} um in x,"
-                f" {mean[1]:.1f} um in y; {significance:.1f} standard deviations): look at its preprocessing"
+                f"the residuals of photo {name} have a pattern (mean {mean[0]:.1f} um in x, {mean[1]:.1f} um"
+                f" in y; {significance:.1f} standard deviations): look at its preprocessing"
             )
             values = {
                 "mean_x_um": float(mean[0]),
                 "mean_y_um": float(mean[1]),
                 "significance_sd": significance,
             }
-            section.findings.append(
-                Finding("photo-pattern", "look", text, [block.photo_ids[photo]], [], values)
-            )
+            section.findings.append(Finding("photo-pattern", "look", text, [name], [], values))
     section.lines.append(
-        f"{'photos tested for a pattern of their own':<44}{tested} of {len(block.photo_ids)}"
+        f"{'photos tested for a pattern of their own':<50}{tested} of {len(block.photo_ids)}"
     )
+
+
+def _own_pattern(result: Result, rows: Indices, size: float, spread: float) -> float:
+    """Return how significant mean and patterns of some images of a photo are, in standard deviations."""
+    block = result.block
+    _, terms = _terms(block.image_xy[rows], size)
+    means = np.broadcast_to(np.eye(2), (len(rows), 2, 2))
+    design = np.concatenate([means, terms], axis=1) / block.image_sd[rows][:, np.newaxis]
+    design = design.transpose(0, 2, 1).reshape(2 * len(rows), -1)
+    observed = (result.residuals[rows] / block.image_sd[rows]).ravel() / spread
+    solved = np.linalg.lstsq(design, observed, rcond=None)[0]
+    explained = float(((design @ solved) ** 2).sum())
+    return _normal_of_chi_square(explained, design.shape[1])
 
 
 def _normal_of_chi_square(value: float, freedom: int) -> float:
     """Turn chi-square into a normal value (Wilson and Hilferty, 1931)."""
     spread = 2 / (9 * freedom)
-    return ((value / freedom) ** (1 / 3) - (1 - spread)) / math.sqrt(spread)
+    return float(((value / freedom) ** (1 / 3) - (1 - spread)) / math.sqrt(spread))

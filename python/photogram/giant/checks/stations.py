@@ -29,13 +29,8 @@ CURVED = 15
 """Photos of a strip whose path may be curved."""
 SMOOTH_POSITION, SMOOTH_ANGLE = 1e-3, 1e-3
 """Departures that are never remarked on: of the base, and radians."""
-QUANTITIES = (
-    "across the strip",
-    "height",
-    "omega along the strip",
-    "phi along the strip",
-    "kappa along the strip",
-)
+QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
+"""The angles are those between the photo and its strip, ground-to-photo."""
 
 
 def stations(block: Block, result: Result | None) -> Section:
@@ -135,13 +130,12 @@ def _path(positions: Floats, heights: Floats, cameras: Floats) -> _Path:
 def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str, section: Section) -> None:
     """Name the photos that depart from the path far more than photos do on the whole."""
     usual = MAD_TO_SD * np.median(np.abs(np.vstack([path.departures for path in paths])), axis=0)
-    positions = local_axes(block).positions(block.photo_positions)
-    base = float(np.median(np.linalg.norm(np.diff(positions, axis=0), axis=1)))
+    base = _base(block)
     floor = np.array([SMOOTH_POSITION * base] * 2 + [SMOOTH_ANGLE] * 3)
     units = [block.linear_unit] * 2 + ["deg"] * 3
     factors = np.array([1.0, 1.0, *[np.degrees(1.0)] * 3])
     for name, spread, unit in zip(QUANTITIES, usual * factors, units, strict=True):
-        section.lines.append(f"{f'spread about the path, {name}':<44}{spread:.4f} {unit}")
+        section.lines.append(f"{f'spread about the path, {name}':<50}{spread:.4f} {unit}")
     for strip, path in zip(strips, paths, strict=True):
         scale = np.maximum(np.maximum(usual, path.spread), floor)
         for row, k in np.argwhere(np.abs(path.departures) > LOOK * scale).tolist():
@@ -159,7 +153,7 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
 def _moved(result: Result, section: Section) -> None:
     """Name the stations that the adjustment moved far more than the others."""
     block = result.block
-    axes = local_axes(block)
+    axes, base = local_axes(block), _base(block)
     shifts = axes.positions(result.photo_positions) - axes.positions(block.photo_positions)
     turns = result.photo_attitudes - block.photo_attitudes
     turns = np.angle(np.exp(1j * turns))
@@ -171,8 +165,8 @@ def _moved(result: Result, section: Section) -> None:
         spread = MAD_TO_SD * np.median(np.abs(changes), axis=0)
         sizes = np.abs(changes) / np.maximum(spread, np.finfo(np.float64).tiny)
         listed = ", ".join(f"{each * factor:.4f}" for each in spread)
-        section.lines.append(f"{f'usual change of {what} by the adjustment':<44}{listed} {shown}")
-        small = np.abs(changes).max(axis=1) < (SMOOTH_ANGLE if what == "attitude" else 1e-6)
+        section.lines.append(f"{f'usual change of {what} by the adjustment':<50}{listed} {shown}")
+        small = np.abs(changes).max(axis=1) < (SMOOTH_ANGLE if what == "attitude" else SMOOTH_POSITION * base)
         for photo in np.flatnonzero((sizes.max(axis=1) > MOVED) & ~small).tolist():
             k = int(sizes[photo].argmax())
             text = (
@@ -184,3 +178,10 @@ def _moved(result: Result, section: Section) -> None:
             section.findings.append(
                 Finding("moved-station", "look", text, [block.photo_ids[photo]], [], values)
             )
+
+
+def _base(block: Block) -> float:
+    """Return the usual distance of a photo from the next; 0 for a single photo."""
+    positions = local_axes(block).positions(block.photo_positions)
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    return float(np.median(steps)) if steps.size else 0.0

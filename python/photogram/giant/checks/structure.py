@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from photogram.block import Block
 from photogram.giant.checks.findings import Finding, Section
+from photogram.giant.remarks import FEWEST_TIES, ties
 from photogram.report import bandwidths
 from photogram.result import Result
 from photogram.structuring import structure
@@ -15,13 +16,11 @@ __all__ = ["parts_of", "structure_section"]
 
 Indices = NDArray[np.int64]
 
-FEWEST_TIES = 3
-"""Points that an orientation needs at least."""
 SHOWN = 12
 
 
 def structure_section(block: Block, result: Result | None) -> Section:
-    """Describe rays, ties and bandwidth; name photos that hang on too few points, and parts that do not hang together.
+    """Describe rays, ties and bandwidth; name photos with few ties, and parts that share no point.
 
     Parameters
     ----------
@@ -32,7 +31,7 @@ def structure_section(block: Block, result: Result | None) -> Section:
     """
     section = Section(
         "Structure",
-        "Photos are tied by the points they share; the order of FRAMES made the bandwidth of the 1987 program.",
+        "Points tie photos together; the order of FRAMES makes the bandwidth of the 1987 program.",
     )
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     counts = np.bincount(block.image_photos, minlength=len(block.photo_ids))
@@ -43,13 +42,11 @@ def structure_section(block: Block, result: Result | None) -> Section:
         f"{counts.min()}, {np.median(counts):.0f}, {counts.max()}"
     )
     _bandwidths(block, result, section)
-    held = np.isfinite(block.point_sd).any(axis=1)
-    useful = (rays >= 2) | held
-    ties = np.bincount(block.image_photos[useful[block.image_points]], minlength=len(block.photo_ids))
-    for photo in np.flatnonzero(ties < FEWEST_TIES).tolist():
+    tied = ties(block)
+    for photo in np.flatnonzero(tied < FEWEST_TIES).tolist():
         name = block.photo_ids[photo]
-        text = f"photo {name} has only {ties[photo]} points that other photos or control tie"
-        section.findings.append(Finding("few-ties", "grave", text, [name], [], {"ties": float(ties[photo])}))
+        text = f"photo {name} has only {tied[photo]} points that other photos or control tie"
+        section.findings.append(Finding("few-ties", "grave", text, [name], [], {"ties": float(tied[photo])}))
     _parts(block, section)
     return section
 
