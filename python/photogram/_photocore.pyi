@@ -238,6 +238,10 @@ class BlockSolution:
         """Every iteration."""
 
     @property
+    def photo_corrections(self) -> _Floats:
+        """(k, P, 6) corrections of position and attitude in each of k iterations, in their units."""
+
+    @property
     def photo_positions(self) -> _Floats:
         """(P, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
 
@@ -256,6 +260,10 @@ class BlockSolution:
     @property
     def point_positions(self) -> _Floats:
         """(n, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
+
+    @property
+    def point_last_corrections(self) -> _Floats:
+        """(n, 3) corrections in the last iteration, in the units of the values."""
 
     @property
     def point_cofactors(self) -> _Floats:

@@ -91,6 +91,9 @@ class AdjustedBlock:
         What the variance of unit weight is based on: `free`, `constrained` or `unity`.
     variance_of_unit_weight
         None without degrees of freedom; covariances are then scaled by 1.
+    photo_corrections
+        (k, P, 6) corrections of position and attitude in each of the k iterations; they lead from the initial
+        to the adjusted values.
     photo_positions, photo_attitudes
         (P, 3) adjusted.
     photo_cofactors
@@ -99,6 +102,8 @@ class AdjustedBlock:
         (P, 6) redundancy numbers of positions and attitudes as observations; 0 unless weighted.
     point_positions
         (n, 3) adjusted.
+    point_last_corrections
+        (n, 3) corrections in the last iteration.
     point_cofactors
         (n, 3, 3).
     point_redundancy
@@ -130,11 +135,13 @@ class AdjustedBlock:
     degrees_of_freedom: int
     unit_variance: str
     variance_of_unit_weight: float | None
+    photo_corrections: Floats
     photo_positions: Floats
     photo_attitudes: Floats
     photo_cofactors: Floats
     photo_redundancy: Floats
     point_positions: Floats
+    point_last_corrections: Floats
     point_cofactors: Floats
     point_redundancy: Floats
     point_rays: NDArray[np.int64]
@@ -163,11 +170,13 @@ class AdjustedBlock:
             degrees_of_freedom=solution.degrees_of_freedom,
             unit_variance=unit_variance,
             variance_of_unit_weight=solution.variance_of_unit_weight,
+            photo_corrections=solution.photo_corrections,
             photo_positions=solution.photo_positions,
             photo_attitudes=solution.photo_attitudes,
             photo_cofactors=solution.photo_cofactors,
             photo_redundancy=solution.photo_redundancy,
             point_positions=solution.point_positions,
+            point_last_corrections=solution.point_last_corrections,
             point_cofactors=solution.point_cofactors,
             point_redundancy=solution.point_redundancy,
             point_rays=solution.point_rays,

@@ -188,6 +188,32 @@ fn a_bad_start_is_damped_and_a_good_one_is_not() {
 }
 
 #[test]
+fn corrections_lead_from_the_initial_to_the_adjusted_values() {
+    let mut problem = problem();
+    hold(&mut problem, &DATUM, 0.0);
+    for frame in 0..FRAMES {
+        problem.initial[2 * POINTS + 3 * frame + 2] += 1.2 * noise(3 * frame + 1);
+    }
+    for criterion in [STRICT.criterion, Criterion::Percent(5.0)] {
+        let adjusted = run(&problem, &Options { criterion, ..STRICT }).unwrap();
+        assert_eq!(adjusted.corrections.len(), adjusted.iterations.len());
+        assert!(adjusted.corrections.len() > 1);
+        for (i, (initial, last)) in
+            problem.initial.iter().zip(&adjusted.unknowns).enumerate().skip(2 * POINTS)
+        {
+            let sum: f64 = adjusted.corrections.iter().map(|all| all[i - 2 * POINTS]).sum();
+            assert!((initial + sum - last).abs() < 1e-13);
+        }
+        // One iteration less ends where the last one began.
+        let max_iterations = adjusted.iterations.len() - 1;
+        let before = run(&problem, &Options { criterion, max_iterations, ..STRICT }).unwrap();
+        for (i, correction) in adjusted.last_local_corrections.iter().enumerate() {
+            assert!((before.unknowns[i] + correction - adjusted.unknowns[i]).abs() < 1e-13);
+        }
+    }
+}
+
+#[test]
 fn undetermined_unknowns_are_named() {
     // Without a datum the plane shifts, turns and grows with all frames and the scale.
     let Err(AdjustError::Undetermined(combinations)) = run(&problem(), &STRICT) else { panic!("determined") };

@@ -59,6 +59,13 @@ impl BlockSolution {
     }
 
     #[getter]
+    fn photo_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let iterations = &self.solution.photo_corrections;
+        let values = iterations.iter().flatten().flatten().copied().collect();
+        PyArray1::from_vec(py, values).reshape([iterations.len(), self.solution.photos.len(), 6])
+    }
+
+    #[getter]
     fn photo_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         table(py, self.solution.photos.iter().map(|photo| photo.position).collect())
     }
@@ -82,6 +89,12 @@ impl BlockSolution {
     fn point_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let missing = [f64::NAN; 3];
         table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.coordinates)).collect())
+    }
+
+    #[getter]
+    fn point_last_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let missing = [f64::NAN; 3];
+        table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.last_correction)).collect())
     }
 
     #[getter]

@@ -111,6 +111,10 @@ pub struct Adjustment {
     pub initial_sum_of_squares: f64,
     /// Every iteration.
     pub iterations: Vec<Iteration>,
+    /// For every iteration, the corrections of all unknowns that are not local, in the order of the layout.
+    pub corrections: Vec<Vec<f64>>,
+    /// The corrections of the local unknowns in the last iteration; zero where there was none.
+    pub last_local_corrections: Vec<f64>,
     /// Adjusted unknowns, in the order of the layout.
     pub unknowns: Vec<f64>,
     /// Observed minus computed, in the order of groups and rows, in the units of the observations.
@@ -165,8 +169,17 @@ pub fn adjust<M: Model>(
     pool: &ThreadPool,
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
 ) -> Result<Adjustment, AdjustError> {
-    let mut run =
-        Run { problem, options, pool, watch, seconds: Seconds::default(), formations: 0, iterations: vec![] };
+    let mut run = Run {
+        problem,
+        options,
+        pool,
+        watch,
+        seconds: Seconds::default(),
+        formations: 0,
+        iterations: vec![],
+        corrections: vec![],
+        last_local_corrections: vec![0.0; problem.layout().all_locals().len()],
+    };
     let start = run.form(problem.initial.clone(), 0.0)?;
     if !start.sum_of_squares.is_finite() {
         return Err(AdjustError::NotFinite);
@@ -220,6 +233,8 @@ struct Run<'a, 'w, M: Model> {
     seconds: Seconds,
     formations: usize,
     iterations: Vec<Iteration>,
+    corrections: Vec<Vec<f64>>,
+    last_local_corrections: Vec<f64>,
 }
 
 /// A step is accepted when the sum of squares does not rise by more than its own rounding error.
@@ -268,7 +283,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
             if next.sum_of_squares <= highest && next.normals.deficient_locals.is_empty() {
                 best = next.sum_of_squares;
-                self.tell(Iteration { sum_of_squares: best, ..iteration })?;
+                self.accept(Iteration { sum_of_squares: best, ..iteration }, &unknowns, &next.unknowns)?;
                 state = next;
             } else {
                 state = self.form(unknowns, harder)?;
@@ -304,7 +319,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
             if !sum_of_squares.is_finite() {
                 return Ok(End { status: Status::Diverged, unknowns, basis: Some(solved.basis), last: None });
             }
-            self.tell(Iteration { number, sum_of_squares, largest_change: solved.change, damping: 0.0 })?;
+            let iteration = Iteration { number, sum_of_squares, largest_change: solved.change, damping: 0.0 };
+            self.accept(iteration, &unknowns, &state.unknowns)?;
             match previous.map(|before| (sum_of_squares - before) / before * 100.0) {
                 Some(change) if change.abs() < percent => return self.stay(state, Status::Converged),
                 Some(change) if change >= percent => return self.stay(state, Status::Diverged),
@@ -384,14 +400,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     fn finish(mut self, end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
         let problem = self.problem;
-        let mut unknowns = end.unknowns;
+        let mut unknowns = end.unknowns.clone();
         if let Some((_, step)) = &end.last {
             unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
         }
         let residuals = problem.residuals(self.pool, &unknowns);
         if let Some((last, _)) = end.last {
             let sum_of_squares = problem.sum_of_squares(&residuals) + problem.prior_sum_of_squares(&unknowns);
-            self.tell(Iteration { sum_of_squares, ..last })?;
+            self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, &unknowns)?;
         }
         let cofactors = match end.basis {
             Some(basis) if self.options.covariance => Some(self.cofactors(basis)?),
@@ -404,6 +420,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
             status: end.status,
             initial_sum_of_squares,
             iterations: self.iterations,
+            corrections: self.corrections,
+            last_local_corrections: self.last_local_corrections,
             unknowns,
             residuals,
             redundancy: cofactors.as_ref().map(redundancy),
@@ -439,7 +457,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
         stopped((self.watch)(Event::Progress { phase, done: 0, total }))
     }
 
-    fn tell(&mut self, iteration: Iteration) -> Result<(), AdjustError> {
+    /// Keeps an iteration that stands, with its corrections, and tells of it.
+    fn accept(&mut self, iteration: Iteration, before: &[f64], after: &[f64]) -> Result<(), AdjustError> {
+        let mut corrections: Vec<f64> = before.iter().zip(after).map(|(from, to)| to - from).collect();
+        let kept = corrections.split_off(self.problem.layout().all_locals().end);
+        self.last_local_corrections = corrections;
+        self.corrections.push(kept);
         self.iterations.push(iteration);
         stopped((self.watch)(Event::Iteration(iteration)))
     }

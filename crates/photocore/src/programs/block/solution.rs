@@ -27,6 +27,8 @@ pub struct AdjustedPoint {
     pub cofactors: [[f64; 3]; 3],
     /// Redundancy numbers of its components as observations of themselves; zero unless weighted.
     pub redundancy: [f64; 3],
+    /// Its correction in the last iteration.
+    pub last_correction: Vector3,
     /// Number of images.
     pub rays: usize,
 }
@@ -66,6 +68,8 @@ impl SumsOfSquares {
 pub struct Solution {
     /// The photographs.
     pub photos: Vec<AdjustedPhoto>,
+    /// For every iteration, the corrections of position, omega, phi and kappa of each photograph.
+    pub photo_corrections: Vec<Vec<[f64; 6]>>,
     /// The points; None for those that were left out.
     pub points: Vec<Option<AdjustedPoint>>,
     /// The images; None for those of points that were left out.
@@ -126,11 +130,14 @@ impl Solution {
                 ),
                 cofactors: square(cofactors.as_ref().map(|all| &all.local[9 * local..])),
                 redundancy: std::array::from_fn(|k| redundancy_of(3 * local + k)),
+                last_correction: std::array::from_fn(|k| adjustment.last_local_corrections[3 * local + k]),
                 rays: layout.groups_of(local).len(),
             });
         }
+        let corrections = std::mem::take(&mut adjustment.corrections);
         Self {
             photos: photos.collect(),
+            photo_corrections: corrections.iter().map(|all| all.as_chunks().0.to_vec()).collect(),
             points: adjusted_points,
             images: images(block, problem, &mut adjustment),
             dropped,
