@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram import _photocore
+from photogram.angles import degrees_minutes_seconds
 from photogram.structuring import structure
 
 if TYPE_CHECKING:
@@ -284,11 +285,9 @@ def _position_formats(result: AdjustedBlock) -> tuple[Callable[[Floats], str], C
 
 
 def _dms(angle: float, decimals: int) -> str:
-    """Degrees, minutes and seconds of an angle in radians, rounded as a whole so that no 60 appears."""
-    units = round(abs(angle) * _ARCSEC * 10**decimals)
-    minutes, seconds = divmod(units, 60 * 10**decimals)
+    degrees, minutes, seconds = degrees_minutes_seconds(angle, decimals)
     sign = "-" if angle < 0 else ""
-    return f"{sign}{minutes // 60} {minutes % 60:02d} {seconds / 10**decimals:0{decimals + 3}.{decimals}f}"
+    return f"{sign}{degrees} {minutes:02d} {seconds:0{decimals + 3}.{decimals}f}"
 
 
 def _number(value: float, decimals: int) -> str:

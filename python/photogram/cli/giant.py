@@ -26,6 +26,8 @@ __all__ = ["giant"]
 
 SHOWN = 24
 """Lines of a section that the summary shows at most."""
+RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
+"""What goes to the output directory."""
 EXAMPLE = "galveston"
 """The packaged example, a directory of photogram.examples."""
 
@@ -65,10 +67,19 @@ def giant(
         Path | None,
         typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
     ] = None,
+    listing: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the printout of the 1987 program, page by page, as COMMON asks for it.",
+            show_default=False,
+        ),
+    ] = None,
     as_published: Annotated[
         bool,
         typer.Option(
-            "--as-published", help="Stop by the percent criterion and the limit of iterations of COMMON."
+            "--as-published",
+            help="Stop by the percent criterion and the limit of iterations of COMMON; list as in 1987.",
         ),
     ] = False,
     ordering: Annotated[
@@ -110,8 +121,10 @@ def giant(
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
+        _check_listing(listing, directory, out)
         project = read_project(directory)
-        block = project.to_block(Limits.parse(limits) if limits else None)
+        allowed = Limits.parse(limits) if limits else None
+        block = project.to_block(allowed)
         try:
             result = _adjust(project, block, as_published, ordering, threads, quiet)
         except AdjustmentError:
@@ -122,6 +135,11 @@ def giant(
         written = _result_files(project, block, result, out)
         if json is not None:
             written[json] = result.to_json()
+        if listing is not None:
+            from photogram.giant import listing as printout
+
+            text = printout(project, block, result, as_published=as_published, limits=allowed)
+            written[listing] = text.encode()
         write_whole(written)
         if not quiet:
             _summarize(result)
@@ -149,6 +167,20 @@ def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Pat
         if inputs:
             raise InputError(f"holds another project ({', '.join(inputs)}); --overwrite allows it", file=out)
     return out
+
+
+def _check_listing(listing: Path | None, directory: Path, out: Path) -> None:
+    """Refuse to write the listing over a file of the project, or over another result."""
+    from photogram.errors import InputError
+    from photogram.giant.files import present_files
+
+    if listing is None:
+        return
+    inputs = [path for paths in present_files(directory).values() for path in paths]
+    if listing.exists() and any(listing.samefile(path) for path in inputs):
+        raise InputError("the listing would be written over the input", file=listing)
+    if listing.resolve() in {(out / name).resolve() for name in RESULTS}:
+        raise InputError("another result has this name", file=listing)
 
 
 def _adjust(

@@ -8,6 +8,7 @@ from photogram.giant.frames import Frame
 from photogram.giant.ground import GroundPoint
 from photogram.giant.images import ImageFrame
 from photogram.giant.limits import Limits
+from photogram.giant.listing import listing
 from photogram.giant.project import Project, read_project, write_project
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "Section",
     "check",
     "error_warnings",
+    "listing",
     "read_project",
     "write_project",
 ]

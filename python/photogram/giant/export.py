@@ -13,6 +13,7 @@ from photogram.block import Block
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
+from photogram.giant.fields import printed_order
 from photogram.giant.files import written
 from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
@@ -144,7 +145,8 @@ def adjusted_ground(project: Contents, block: Block, positions: Floats) -> list[
     """Return the points for unit 9: every point on two or more photographs.
 
     Control keeps its standard deviations and type code. Pass points get the type code 7, so that the file can
-    be read as GROUND without turning them into control.
+    be read as GROUND without turning them into control. They are sorted as the printout is, unless COMMON
+    (column 13) says not to.
 
     Parameters
     ----------
@@ -156,6 +158,8 @@ def adjusted_ground(project: Contents, block: Block, positions: Floats) -> list[
     control = {point.name: point for point in project.ground}
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     rows = np.flatnonzero((rays >= 2) & np.isfinite(positions).all(axis=1)).tolist()
+    if project.common.sort_points:
+        rows.sort(key=lambda row: printed_order(block.point_ids[row]))
     names = [block.point_ids[row] for row in rows]
     return [
         dataclasses.replace(

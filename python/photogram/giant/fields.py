@@ -23,6 +23,7 @@ __all__ = [
     "parse_integer",
     "parse_name",
     "parse_real",
+    "printed_order",
     "unpack_dms",
 ]
 
@@ -203,6 +204,14 @@ def format_name(name: str) -> str:
     if name != name.strip(" ") or not name.isprintable() or name.startswith("****"):
         raise ValueError(f"the name {name!r} cannot be written: it would not be read again as it is")
     return name.ljust(8)
+
+
+def printed_order(name: str) -> tuple[int, str]:
+    """Return the key by which the program sorted names: as right-justified fields, character by character.
+
+    A blank sorts before every character that a name begins with, so that the shorter name comes first.
+    """
+    return len(name), name
 
 
 def format_position(position: Iterable[float], geographic: bool) -> str:

@@ -1,0 +1,22 @@
+"""Angles as people read them."""
+
+from __future__ import annotations
+
+import math
+
+__all__ = ["degrees_minutes_seconds"]
+
+
+def degrees_minutes_seconds(angle: float, decimals: int) -> tuple[int, int, float]:
+    """Split the size of an angle in radians; it is rounded as a whole, so that no 60 appears.
+
+    Parameters
+    ----------
+    angle
+        Radians; the sign is left to the caller.
+    decimals
+        Decimals of the seconds to round to.
+    """
+    scale: int = 10**decimals
+    minutes, units = divmod(round(math.degrees(abs(angle)) * 3600 * scale), 60 * scale)
+    return minutes // 60, minutes % 60, units / scale

@@ -1,0 +1,167 @@
+"""The printout of a job: which pages there are, in which order, from which arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.giant.diagnostics import error_warnings
+from photogram.giant.fields import printed_order
+from photogram.giant.listing.control import control_pages
+from photogram.giant.listing.corrections import correction_pages
+from photogram.giant.listing.formats import Space
+from photogram.giant.listing.frames import Station, frame_pages
+from photogram.giant.listing.iterations import iteration_pages
+from photogram.giant.listing.options import options_page
+from photogram.giant.listing.pages import Page, printout
+from photogram.giant.listing.points import point_pages, propagated_point_pages
+from photogram.giant.listing.residuals import PointResiduals, residual_pages, statistics
+from photogram.giant.listing.stations import station_pages
+from photogram.giant.listing.warnings import warning_pages
+
+if TYPE_CHECKING:
+    from photogram.adjusted import AdjustedBlock
+    from photogram.block import Block
+    from photogram.giant.contents import Contents
+    from photogram.giant.limits import Limits
+
+__all__ = ["listing"]
+
+NOTICES = {
+    "converged": "",
+    "not converged": "SOLUTION HAS NOT CONVERGED",
+    "diverged": "SOLUTION HAS DIVERGED",
+}
+
+
+def listing(
+    project: Contents,
+    block: Block,
+    result: AdjustedBlock,
+    *,
+    as_published: bool = False,
+    limits: Limits | None = None,
+) -> str:
+    """Return the printout of the 1987 program (unit 6) for an adjusted project.
+
+    Columns 3 to 6, 8 and 11 of COMMON and its residual limit say what is listed; see `docs/giant-listing.md`.
+
+    Parameters
+    ----------
+    project, block
+        What was adjusted: `block` is `project.to_block()`, with or without limits.
+    result
+        The adjustment of the block, whether it converged or not.
+    as_published
+        Whether the corrections of control components that are not held are, as in 1987, the changes of the
+        last iteration, and not adjusted minus supplied.
+    limits
+        The limits that the block was made with.
+
+    Returns
+    -------
+    Lines with FORTRAN carriage control: a `1` in the first column begins a page.
+    """
+    space = Space(block.geographic, block.linear_unit)
+    pages = [
+        options_page(project.common, space),
+        *_input_pages(project, block, space),
+        *warning_pages(error_warnings(project, block, limits)),
+    ]
+    notice = NOTICES[result.status]
+    if not project.common.intersection_only:
+        pages += iteration_pages(space, block.photo_ids, result.iterations, result.photo_corrections, notice)
+    for page in _result_pages(project, block, result, space, as_published):
+        pages.append([notice, *page] if notice else page)
+    return printout(block.title, pages)
+
+
+def _input_pages(project: Contents, block: Block, space: Space) -> Iterator[Page]:
+    common = project.common
+    if common.list_input_stations or common.list_input_images:
+        images = {frame.name: frame for frame in reversed(project.images)}
+        for row, name in enumerate(block.photo_ids):
+            station = Station(
+                block.photo_positions[row],
+                block.photo_attitudes[row],
+                block.photo_position_sd[row],
+                block.photo_attitude_sd[row],
+                block.principal_distances[row],
+            )
+            yield from frame_pages(
+                space,
+                block.photo_to_ground,
+                station,
+                images[name],
+                parameters=common.list_input_stations,
+                plates=common.list_input_images,
+            )
+    if common.list_input_control and project.ground:
+        yield from control_pages(space, project.ground, common.default_control_sd)
+
+
+def _result_pages(
+    project: Contents, block: Block, result: AdjustedBlock, space: Space, as_published: bool
+) -> Iterator[Page]:
+    common = project.common
+    closing = statistics(result.sums_of_squares, result.degrees_of_freedom, result.variance_of_unit_weight)
+    yield from residual_pages(_residuals(block, result), common.residual_limit, closing)
+    # A diverged adjustment may have no covariances.
+    used = result.used_points
+    propagated = common.error_propagation and bool(
+        np.isfinite(result.photo_cofactors).all() and np.isfinite(result.point_cofactors[used]).all()
+    )
+    if common.list_stations and not common.intersection_only:
+        yield from station_pages(
+            space,
+            block.photo_to_ground,
+            block.photo_ids,
+            result.photo_positions,
+            result.photo_attitudes,
+            result.photo_covariances if propagated else None,
+        )
+    if common.list_points:
+        yield from _points(project, block, result, space, propagated)
+    yield from _corrections(project, block, result, space, as_published)
+
+
+def _residuals(block: Block, result: AdjustedBlock) -> Iterator[PointResiduals]:
+    """Return the points in processing order, that of the block, each with its images by frame."""
+    order = np.argsort(block.image_points, kind="stable")
+    bounds = np.searchsorted(block.image_points[order], np.arange(len(block.point_ids) + 1))
+    for point in np.flatnonzero(result.used_points).tolist():
+        rows = order[bounds[point] : bounds[point + 1]]
+        frames = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
+        yield PointResiduals(block.point_ids[point], frames, result.residuals[rows])
+
+
+def _points(
+    project: Contents, block: Block, result: AdjustedBlock, space: Space, propagated: bool
+) -> list[Page]:
+    rows = np.flatnonzero(result.used_points).tolist()
+    if project.common.sort_points:
+        rows.sort(key=lambda row: printed_order(block.point_ids[row]))
+    marks = {point.name: f"*{point.type_code}*" for point in project.ground}
+    names = [block.point_ids[row] for row in rows]
+    listed = space, names, [marks.get(name, "") for name in names], result.point_positions[rows]
+    if not propagated:
+        return point_pages(*listed)
+    return propagated_point_pages(*listed, result.point_covariances[rows], np.isfinite(block.point_sd[rows]))
+
+
+def _corrections(
+    project: Contents, block: Block, result: AdjustedBlock, space: Space, as_published: bool
+) -> list[Page]:
+    index = {block.point_ids[row]: row for row in np.flatnonzero(result.used_points).tolist()}
+    names = list(dict.fromkeys(point.name for point in project.ground if point.name in index))
+    if not names:
+        return []
+    rows = [index[name] for name in names]
+    held: NDArray[np.bool_] = np.isfinite(block.point_sd[rows])
+    corrections = result.point_differences[rows]
+    if as_published:
+        corrections = np.where(held, corrections, result.point_last_corrections[rows])
+    return correction_pages(space, names, corrections, held, as_published=as_published)
