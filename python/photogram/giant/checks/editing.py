@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Adjust = Callable[[Block], Result]
 
-ROUNDS = 12
+ROUNDS = 20
 """Adjustments at the most."""
 TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
 """Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
@@ -209,28 +209,23 @@ def _largest(result: Result, spread: float) -> list[_Suspect]:
         for kind, each in values.items()
         for row, axis in np.argwhere(each > limit)
     ]
+    beyond.sort(key=lambda each: -each.test)
+    if not beyond or beyond[0].kind != "image":
+        # An error of control or of a station spoils test values far away: nothing is taken out with it.
+        return beyond[:1]
     taken: list[_Suspect] = []
     photos: set[int] = set()
     points: set[int] = set()
-    ordered = sorted(beyond, key=lambda each: -each.test)
-    for suspect in ordered:
-        if suspect.test < COMPARABLE * ordered[0].test:
+    for suspect in beyond:
+        if suspect.kind != "image" or suspect.test < COMPARABLE * beyond[0].test:
             break
-        near_photos, near_points = _neighbourhood(result.block, suspect)
-        if photos.isdisjoint(near_photos) and points.isdisjoint(near_points):
+        photo = int(result.block.image_photos[suspect.row])
+        point = int(result.block.image_points[suspect.row])
+        if photo not in photos and point not in points:
             taken.append(suspect)
-            photos |= near_photos
-            points |= near_points
+            photos.add(photo)
+            points.add(point)
     return taken
-
-
-def _neighbourhood(block: Block, suspect: _Suspect) -> tuple[set[int], set[int]]:
-    """Return the photos and points whose test values an error of the observation spoils most."""
-    if suspect.kind == "image":
-        return {int(block.image_photos[suspect.row])}, {int(block.image_points[suspect.row])}
-    if suspect.kind == "station":
-        return {suspect.row}, set()
-    return set(block.image_photos[block.image_points == suspect.row].tolist()), {suspect.row}
 
 
 def _without(block: Block, suspects: list[_Suspect]) -> Block:

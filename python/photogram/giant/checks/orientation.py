@@ -23,6 +23,8 @@ BETTER = 0.5
 """An explanation must lower the cost to this part of what it was."""
 UPRIGHT = 0.8
 """Vertical component of the z axis of a near-vertical photo, at least; it looks along its negative z axis."""
+AS_GOOD = 1.5
+"""Another explanation is as good when its cost is below so many times the least."""
 MOST = 20
 """Photos that are turned one by one, at most."""
 TURNS = {"by 180 degrees": math.pi, "by 90 degrees": math.pi / 2, "by -90 degrees": -math.pi / 2}
@@ -69,9 +71,8 @@ def _median(values: Floats) -> float:
 def _above(rays: Rays, met: Intersection) -> list[Finding]:
     """Name control points computed above a camera that looks down."""
     block = rays.block
-    given = np.isfinite(block.point_sd).any(axis=1)[block.image_points]
-    upright = np.asarray(rays.cameras[:, 2, 2] > UPRIGHT, dtype=np.bool_)
-    looks_down = upright[block.image_photos]
+    given = np.isfinite(block.point_sd).any(axis=1).take(block.image_points)
+    looks_down = (rays.cameras[:, 2, 2] > UPRIGHT).take(block.image_photos)
     heights, stations = met.positions[block.image_points, 2], rays.centres[block.image_photos, 2]
     rows = np.flatnonzero(given & looks_down & (heights > stations))
     points, first = np.unique(block.image_points[rows], return_index=True)
@@ -130,7 +131,13 @@ def _whole_block(block: Block, section: Section) -> Block:
         section.findings.append(Finding("rays-do-not-meet", "grave", text, values={"cost": before}))
         return block
     values = {"cost_before": before, "cost_after": min(costs)}
-    section.findings.append(Finding(best.kind, "grave", best.text, best.photos, [], values))
+    others = [
+        other.kind.replace("-", " ")
+        for other, cost in zip(trials, costs, strict=True)
+        if other is not best and cost < AS_GOOD * min(costs)
+    ]
+    text = best.text + (f" Nearly as good: {', '.join(others)}" if others else "")
+    section.findings.append(Finding(best.kind, "grave", text, best.photos, [], values))
     return best.block
 
 
@@ -159,9 +166,9 @@ def _trials(block: Block) -> list[_Trial]:
         )
         trials.append(_Trial("sign-of-principal-distance", text, names, _sign_changed(block, photos)))
         for turn in ("by 90 degrees", "by -90 degrees"):
-            text = f"the kappa of {name} is wrong: turned {turn}, the rays meet"
+            text = f"the kappa of {name} is wrong: turned {turn}, the rays meet."
             trials.append(_Trial("kappa", text, names, _turned(block, photos, TURNS[turn])))
-    text = "the angles are of the other sense (COMMON column 2): taken so, the rays meet"
+    text = "the angles are of the other sense (COMMON column 2): taken so, the rays meet."
     other = block.replace(photo_to_ground=not block.photo_to_ground)
     return [*trials, _Trial("sense-of-rotation", text, list(block.photo_ids), other)]
 

@@ -84,17 +84,23 @@ def strips_of(positions: Floats) -> list[Indices]:
         )
 
     strips: list[list[int]] = []
+    last = 0
     for photo in range(len(plan)):
-        if not strips:
-            strips.append([photo])
-            continue
-        strip = strips[-1]
+        if strips and follows(last, strips[-1][0], photo, photo - last):
+            strips[-1].append(photo)
+            last = photo
         # One photo out of line breaks no strip when the next one is back on course.
-        stray = len(strip) > 1 and photo + 1 < len(plan) and follows(strip[-1], strip[0], photo + 1, 2)
-        if follows(strip[-1], strip[0], photo, 1) or stray:
-            strip.append(photo)
+        elif (
+            strips
+            and len(strips[-1]) > 1
+            and last == photo - 1
+            and photo + 1 < len(plan)
+            and follows(last, strips[-1][0], photo + 1, 2)
+        ):
+            strips[-1].append(photo)
         else:
             strips.append([photo])
+            last = photo
     return [np.array(strip, dtype=np.int64) for strip in strips]
 
 
