@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from photogram import simulate
 from photogram.cli import app
 from photogram.geometry import Spheroid
 from photogram.giant import Limits, Project, check, write_project
+from photogram.giant.checks.editing import kept_images, without_photos
 from photogram.giant.checks.heights import neighbours
 from photogram.giant.checks.rays import Rays
 from photogram.giant.checks.robust import critical, fit, mad_sd
@@ -148,7 +151,7 @@ def test_the_sense_of_rotation():
         photo_positions=turned,
         point_positions=known,
         point_sd=block.point_sd[:, [1, 0, 2]],
-        photo_attitudes=block.photo_attitudes + [0, 0, np.pi / 2],
+        photo_attitudes=block.photo_attitudes + np.array([0, 0, np.pi / 2]),
     )
     kinds = {True: checked(block), False: checked(block.replace(photo_to_ground=True))}
     assert {finding.kind for finding in kinds[True].grave} & {"kappa", "sense-of-rotation"} == set()
@@ -466,6 +469,59 @@ def test_a_robust_fit_does_not_see_outliers():
     np.testing.assert_allclose(fit(design, values).ravel(), [2, 1], atol=0.02)
     assert mad_sd(values - design @ [[2.0], [1.0]]) < 0.03
     assert critical(1, 0.05) == pytest.approx(1.96, abs=0.001)
+
+
+@pytest.mark.giant("13", "the check of whatever can be read")
+@pytest.mark.parametrize("seed", range(40))
+def test_section_13_no_block_is_too_poor_or_too_bad_for_a_check(seed):
+    rng = np.random.default_rng(seed)
+    block = simulate(
+        strips=1 + seed % 2,
+        photos_per_strip=2 + seed % 4,
+        points_per_photo=4 + seed % 9,
+        control=("perimeter", "corners", "none")[seed % 3],
+        seed=seed,
+        **(GULF if seed % 2 else {}),
+    ).block
+    keep = rng.random(len(block.image_xy)) < rng.random()
+    keep[0] = True
+    block = kept_images(block, keep)
+    without = np.ones(len(block.photo_ids), dtype=bool)
+    without[np.unique(block.image_photos)] = False
+    block = without_photos(block, without)
+    gross = rng.random((len(block.image_xy), 1)) < 0.2 * (seed % 3)
+    block = block.replace(image_xy=(block.image_xy + 30 * gross * rng.standard_normal(2)) * (seed % 10 > 0))
+    outcome = checked(block)
+    assert [section.title for section in outcome.sections][-1] == "Key numbers"
+    assert json.loads(outcome.to_json())["grave"] == len(outcome.grave)
+    assert outcome.report().endswith("\n")
+
+
+def test_intersection_only_is_checked_with_fixed_stations(block):
+    project = Project.from_block(block)
+    project.common.intersection_only = True
+    outcome = check(project)
+    (none,) = found(outcome, "no-adjustment")
+    assert none.level == "look"
+    assert "the stations are not adjusted ones" in none.text
+    adjusted = checked(block).result
+    final = block.replace(photo_positions=adjusted.photo_positions, photo_attitudes=adjusted.photo_attitudes)
+    row = image(block, "0302", least_rays=4)
+    project = Project.from_block(changed(final, "image_xy", row, 0, 0.3))
+    project.common.intersection_only = True
+    outcome = check(project)
+    np.testing.assert_array_equal(outcome.result.photo_positions, outcome.result.block.photo_positions)
+    (blunder,) = outcome.grave
+    assert blunder.photos == ["0302"]
+
+
+def test_every_kind_of_finding_is_documented():
+    root = Path(__file__).parents[2]
+    sources = (root / "python" / "photogram" / "giant" / "checks").glob("*.py")
+    kinds = {kind for path in sources for kind in re.findall(r'"([a-z]+(?:-[a-z]+)+)"', path.read_text())}
+    text = (root / "docs" / "giant-check.md").read_text()
+    assert {kind for kind in kinds if f"`{kind}`" not in text} == set()
+    assert len(kinds) > 15
 
 
 # Command line

@@ -84,8 +84,8 @@ def key_numbers(edited: Edited) -> Section:
     )
     first, last = edited.first, edited.last
     if first is None or last is None:
-        section.lines.append(f"the block cannot be adjusted: {edited.reason}")
-        section.findings.append(Finding("no-adjustment", "grave", f"no adjustment: {edited.reason}"))
+        level: Level = "grave" if edited.asked else "look"
+        section.findings.append(Finding("no-adjustment", level, f"no adjustment: {edited.reason}"))
         return section
     _statuses(first, last, section)
     rows = [("as it is", first)] if first is last else [("as it is", first), ("without what is named", last)]

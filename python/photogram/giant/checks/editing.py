@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,8 @@ class Edited:
         The blunder list.
     control
         Findings on control, by point: which components were taken out.
+    asked
+        Whether an adjustment was wanted.
     """
 
     first: Result | None
@@ -65,6 +68,7 @@ class Edited:
     spread: float
     section: Section
     control: dict[str, list[Finding]] = field(default_factory=dict)
+    asked: bool = True
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,7 @@ class _Suspect:
     test: float
 
 
-def edit(block: Block, suspects: Suspects, run: Callable[..., Result] = adjust, **options: object) -> Edited:
+def edit(block: Block, suspects: Suspects, **options: Any) -> Edited:
     """Adjust a block and take out what does not fit, the largest of a neighbourhood at a time.
 
     Parameters
@@ -87,16 +91,13 @@ def edit(block: Block, suspects: Suspects, run: Callable[..., Result] = adjust, 
     suspects
         Gross errors known already: left out from the beginning. Bad photos are left out when the block does
         not fit with them.
-    run, options
-        The adjustment and its options.
+    options
+        Of :func:`photogram.adjust`.
     """
-    section = Section(
-        "Blunders (adjustment, 3-sigma rule)",
-        "A residual beyond three of its standard deviations is suspect; what is taken out stands here first.",
-    )
+    section = blunder_section()
 
     def adjusted(changed: Block) -> Result:
-        return run(changed, **options)
+        return adjust(changed, **options)
 
     current = kept_images(block, ~suspects.images)
     try:
@@ -106,6 +107,14 @@ def edit(block: Block, suspects: Suspects, run: Callable[..., Result] = adjust, 
         return Edited(None, None, str(error), float("nan"), section)
     _list(last, spread, section)
     return Edited(first, last, "", spread, section, control)
+
+
+def blunder_section() -> Section:
+    """Return the blunder list without entries."""
+    return Section(
+        "Blunders (adjustment, 3-sigma rule)",
+        "A residual beyond three of its standard deviations is suspect; what is taken out is named below.",
+    )
 
 
 def kept_images(block: Block, kept: Mask) -> Block:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram.block import Block
 from photogram.giant.checks.findings import Finding, Section
-from photogram.giant.checks.rays import Intersection, Rays, meet
+from photogram.giant.checks.rays import Intersection, Rays, frame_radius, meet
 
 __all__ = ["orientation"]
 
@@ -43,7 +43,7 @@ def orientation(block: Block) -> tuple[Section, Block]:
     met = rays.intersect()
     section.findings += _above(rays, met)
     costs = _costs(rays, met)
-    if np.nanmean(costs) > SUSPICIOUS:
+    if _mean(costs) > SUSPICIOUS:
         block = _whole_block(block, section)
     for _ in range(MOST):
         turned = _one_photo(block, section)
@@ -66,6 +66,11 @@ def orientation(block: Block) -> tuple[Section, Block]:
 def _median(values: Floats) -> float:
     finite = values[np.isfinite(values)]
     return float(np.median(finite)) if finite.size else math.nan
+
+
+def _mean(values: Floats) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else 0.0
 
 
 def _above(rays: Rays, met: Intersection) -> list[Finding]:
@@ -91,7 +96,7 @@ def _above(rays: Rays, met: Intersection) -> list[Finding]:
 
 def _costs(rays: Rays, met: Intersection) -> Floats:
     """(m,) how badly each image fits: its residual as a part of half the frame, 1 behind the camera."""
-    radius = float(np.quantile(np.hypot(*rays.block.image_xy.T), 0.95)) / 2
+    radius = frame_radius(rays.block) / 2
     costs = np.minimum(met.sizes / radius, 1)
     return np.where(np.isfinite(met.sizes) & ~met.in_front, 1.0, costs)
 
@@ -118,9 +123,9 @@ def _sign_changed(block: Block, photos: Mask) -> Block:
 
 def _whole_block(block: Block, section: Section) -> Block:
     """Look for one explanation for all photos, or for all of one principal distance."""
-    before = float(np.nanmean(_cost_of(block)))
+    before = _mean(_cost_of(block))
     trials = _trials(block)
-    costs = [float(np.nanmean(_cost_of(trial.block))) for trial in trials]
+    costs = [_mean(_cost_of(trial.block)) for trial in trials]
     best = trials[int(np.argmin(costs))]
     if min(costs) > BETTER * before:
         text = (

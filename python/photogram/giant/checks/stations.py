@@ -23,6 +23,8 @@ LOOK, GRAVE = 8.0, 20.0
 """Departures from the path, in robust standard deviations of all departures of their kind."""
 MOVED = 10.0
 """The same for the change from the initial to the adjusted station."""
+TINY = 1e-9
+"""A spread below this is rounding: radians, or the linear unit."""
 FEWEST = 5
 """Photos of a strip whose path can be judged."""
 CURVED = 15
@@ -159,6 +161,8 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
 def _moved(result: Result, section: Section) -> None:
     """Name the stations that the adjustment moved far more than the others."""
     block = result.block
+    if len(block.photo_ids) < FEWEST:
+        return
     axes, base = local_axes(block), _base(block)
     shifts = axes.positions(result.photo_positions) - axes.positions(block.photo_positions)
     turns = result.photo_attitudes - block.photo_attitudes
@@ -169,7 +173,7 @@ def _moved(result: Result, section: Section) -> None:
         ("attitude", turns, "deg", float(np.degrees(1.0))),
     ):
         spread = MAD_TO_SD * np.median(np.abs(changes), axis=0)
-        sizes = np.abs(changes) / np.maximum(spread, np.finfo(np.float64).tiny)
+        sizes = np.abs(changes) / np.maximum(spread, TINY)
         listed = ", ".join(f"{each * factor:.4f}" for each in spread)
         section.lines.append(f"{f'usual change of {what} by the adjustment':<50}{listed} {shown}")
         small = np.abs(changes).max(axis=1) < (SMOOTH_ANGLE if what == "attitude" else SMOOTH_POSITION * base)
