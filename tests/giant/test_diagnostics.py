@@ -2,10 +2,12 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 from small_project import COMMON, FRAMES, GROUND, IMAGES, frame_record, ground_record, replaced, write_files
 
-from photogram.errors import InputError
+from photogram import adjust
+from photogram.errors import InputError, RankError
 from photogram.giant import ErrorWarning, Limits, error_warnings, read_project
 
 
@@ -226,3 +228,100 @@ def test_of_control_that_stands_there_twice_by_hand_the_first_counts(tmp_path):
     assert block.point_positions[0].tolist() == [110, 210, 10]
     assert "duplicate control point 1: the first is kept" in project.messages[0].text
     assert error_warnings(project, block) == [ErrorWarning("DUPLICATE CONTROL POINTS", ["1"], general=True)]
+
+
+# Not in the guide, but needed
+
+
+@pytest.mark.giant("11", "needed beside the guide: fatal")
+@pytest.mark.parametrize(
+    ("changes", "place", "why"),
+    [
+        pytest.param(
+            {"FRAMES": [*FRAMES, frame_record("C", "1.", "2.", "3."), "C"]},
+            ("FRAMES", 5),
+            "the frame 'C' has no images",
+            id="frame without images",
+        ),
+        pytest.param(
+            {"IMAGES": replaced(IMAGES, 6, f"{'B':40}F1983")},
+            ("IMAGES", 6),
+            "its camera 'F1983' is not in CAMERAS",
+            id="unknown camera",
+        ),
+        pytest.param({"IMAGES": IMAGES[:-1]}, ("IMAGES", 9), "has no terminator", id="missing terminator"),
+        pytest.param(
+            {"FRAMES": [*FRAMES, *FRAMES[:2]]},
+            ("FRAMES", 5),
+            "the frame 'A' is already listed in record 1",
+            id="frame listed twice",
+        ),
+        pytest.param(
+            {"COMMON": ["T", f"{'':17}-1"]}, ("COMMON", 2), "convergence criterion is negative", id="E"
+        ),
+        pytest.param({"COMMON": ["T", f"{'':13}-"]}, ("COMMON", 2), "column", id="iterations"),
+    ],
+)
+def test_section_11_needed_beside_the_guide(tmp_path, changes, place, why):
+    error = refused(tmp_path, None, **changes)
+    assert (error.file, error.record) == (tmp_path / place[0], place[1])
+    assert error.text == changes[place[0]][place[1] - 1]
+    assert why in error.message
+
+
+@pytest.mark.giant("11", "needed beside the guide: duplicate image in a frame")
+def test_section_11_a_duplicate_image_is_left_out(tmp_path):
+    project, block = with_limits(tmp_path, None, IMAGES=with_images(a=["1"]))
+    assert [message.record for message in project.messages] == [5]
+    assert "the point 1 stands in the frame A twice" in project.messages[0].text
+    assert len(block.image_xy) == 6
+
+
+@pytest.mark.giant("11", "needed beside the guide: station without enough rays")
+def test_section_11_a_station_without_enough_rays(tmp_path):
+    few = [*IMAGES[:3], *IMAGES[4:]]
+    project, _ = with_limits(tmp_path, None, IMAGES=few, GROUND=[])
+    about = [message for message in project.messages if "control tie" in message.text]
+    assert [message.record for message in about] == [1, 3]
+    assert "the frame A has 2 points that other frames or control tie" in about[0].text
+    # Weights of its own are enough.
+    own = ["5."] * 3
+    frames = [
+        frame_record(name, x, "200.", "1500.", *own) if x else frame_record(name, "0.", "0.", "0.", *own)
+        for name in "AB"
+        for x in ("100.", "")
+    ]
+    project, _ = with_limits(tmp_path, None, IMAGES=few, GROUND=[], FRAMES=frames)
+    assert not any("control tie" in message.text for message in project.messages)
+
+
+@pytest.mark.giant("11", "needed beside the guide: singular point")
+def test_section_11_a_singular_point_is_named(small_block):
+    # Two photos from one station see the point; rays from one centre do not say how far it is.
+    block = small_block
+    images = block.image_photos == 0
+    twin = len(block.photo_ids)
+    changes = {
+        name: np.concatenate([getattr(block, name), getattr(block, name)[:1]])
+        for name in ("photo_positions", "photo_attitudes", "principal_distances")
+    }
+    row = np.flatnonzero(images)[:1]
+    new = len(block.point_ids)
+    both = np.array([0, twin])
+    singular = block.replace(
+        **changes,
+        photo_ids=[*block.photo_ids, "TWIN"],
+        photo_position_sd=np.full((twin + 1, 3), 1e-6),
+        photo_attitude_sd=np.full((twin + 1, 3), 1e-9),
+        point_ids=[*block.point_ids, "FAR"],
+        point_positions=np.vstack([block.point_positions, np.full((1, 3), np.nan)]),
+        point_sd=np.vstack([block.point_sd, np.full((1, 3), np.inf)]),
+        image_photos=np.concatenate([block.image_photos, both]),
+        image_points=np.concatenate([block.image_points, [new, new]]),
+        image_xy=np.concatenate([block.image_xy, block.image_xy[row], block.image_xy[row]]),
+        image_sd=np.array(0.01),
+    )
+    with pytest.raises(RankError, match="do not determine the points FAR") as caught:
+        adjust(singular)
+    assert caught.value.points == ["FAR"]
+    assert caught.value.photos == [block.photo_ids[0], "TWIN"]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, failures, output
+from photogram.cli.console import NOT_CONVERGED, errors, failures, output
 
 __all__ = ["check"]
 
@@ -40,7 +41,9 @@ def check(
         from photogram.giant.checks import check as check_project
 
         project = read_project(directory)
-        found = check_project(project, limits=Limits.parse(limits) if limits else None, threads=threads)
+        allowed = Limits.parse(limits) if limits else None
+        with errors.status("checking", spinner="line") if not quiet else nullcontext():
+            found = check_project(project, limits=allowed, threads=threads)
         if json is not None:
             write_whole({json: found.to_json()})
         if not quiet:

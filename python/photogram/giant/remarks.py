@@ -73,7 +73,7 @@ def _map_projection(block: Block) -> list[Message]:
         return []
     return [
         Message(
-            "the coordinates look like those of a map projection (State Plane, UTM): the curvature of the earth"
+            "the coordinates look like those of a map projection (State Plane, UTM): the earth's curvature"
             f" is not modelled, which moves images by up to {1000 * shift:.0f} um (heights in metres);"
             " geographic coordinates (COMMON column 1) or a local tangent system have no such error"
         )

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from photogram.block import Block
 from photogram.giant.checks.control import control, key_numbers
-from photogram.giant.checks.editing import Edited, edit
+from photogram.giant.checks.editing import Edited, blunder_section, edit
 from photogram.giant.checks.findings import Check, Finding, Section
-from photogram.giant.checks.gross import gross
+from photogram.giant.checks.gross import Suspects, gross
 from photogram.giant.checks.heights import two_ray_heights
 from photogram.giant.checks.orientation import orientation
+from photogram.giant.checks.rays import Rays
 from photogram.giant.checks.residuals import residuals
 from photogram.giant.checks.stations import stations
 from photogram.giant.checks.structure import structure_section
@@ -22,6 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["check"]
 
+FINAL_STATIONS = 5.0
+"""Stations count as adjusted when half the residuals are below so many standard deviations."""
 NAMES_ON_A_LINE = 4
 """As the 1987 program printed them."""
 
@@ -53,10 +59,24 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     block = project.to_block(limits)
     upright, oriented = orientation(block)
     errors, suspects = gross(oriented)
-    edited = edit(oriented, suspects, unit_variance=project.common.unit_variance, threads=threads)
+    edited = _edited(project, oriented, suspects, threads)
     sections = [_input(project, block, limits), structure_section(block, edited.first), upright, errors]
     sections += [edited.section, *_after_adjustment(oriented, edited)]
     return Check(project.title, sections, edited.last)
+
+
+def _edited(project: Project, block: Block, suspects: Suspects, threads: int | None) -> Edited:
+    """Adjust the block, or intersect it when that is the job and its stations are good enough."""
+    common = project.common
+    options: dict[str, Any] = {"unit_variance": common.unit_variance, "threads": threads}
+    if not common.intersection_only:
+        return edit(block, suspects, **options)
+    met = Rays.of(block).intersect()
+    ratio = met.sizes / block.image_sd.mean(axis=1)
+    if np.isfinite(ratio).any() and np.nanmedian(ratio) < FINAL_STATIONS:
+        return edit(block, suspects, **options, fix_photos=True)
+    reason = "COMMON column 10 asks for intersection only, and the stations are not adjusted ones"
+    return Edited(None, None, reason, math.nan, blunder_section(), asked=False)
 
 
 def _input(project: Project, block: Block, limits: Limits | None) -> Section:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.giant.checks.editing import Edited
-from photogram.giant.checks.findings import Finding, Section
+from photogram.giant.checks.findings import Finding, Level, Section
 from photogram.giant.checks.robust import mad_sd
 from photogram.giant.ground import CHECK_POINT
 from photogram.result import Result
@@ -17,6 +17,8 @@ __all__ = ["control", "key_numbers"]
 CODES = np.array([1, 2, 4])
 WEIGHTS_UM = (5.0, 15.0)
 """Standard deviations of image coordinates that are usual, micrometres (Appendix H)."""
+MANY = 0.2
+"""Of the control: when more does not fit, it is hardly the points."""
 VARIANCE = (0.5, 2.0)
 """Variance of unit weight between which the weights count as realistic."""
 
@@ -30,10 +32,20 @@ def control(edited: Edited) -> Section:
     result = edited.last
     if result is None:
         return section
+    block = result.block
+    controls = int((np.isfinite(block.point_sd).any(axis=1) & result.used_points).sum())
+    common = len(edited.control) > max(MANY * controls, 3)
+    if common:
+        text = (
+            f"{len(edited.control)} control points do not fit: rather than all of them, something common may"
+            " be wrong (lens, film, refraction, curvature of the earth, datum, standard deviations)"
+        )
+        section.findings.append(Finding("control-system", "grave", text, [], list(edited.control)))
     spoilt = {point for finding in edited.section.findings for point in finding.points}
     for name, findings in edited.control.items():
-        section.findings.append(_misfit(result, name, findings, name in spoilt))
-    block = result.block
+        section.findings.append(
+            _misfit(result, name, findings, name in spoilt, "look" if common else "grave")
+        )
     held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
     names = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
     for axis, name in enumerate(names):
@@ -41,7 +53,7 @@ def control(edited: Edited) -> Section:
     return section
 
 
-def _misfit(result: Result, name: str, findings: list[Finding], images_too: bool) -> Finding:
+def _misfit(result: Result, name: str, findings: list[Finding], images_too: bool, level: Level) -> Finding:
     """Put the components of one control point together, with the remedies of the guide."""
     axes = sorted({int(finding.values["component"]) for finding in findings})
     row = result.block.point_ids.index(name)
@@ -61,9 +73,7 @@ def _misfit(result: Result, name: str, findings: list[Finding], images_too: bool
         remedy += "; its images do not fit either: look at the plates first"
     text = "; ".join(finding.text for finding in findings) + ": " + remedy
     test = max(finding.values["test_value"] for finding in findings)
-    return Finding(
-        "control-misfit", "grave", text, [], [name], {"test_value": test, "type_code": float(code)}
-    )
+    return Finding("control-misfit", level, text, [], [name], {"test_value": test, "type_code": float(code)})
 
 
 def key_numbers(edited: Edited) -> Section:
@@ -74,8 +84,8 @@ def key_numbers(edited: Edited) -> Section:
     )
     first, last = edited.first, edited.last
     if first is None or last is None:
-        section.lines.append(f"the block cannot be adjusted: {edited.reason}")
-        section.findings.append(Finding("no-adjustment", "grave", f"no adjustment: {edited.reason}"))
+        level: Level = "grave" if edited.asked else "look"
+        section.findings.append(Finding("no-adjustment", level, f"no adjustment: {edited.reason}"))
         return section
     _statuses(first, last, section)
     rows = [("as it is", first)] if first is last else [("as it is", first), ("without what is named", last)]

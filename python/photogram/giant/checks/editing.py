@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Adjust = Callable[[Block], Result]
 
-ROUNDS = 12
+ROUNDS = 20
 """Adjustments at the most."""
 TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
 """Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
@@ -57,6 +58,8 @@ class Edited:
         The blunder list.
     control
         Findings on control, by point: which components were taken out.
+    asked
+        Whether an adjustment was wanted.
     """
 
     first: Result | None
@@ -65,6 +68,7 @@ class Edited:
     spread: float
     section: Section
     control: dict[str, list[Finding]] = field(default_factory=dict)
+    asked: bool = True
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,7 @@ class _Suspect:
     test: float
 
 
-def edit(block: Block, suspects: Suspects, run: Callable[..., Result] = adjust, **options: object) -> Edited:
+def edit(block: Block, suspects: Suspects, **options: Any) -> Edited:
     """Adjust a block and take out what does not fit, the largest of a neighbourhood at a time.
 
     Parameters
@@ -87,16 +91,13 @@ def edit(block: Block, suspects: Suspects, run: Callable[..., Result] = adjust, 
     suspects
         Gross errors known already: left out from the beginning. Bad photos are left out when the block does
         not fit with them.
-    run, options
-        The adjustment and its options.
+    options
+        Of :func:`photogram.adjust`.
     """
-    section = Section(
-        "Blunders (adjustment, 3-sigma rule)",
-        "A residual beyond three of its standard deviations is suspect; what is taken out stands here first.",
-    )
+    section = blunder_section()
 
     def adjusted(changed: Block) -> Result:
-        return run(changed, **options)
+        return adjust(changed, **options)
 
     current = kept_images(block, ~suspects.images)
     try:
@@ -106,6 +107,14 @@ def edit(block: Block, suspects: Suspects, run: Callable[..., Result] = adjust, 
         return Edited(None, None, str(error), float("nan"), section)
     _list(last, spread, section)
     return Edited(first, last, "", spread, section, control)
+
+
+def blunder_section() -> Section:
+    """Return the blunder list without entries."""
+    return Section(
+        "Blunders (adjustment, 3-sigma rule)",
+        "A residual beyond three of its standard deviations is suspect; what is taken out is named below.",
+    )
 
 
 def kept_images(block: Block, kept: Mask) -> Block:
@@ -209,28 +218,23 @@ def _largest(result: Result, spread: float) -> list[_Suspect]:
         for kind, each in values.items()
         for row, axis in np.argwhere(each > limit)
     ]
+    beyond.sort(key=lambda each: -each.test)
+    if not beyond or beyond[0].kind != "image":
+        # An error of control or of a station spoils test values far away: nothing is taken out with it.
+        return beyond[:1]
     taken: list[_Suspect] = []
     photos: set[int] = set()
     points: set[int] = set()
-    ordered = sorted(beyond, key=lambda each: -each.test)
-    for suspect in ordered:
-        if suspect.test < COMPARABLE * ordered[0].test:
+    for suspect in beyond:
+        if suspect.kind != "image" or suspect.test < COMPARABLE * beyond[0].test:
             break
-        near_photos, near_points = _neighbourhood(result.block, suspect)
-        if photos.isdisjoint(near_photos) and points.isdisjoint(near_points):
+        photo = int(result.block.image_photos[suspect.row])
+        point = int(result.block.image_points[suspect.row])
+        if photo not in photos and point not in points:
             taken.append(suspect)
-            photos |= near_photos
-            points |= near_points
+            photos.add(photo)
+            points.add(point)
     return taken
-
-
-def _neighbourhood(block: Block, suspect: _Suspect) -> tuple[set[int], set[int]]:
-    """Return the photos and points whose test values an error of the observation spoils most."""
-    if suspect.kind == "image":
-        return {int(block.image_photos[suspect.row])}, {int(block.image_points[suspect.row])}
-    if suspect.kind == "station":
-        return {suspect.row}, set()
-    return set(block.image_photos[block.image_points == suspect.row].tolist()), {suspect.row}
 
 
 def _without(block: Block, suspects: list[_Suspect]) -> Block:

@@ -38,16 +38,16 @@ def two_ray_heights(result: Result) -> Section:
         section.lines.append(f"{len(two)} two-ray points of {len(known)}: nothing to compare")
         return section
     near = neighbours(positions[:, :2], two, NEIGHBOURS)
-    departures = _departures(positions[:, :2], heights, two, near)
+    departures, extrapolation = _departures(positions[:, :2], heights, two, near)
     own_sd = np.sqrt(np.maximum(result.point_covariances[known[two], 2, 2], 0))
-    spread = MAD_TO_SD * float(np.median(np.abs(departures)))
+    spread = MAD_TO_SD * float(np.median(np.abs(departures) / extrapolation))
     unit = block.linear_unit
     section.lines += [
         f"{'two-ray points':<50}{len(two)} of {len(known)}",
         f"{'spread about the planes of their neighbours':<50}{spread:.3f} {unit}",
         f"{'median standard deviation of their heights':<50}{float(np.median(own_sd)):.3f} {unit}",
     ]
-    scale = np.maximum(spread, own_sd)
+    scale = np.maximum(spread * extrapolation, own_sd)
     for row in np.flatnonzero(np.abs(departures) > DEPARTURE * scale).tolist():
         name = block.point_ids[known[two[row]]]
         photos = [block.photo_ids[p] for p in block.image_photos[block.image_points == known[two[row]]]]
@@ -61,28 +61,33 @@ def two_ray_heights(result: Result) -> Section:
     return section
 
 
-def _departures(plan: Floats, heights: Floats, rows: Indices, near: Indices) -> Floats:
-    """(k,) heights above the planes of the neighbours, the neighbour that fits worst left out."""
+def _departures(plan: Floats, heights: Floats, rows: Indices, near: Indices) -> tuple[Floats, Floats]:
+    """Heights above the planes of the neighbours, (k,), the neighbour that fits worst left out.
+
+    With them (k,) how uncertain the plane is at the point: the root of 1 + its cofactor there, large outside
+    the neighbours.
+    """
     offset = plan[near] - plan[rows][:, np.newaxis]
     scale = np.maximum(np.abs(offset).max(axis=(1, 2)), 1e-300)
     design = np.concatenate([np.ones((*near.shape, 1)), offset / scale[:, np.newaxis, np.newaxis]], axis=2)
     # Relative to the point itself, so that large heights lose no digits.
     z = heights[near] - heights[rows][:, np.newaxis]
     weights = np.ones(near.shape)
-    for _ in range(2):
-        plane = _planes(design, z, weights)
-        left = np.abs(z - np.einsum("nkj,nj->nk", design, plane)) * weights
-        weights[np.arange(len(rows)), left.argmax(axis=1)] = 0
-    departures: Floats = -plane[:, 0]
-    return departures
+    plane, cofactors = _planes(design, z, weights)
+    left = np.abs(z - np.einsum("nkj,nj->nk", design, plane))
+    weights[np.arange(len(rows)), left.argmax(axis=1)] = 0
+    plane, cofactors = _planes(design, z, weights)
+    return -plane[:, 0], np.sqrt(1 + cofactors)
 
 
-def _planes(design: Floats, z: Floats, weights: Floats) -> Floats:
+def _planes(design: Floats, z: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """Coefficients (n, 3) of the planes, and the cofactor (n,) of their height at the origin."""
     normal = np.einsum("nki,nk,nkj->nij", design, weights, design)
     # Neighbours in a row give no plane: a little weight on level ground gives the mean across the row.
     normal[:, 1:, 1:] += 1e-6 * np.eye(2)
+    inverse = np.linalg.inv(normal)
     right = np.einsum("nki,nk,nk->ni", design, weights, z)
-    return np.asarray(np.linalg.solve(normal, right[:, :, np.newaxis])[..., 0], dtype=np.float64)
+    return np.einsum("nij,nj->ni", inverse, right), inverse[:, 0, 0]
 
 
 def neighbours(plan: Floats, rows: Indices, count: int) -> Indices:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram.block import Block
 from photogram.giant.checks.findings import Finding, Section
-from photogram.giant.checks.rays import Intersection, Rays, meet
+from photogram.giant.checks.rays import Intersection, Rays, frame_radius, meet
 
 __all__ = ["orientation"]
 
@@ -23,6 +23,8 @@ BETTER = 0.5
 """An explanation must lower the cost to this part of what it was."""
 UPRIGHT = 0.8
 """Vertical component of the z axis of a near-vertical photo, at least; it looks along its negative z axis."""
+AS_GOOD = 1.5
+"""Another explanation is as good when its cost is below so many times the least."""
 MOST = 20
 """Photos that are turned one by one, at most."""
 TURNS = {"by 180 degrees": math.pi, "by 90 degrees": math.pi / 2, "by -90 degrees": -math.pi / 2}
@@ -41,7 +43,7 @@ def orientation(block: Block) -> tuple[Section, Block]:
     met = rays.intersect()
     section.findings += _above(rays, met)
     costs = _costs(rays, met)
-    if np.nanmean(costs) > SUSPICIOUS:
+    if _mean(costs) > SUSPICIOUS:
         block = _whole_block(block, section)
     for _ in range(MOST):
         turned = _one_photo(block, section)
@@ -66,12 +68,16 @@ def _median(values: Floats) -> float:
     return float(np.median(finite)) if finite.size else math.nan
 
 
+def _mean(values: Floats) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else 0.0
+
+
 def _above(rays: Rays, met: Intersection) -> list[Finding]:
     """Name control points computed above a camera that looks down."""
     block = rays.block
-    given = np.isfinite(block.point_sd).any(axis=1)[block.image_points]
-    upright = np.asarray(rays.cameras[:, 2, 2] > UPRIGHT, dtype=np.bool_)
-    looks_down = upright[block.image_photos]
+    given = np.isfinite(block.point_sd).any(axis=1).take(block.image_points)
+    looks_down = (rays.cameras[:, 2, 2] > UPRIGHT).take(block.image_photos)
     heights, stations = met.positions[block.image_points, 2], rays.centres[block.image_photos, 2]
     rows = np.flatnonzero(given & looks_down & (heights > stations))
     points, first = np.unique(block.image_points[rows], return_index=True)
@@ -90,7 +96,7 @@ def _above(rays: Rays, met: Intersection) -> list[Finding]:
 
 def _costs(rays: Rays, met: Intersection) -> Floats:
     """(m,) how badly each image fits: its residual as a part of half the frame, 1 behind the camera."""
-    radius = float(np.quantile(np.hypot(*rays.block.image_xy.T), 0.95)) / 2
+    radius = frame_radius(rays.block) / 2
     costs = np.minimum(met.sizes / radius, 1)
     return np.where(np.isfinite(met.sizes) & ~met.in_front, 1.0, costs)
 
@@ -117,9 +123,9 @@ def _sign_changed(block: Block, photos: Mask) -> Block:
 
 def _whole_block(block: Block, section: Section) -> Block:
     """Look for one explanation for all photos, or for all of one principal distance."""
-    before = float(np.nanmean(_cost_of(block)))
+    before = _mean(_cost_of(block))
     trials = _trials(block)
-    costs = [float(np.nanmean(_cost_of(trial.block))) for trial in trials]
+    costs = [_mean(_cost_of(trial.block)) for trial in trials]
     best = trials[int(np.argmin(costs))]
     if min(costs) > BETTER * before:
         text = (
@@ -130,7 +136,13 @@ def _whole_block(block: Block, section: Section) -> Block:
         section.findings.append(Finding("rays-do-not-meet", "grave", text, values={"cost": before}))
         return block
     values = {"cost_before": before, "cost_after": min(costs)}
-    section.findings.append(Finding(best.kind, "grave", best.text, best.photos, [], values))
+    others = [
+        other.kind.replace("-", " ")
+        for other, cost in zip(trials, costs, strict=True)
+        if other is not best and cost < AS_GOOD * min(costs)
+    ]
+    text = best.text + (f" Nearly as good: {', '.join(others)}" if others else "")
+    section.findings.append(Finding(best.kind, "grave", text, best.photos, [], values))
     return best.block
 
 
@@ -159,9 +171,9 @@ def _trials(block: Block) -> list[_Trial]:
         )
         trials.append(_Trial("sign-of-principal-distance", text, names, _sign_changed(block, photos)))
         for turn in ("by 90 degrees", "by -90 degrees"):
-            text = f"the kappa of {name} is wrong: turned {turn}, the rays meet"
+            text = f"the kappa of {name} is wrong: turned {turn}, the rays meet."
             trials.append(_Trial("kappa", text, names, _turned(block, photos, TURNS[turn])))
-    text = "the angles are of the other sense (COMMON column 2): taken so, the rays meet"
+    text = "the angles are of the other sense (COMMON column 2): taken so, the rays meet."
     other = block.replace(photo_to_ground=not block.photo_to_ground)
     return [*trials, _Trial("sense-of-rotation", text, list(block.photo_ids), other)]
 

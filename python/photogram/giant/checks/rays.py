@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from photogram import geometry
 from photogram.block import Block
 
-__all__ = ["Intersection", "LocalAxes", "Rays", "local_axes", "meet"]
+__all__ = ["Intersection", "LocalAxes", "Rays", "frame_radius", "local_axes", "meet"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -18,6 +18,10 @@ Mask = NDArray[np.bool_]
 
 PARALLEL = 1e-8
 """Determinant of the normal matrix of a mean ray below which the rays of a point count as parallel."""
+
+
+SMALL_FRAME = 0.01
+"""The radius of a frame, as a part of the principal distance, at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +66,12 @@ def local_axes(block: Block) -> LocalAxes:
     middle = np.median(block.photo_positions, axis=0)[np.newaxis] * [1.0, 1.0, 0.0]
     origin = geometry.geographic_to_geocentric(middle, block.spheroid)[0]
     return LocalAxes(block, origin, geometry.east_north_up(middle)[0])
+
+
+def frame_radius(block: Block) -> float:
+    """Return how far from the centre images reach, millimetres."""
+    reach = float(np.quantile(np.hypot(block.image_xy[:, 0], block.image_xy[:, 1]), 0.95))
+    return max(reach, SMALL_FRAME * float(np.abs(block.principal_distances).min()))
 
 
 @dataclass(frozen=True, eq=False)

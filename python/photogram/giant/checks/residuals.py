@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.giant.checks.findings import Finding, Section
+from photogram.giant.checks.rays import frame_radius
 from photogram.giant.checks.robust import critical
 from photogram.result import Result
 
@@ -21,6 +22,8 @@ FEWEST = 20
 """Images of a photo that a test of its pattern needs."""
 WORTH = 0.3
 """A pattern of all photos matters from this part of the standard deviation of an image coordinate on."""
+ROUNDING = 0.01
+"""Of the standard deviation of an image coordinate: smaller standard deviations of residuals are not used."""
 SHOWN = 5
 
 
@@ -78,7 +81,9 @@ def _sums(result: Result, section: Section) -> None:
         return
     rms = 1000 * np.sqrt((sums[several] ** 2).mean())
     section.lines.append(f"{'rms of the sums of the residuals of a point':<50}{rms:.2f} um (3 and more rays)")
-    sizes = np.abs(sums) / np.sqrt(np.maximum(variances, 1e-300)) * several[:, np.newaxis]
+    # A point whose residuals nothing checks has sums of rounding errors.
+    floor = (ROUNDING * float(block.image_sd.min())) ** 2
+    sizes = np.abs(sums) / np.sqrt(np.maximum(variances, floor)) * several[:, np.newaxis]
     limit = critical(2 * int(several.sum()))
     for point in np.argsort(-sizes.max(axis=1), kind="stable")[:SHOWN].tolist():
         if sizes[point].max() > limit:
@@ -109,7 +114,7 @@ def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
 def _frame_pattern(result: Result, spread: float, section: Section) -> None:
     """Look for a pattern that all photos share: lens, film, or the reduction of the plates."""
     block, used = result.block, result.used_images
-    size = float(np.quantile(np.abs(block.image_xy), 0.99))
+    size = frame_radius(block)
     names, terms = _terms(block.image_xy[used], size)
     sd = block.image_sd[used]
     usual = float(np.median(sd))
@@ -117,6 +122,8 @@ def _frame_pattern(result: Result, spread: float, section: Section) -> None:
     for index, name in enumerate(names):
         design = terms[:, index] / sd
         norm = float((design**2).sum())
+        if norm == 0:
+            continue
         amplitude = float((design * (result.residuals[used] / sd)).sum()) / norm
         significance = abs(amplitude) * math.sqrt(norm) / spread
         section.lines.append(
@@ -138,7 +145,7 @@ def _photo_patterns(result: Result, spread: float, section: Section) -> None:
     rows = np.flatnonzero(result.used_images)
     rows = rows[np.argsort(block.image_photos[rows], kind="stable")]
     bounds = np.searchsorted(block.image_photos[rows], np.arange(len(block.photo_ids) + 1)).tolist()
-    size = float(np.quantile(np.abs(block.image_xy), 0.99))
+    size = frame_radius(block)
     limit, tested = critical(len(block.photo_ids)), 0
     for photo, (first, last) in enumerate(pairwise(bounds)):
         own = rows[first:last]

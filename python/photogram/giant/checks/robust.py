@@ -12,6 +12,8 @@ __all__ = ["critical", "fit", "mad_sd"]
 Floats = NDArray[np.float64]
 
 MAD_TO_SD = 1 / NormalDist().inv_cdf(0.75)
+ROUNDING = 1e-9
+"""Of the largest residual: a median below it is rounding."""
 TUKEY = 4.685
 """Tuning constant of Tukey's biweight: 95 % efficiency for normal errors."""
 
@@ -43,9 +45,11 @@ def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:
         root = np.sqrt(weights)[:, np.newaxis]
         coefficients = np.asarray(np.linalg.lstsq(design * root, values * root, rcond=None)[0])
         size = np.linalg.norm(values - design @ coefficients, axis=1)
-        middle = max(float(np.median(size)), np.finfo(np.float64).tiny)
+        middle = max(float(np.median(size)), ROUNDING * float(size.max()))
+        if middle == 0:
+            break
         if iteration < iterations // 2:
             weights = middle / np.maximum(size, 1e-3 * middle)
         else:
-            weights = np.clip(1 - (size / (TUKEY * MAD_TO_SD * middle)) ** 2, 0, None) ** 2
+            weights = (1 - np.minimum(size / (TUKEY * MAD_TO_SD * middle), 1) ** 2) ** 2
     return coefficients

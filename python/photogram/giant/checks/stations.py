@@ -23,6 +23,8 @@ LOOK, GRAVE = 8.0, 20.0
 """Departures from the path, in robust standard deviations of all departures of their kind."""
 MOVED = 10.0
 """The same for the change from the initial to the adjusted station."""
+TINY = 1e-9
+"""A spread below this is rounding: radians, or the linear unit."""
 FEWEST = 5
 """Photos of a strip whose path can be judged."""
 CURVED = 15
@@ -84,17 +86,23 @@ def strips_of(positions: Floats) -> list[Indices]:
         )
 
     strips: list[list[int]] = []
+    last = 0
     for photo in range(len(plan)):
-        if not strips:
-            strips.append([photo])
-            continue
-        strip = strips[-1]
+        if strips and follows(last, strips[-1][0], photo, photo - last):
+            strips[-1].append(photo)
+            last = photo
         # One photo out of line breaks no strip when the next one is back on course.
-        stray = len(strip) > 1 and photo + 1 < len(plan) and follows(strip[-1], strip[0], photo + 1, 2)
-        if follows(strip[-1], strip[0], photo, 1) or stray:
-            strip.append(photo)
+        elif (
+            strips
+            and len(strips[-1]) > 1
+            and last == photo - 1
+            and photo + 1 < len(plan)
+            and follows(last, strips[-1][0], photo + 1, 2)
+        ):
+            strips[-1].append(photo)
         else:
             strips.append([photo])
+            last = photo
     return [np.array(strip, dtype=np.int64) for strip in strips]
 
 
@@ -153,6 +161,8 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
 def _moved(result: Result, section: Section) -> None:
     """Name the stations that the adjustment moved far more than the others."""
     block = result.block
+    if len(block.photo_ids) < FEWEST:
+        return
     axes, base = local_axes(block), _base(block)
     shifts = axes.positions(result.photo_positions) - axes.positions(block.photo_positions)
     turns = result.photo_attitudes - block.photo_attitudes
@@ -163,7 +173,7 @@ def _moved(result: Result, section: Section) -> None:
         ("attitude", turns, "deg", float(np.degrees(1.0))),
     ):
         spread = MAD_TO_SD * np.median(np.abs(changes), axis=0)
-        sizes = np.abs(changes) / np.maximum(spread, np.finfo(np.float64).tiny)
+        sizes = np.abs(changes) / np.maximum(spread, TINY)
         listed = ", ".join(f"{each * factor:.4f}" for each in spread)
         section.lines.append(f"{f'usual change of {what} by the adjustment':<50}{listed} {shown}")
         small = np.abs(changes).max(axis=1) < (SMOOTH_ANGLE if what == "attitude" else SMOOTH_POSITION * base)
