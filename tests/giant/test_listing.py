@@ -290,7 +290,7 @@ def test_section_10_without_degrees_of_freedom_the_estimates_are_undefined():
 
 
 def stable(text):
-    """Round heights among the corrections: lengths from geocentric coordinates are noise beyond 8 decimals."""
+    """Round heights among the corrections: from geocentric coordinates they are noise beyond 8 decimals."""
     pattern = re.compile(r"(POSITION +\S+ +\S+ +)(-?\d+\.\d{9})")
     return pattern.sub(lambda match: f"{match[1]}{round(float(match[2]), 4) + 0.0:.4f}", text)
 
