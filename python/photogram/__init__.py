@@ -7,6 +7,7 @@ from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
+from photogram.prediction import predict
 from photogram.result import Result
 from photogram.simulation import Simulation, simulate
 
@@ -25,5 +26,6 @@ __all__ = [
     "Spheroid",
     "__version__",
     "adjust",
+    "predict",
     "simulate",
 ]

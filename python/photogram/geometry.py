@@ -19,9 +19,12 @@ __all__ = [
     "Spheroid",
     "geocentric_to_geographic",
     "geographic_to_geocentric",
+    "lengths_of_units",
+    "local_frames",
     "project",
     "rotation_angles",
     "rotation_matrix",
+    "viewing_directions",
 ]
 
 Floats = NDArray[np.float64]
@@ -104,6 +107,49 @@ def geocentric_to_geographic(xyz: ArrayLike, spheroid: Spheroid) -> Floats:
         Another shape.
     """
     return _photocore.geocentric_to_geographic(_floats(xyz), spheroid.a, spheroid.b)
+
+
+def lengths_of_units(positions: ArrayLike, spheroid: Spheroid | None) -> Floats:
+    """Lengths of the units of the coordinates at (n, 3) positions, (n, 3), in the linear unit.
+
+    Ones in rectangular space. In geographic space a radian of longitude is as long as the radius of the
+    parallel, one of latitude as that of the meridian's curvature, both at the height of the position.
+    """
+    values = _floats(positions)
+    if spheroid is None:
+        return np.ones_like(values)
+    latitude, height = values[:, 1], values[:, 2]
+    w = np.sqrt(1 - (1 - (spheroid.b / spheroid.a) ** 2) * np.sin(latitude) ** 2)
+    parallel = (spheroid.a / w + height) * np.cos(latitude)
+    meridian = spheroid.b**2 / spheroid.a / w**3 + height
+    return np.stack([parallel, meridian, np.ones_like(height)], axis=1)
+
+
+def local_frames(positions: ArrayLike) -> Floats:
+    """Local vertical frames, (n, 3, 3) with rows east, north, up, at (n, 3) longitude, latitude (rad), height."""
+    longitude, latitude = _floats(positions)[:, :2].T
+    sl, cl, sp, cp = np.sin(longitude), np.cos(longitude), np.sin(latitude), np.cos(latitude)
+    rows = [[-sl, cl, np.zeros_like(sl)], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]]
+    return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
+
+
+def viewing_directions(
+    positions: ArrayLike,
+    attitudes: ArrayLike,
+    *,
+    spheroid: Spheroid | None = None,
+    photo_to_ground: bool = False,
+) -> Floats:
+    """Directions in which photos look, the negative z axes of their frames, (n, 3) unit vectors.
+
+    Arguments are those of :func:`project`; with a spheroid the directions are geocentric.
+    """
+    rotations = rotation_matrix(attitudes)
+    directions = -(rotations[:, :, 2] if photo_to_ground else rotations[:, 2, :])
+    if spheroid is None:
+        return directions
+    turned: Floats = np.einsum("nij,ni->nj", local_frames(positions), directions)
+    return turned
 
 
 def project(

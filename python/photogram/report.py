@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram import _photocore
+from photogram.reliability import TESTABLE
 
 if TYPE_CHECKING:
     from photogram.adjusted import AdjustedBlock, Floats
@@ -17,8 +18,6 @@ __all__ = ["report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
-# With less redundancy a blunder hides in the unknowns; the test value repeats that of another coordinate.
-_TESTABLE = 0.01
 _ARCSEC = 180 * 3600 / math.pi
 
 
@@ -129,7 +128,7 @@ def _iterations(result: AdjustedBlock) -> list[str]:
 
 
 def _suspects(result: AdjustedBlock) -> list[str]:
-    testable = result.redundancy > _TESTABLE
+    testable = result.redundancy > TESTABLE
     size = np.where(testable, np.nan_to_num(np.abs(result.standardized)), 0.0)
     images, axes = np.nonzero(size > _BLUNDER)
     if not images.size:

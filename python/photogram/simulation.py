@@ -234,11 +234,11 @@ def simulate(
     checks = control_random.choice(free, min(check_points, len(free)), replace=False)
     known = held.copy()
     known[checks] = True
-    metres = _metres_per_unit(ground, spheroid)
+    metres = geometry.lengths_of_units(ground, spheroid)
     point_sd = np.where(held, control_sd / metres, np.inf)
     control_noise = control_sd / metres * control_random.standard_normal(ground.shape)
 
-    metres = _metres_per_unit(positions, spheroid)
+    metres = geometry.lengths_of_units(positions, spheroid)
     truth = Block(
         photo_ids=_photo_ids(plan),
         photo_positions=positions,
@@ -398,7 +398,8 @@ def _into_object_space(
     """Positions and, given the rotations from the plan to the photos, attitudes in the object space."""
     positions = plan_positions + np.asarray(origin)
     if spheroid is not None:
-        frame, tangent_point = _east_north_up(origin[0], origin[1]), np.array([[origin[0], origin[1], 0.0]])
+        tangent_point = np.array([[origin[0], origin[1], 0.0]])
+        frame = geometry.local_frames(tangent_point)[0]
         plane = plan_positions * [1.0, 1.0, 0.0]
         xyz = geometry.geographic_to_geocentric(tangent_point, spheroid) + plane @ frame
         positions = geometry.geocentric_to_geographic(xyz, spheroid)
@@ -408,29 +409,11 @@ def _into_object_space(
     if spheroid is not None:
         # East at the station, seen from the plan: turned about the vertical by the convergence of the
         # meridians.
-        east = np.stack([-np.sin(positions[:, 0]), np.cos(positions[:, 0]), np.zeros(len(positions))], axis=1)
-        in_plan = east @ frame.T
+        in_plan = geometry.local_frames(positions)[:, 0] @ frame.T
         convergence = np.zeros_like(positions)
         convergence[:, 2] = -np.arctan2(in_plan[:, 1], in_plan[:, 0])
         rotations = rotations @ geometry.rotation_matrix(convergence)
     return positions, geometry.rotation_angles(rotations.transpose(0, 2, 1) if photo_to_ground else rotations)
-
-
-def _east_north_up(longitude: float, latitude: float) -> Floats:
-    """Rows east, north and up of the local vertical frame."""
-    (sl, cl), (sp, cp) = ((math.sin(angle), math.cos(angle)) for angle in (longitude, latitude))
-    return np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
-
-
-def _metres_per_unit(positions: Floats, spheroid: Spheroid | None) -> Floats:
-    """Lengths of the units of the coordinates: ones, or radii of curvature for longitude and latitude."""
-    if spheroid is None:
-        return np.ones_like(positions)
-    latitude, height = positions[:, 1], positions[:, 2]
-    w = np.sqrt(1 - (1 - (spheroid.b / spheroid.a) ** 2) * np.sin(latitude) ** 2)
-    parallel = (spheroid.a / w + height) * np.cos(latitude)
-    meridian = spheroid.b**2 / spheroid.a / w**3 + height
-    return np.stack([parallel, meridian, np.ones_like(height)], axis=1)
 
 
 def _control(plan: _Plan, terrain: Floats, pattern: str, spacing: int) -> NDArray[np.bool_]:
