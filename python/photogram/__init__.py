@@ -7,6 +7,7 @@ from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
+from photogram.planning import Plan, plan
 from photogram.prediction import predict
 from photogram.result import Result
 from photogram.simulation import Simulation, simulate
@@ -18,6 +19,7 @@ __all__ = [
     "InputError",
     "Iteration",
     "Message",
+    "Plan",
     "PhotogramError",
     "Progress",
     "RankError",
@@ -26,6 +28,7 @@ __all__ = [
     "Spheroid",
     "__version__",
     "adjust",
+    "plan",
     "predict",
     "simulate",
 ]

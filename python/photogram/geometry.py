@@ -126,7 +126,7 @@ def lengths_of_units(positions: ArrayLike, spheroid: Spheroid | None) -> Floats:
 
 
 def local_frames(positions: ArrayLike) -> Floats:
-    """Local vertical frames, (n, 3, 3) with rows east, north, up, at (n, 3) longitude, latitude (rad), height."""
+    """Rows east, north, up, (n, 3, 3), of the local frames at (n, 3) longitude, latitude (rad), height."""
     longitude, latitude = _floats(positions)[:, :2].T
     sl, cl, sp, cp = np.sin(longitude), np.cos(longitude), np.sin(latitude), np.cos(latitude)
     rows = [[-sl, cl, np.zeros_like(sl)], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]]

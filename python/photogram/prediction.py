@@ -88,7 +88,14 @@ def at_adjusted(result: Result) -> Block:
     """Return the block of an adjustment with adjusted for given values, ready for :func:`predict`.
 
     Images of points that were left out are left out too.
+
+    Raises
+    ------
+    AdjustmentError
+        The adjustment has not converged.
     """
+    if not result.converged:
+        raise AdjustmentError(f"the adjustment has {result.status}: its positions are no plan")
     block, used = result.block, result.used_images
     return block.replace(
         photo_positions=result.photo_positions,
