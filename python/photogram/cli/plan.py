@@ -101,8 +101,9 @@ def _simulated(*networks: NetworkOptions) -> dict[str, Block]:
 
 def _name(network: NetworkOptions) -> str:
     """Name a pattern by what two of them may differ in."""
+    spacing = network.control_spacing
     names = {
-        Control.PERIMETER: f"perimeter, {network.control_spacing} bases",
+        Control.PERIMETER: f"perimeter, {spacing} base{'s' * (spacing != 1)}",
         Control.CORNERS: "corners",
         Control.NONE: "no control",
     }
@@ -123,17 +124,23 @@ def _adjusted(projects: list[Path]) -> dict[str, Block]:
     from photogram.prediction import at_adjusted
 
     patterns = {}
-    for directory in projects:
+    for name, directory in _names(projects).items():
         project = read_project(directory)
         block = project.to_block()
         for message in project.messages:
             errors.print(f"[yellow]remark:[/] {escape(str(message))}")
         fixed = project.common.intersection_only
-        name = directory.resolve().name
-        patterns[str(directory) if name in patterns else name] = at_adjusted(
-            adjust(block, covariance=False, fix_photos=fixed)
-        )
+        patterns[name] = at_adjusted(adjust(block, covariance=False, fix_photos=fixed))
     return patterns
+
+
+def _names(projects: list[Path]) -> dict[str, Path]:
+    """Name projects by the last part of their paths, or the whole where two have the same."""
+    places = [directory.resolve() for directory in projects]
+    if len(set(places)) < len(places):
+        raise typer.BadParameter("the same project twice", param_hint="DIR")
+    short = len({place.name for place in places}) == len(places)
+    return {place.name if short else str(place): given for place, given in zip(places, projects, strict=True)}
 
 
 def _documents(made: Plan, json: Path | None, plot: Path | None) -> dict[Path, bytes]:
