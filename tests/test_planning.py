@@ -125,6 +125,7 @@ def test_standard_deviations_scale_with_those_of_the_observations():
 RUNS = 1000
 
 
+@pytest.mark.giant("1", "accuracy predicted before any photograph is taken: Monte Carlo")
 @pytest.mark.parametrize(
     "kind", [RECTANGULAR, {**GEOGRAPHIC, "position_sd": 0.2, "control": "none"}], ids=["control", "GNSS"]
 )
@@ -287,6 +288,7 @@ def group(made: Plan, pattern: int, name: str):
     return next(quality for quality in made.patterns[pattern].points if quality.group == name)
 
 
+@pytest.mark.giant("1", "different configurations of control planned")
 def test_what_textbooks_say_of_blocks(two_patterns):
     perimeter, corners = 0, 1
     for pattern in (perimeter, corners):
@@ -500,7 +502,29 @@ def test_a_picture_of_control_only_is_refused():
     assert made.patterns[0].points[-1].points == 0
     with pytest.raises(PhotogramError, match="no new points"):
         made.plot()
-    assert "no control" not in made.report()
+    assert "New points: " not in made.report()
+    assert "Comparison: " not in plan({"all held": made.patterns[0].block, "corners": block}).report()
+
+
+def test_control_that_nothing_checks():
+    # Three full control points on a photo: 15 observations, 15 unknowns.
+    photo = Block(
+        photo_ids=["1"],
+        photo_positions=np.array([[0.0, 0.0, 1000.0]]),
+        photo_attitudes=np.zeros((1, 3)),
+        principal_distances=np.array([-150.0]),
+        point_ids=["A", "B", "C"],
+        point_positions=np.array([[100.0, 100.0, 0.0], [-300.0, 200.0, 0.0], [10.0, -300.0, 5.0]]),
+        image_photos=np.zeros(3, dtype=np.int64),
+        image_points=np.arange(3),
+        image_xy=np.zeros((3, 2)),
+        image_sd=np.array(0.01),
+        point_sd=np.array(0.1),
+    )
+    made = plan({"one photo": photo})
+    assert [(quality.held, quality.detectable) for quality in made.patterns[0].control] == 3 * [(3, math.inf)]
+    row = next(line for line in made.report().split("Control: ")[1].splitlines() if line.startswith("X"))
+    assert row.split() == ["X", "3", "0.1000", "0.000", "-", "-"]
 
 
 def test_a_second_pattern_by_spacing_and_by_positions(run):
@@ -528,6 +552,7 @@ def test_what_plan_refuses(run, tmp_path):
     assert "no control: the observations leave 7 combinations" in result.stderr
 
 
+@pytest.mark.giant("1", "fictitious data generator outside the program: a project of simulated images")
 def test_projects_are_planned_where_their_images_put_them(run, tmp_path):
     assert run("simulate", "a/block", *SMALL).exit_code == 0
     assert run("simulate", "b/block", *SMALL, "--control", "corners").exit_code == 0

@@ -34,6 +34,10 @@ TESTABLE = 0.01
 observation."""
 
 
+_ROUNDING = 1e-10
+"""Redundancy numbers below this are rounding errors of zero."""
+
+
 def noncentrality(significance: float = 0.001, power: float = 0.80) -> float:
     """Return delta0: how far a gross error must move a standardized residual to be found.
 
@@ -79,7 +83,7 @@ def minimal_detectable_error(sd: ArrayLike, redundancy: ArrayLike, delta0: float
     observed = np.isfinite(sd) & (sd > 0)
     errors = _shift(delta0) * np.where(observed, sd, math.nan)
     with np.errstate(divide="ignore"):
-        return np.asarray(errors / np.sqrt(np.maximum(r, 0.0)))
+        return np.asarray(errors / np.sqrt(_without_rounding(r)))
 
 
 def largest_effect(redundancy: ArrayLike, delta0: float | None = None) -> Floats:
@@ -96,9 +100,13 @@ def largest_effect(redundancy: ArrayLike, delta0: float | None = None) -> Floats
     -------
     Bounds in standard deviations of whatever is computed from the unknowns; infinite without redundancy.
     """
-    r = np.clip(np.asarray(redundancy, dtype=np.float64), 0.0, 1.0)
+    r = _without_rounding(np.asarray(redundancy, dtype=np.float64))
     with np.errstate(divide="ignore"):
         return np.asarray(_shift(delta0) * np.sqrt((1 - r) / r))
+
+
+def _without_rounding(redundancy: Floats) -> Floats:
+    return np.where(redundancy < _ROUNDING, 0.0, np.minimum(redundancy, 1.0))
 
 
 def _shift(delta0: float | None) -> float:

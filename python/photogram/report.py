@@ -14,7 +14,7 @@ from photogram.reliability import TESTABLE
 if TYPE_CHECKING:
     from photogram.adjusted import AdjustedBlock, Floats
 
-__all__ = ["report", "summary"]
+__all__ = ["composed", "report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
@@ -33,6 +33,11 @@ def report(result: AdjustedBlock) -> str:
         ("Work", _work(result)),
     ]
     head = f"photogram {_photocore.__version__}  block adjustment  {result.block.title}".rstrip()
+    return composed(head, sections)
+
+
+def composed(head: str, sections: Iterable[tuple[str, list[str]]]) -> str:
+    """Return a report: its first line, then titled sections; those without lines are left out."""
     parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
     return "\n\n".join([head, *parts]) + "\n"
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from photogram import _photocore
 from photogram.planning.statistics import PointQuality
+from photogram.report import composed
 
 if TYPE_CHECKING:
     from photogram.planning.pattern import Pattern
@@ -20,7 +21,7 @@ _NOTICED = 1.005
 """Ratio of standard deviations that two decimals show."""
 _HEAD = 3
 """Lines of a block before its first row: its name, headings, units."""
-_LABEL, _GAP = 12, "    "
+_LABEL, _GAP = 11, "    "
 
 # A column: its heading, its unit, and the text of its cell.
 Column = tuple[str, str, Callable[[PointQuality], str]]
@@ -39,8 +40,7 @@ def report(patterns: Sequence[Pattern]) -> str:
         ("Comparison: expected standard deviations of all new points", _comparison(patterns)),
     ]
     head = f"photogram {_photocore.__version__}  plan  {patterns[0].block.title}".rstrip()
-    parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
-    return "\n\n".join([head, *parts]) + "\n"
+    return composed(head, sections)
 
 
 def _network(patterns: Sequence[Pattern]) -> list[str]:
@@ -108,7 +108,9 @@ def _reliability(patterns: Sequence[Pattern]) -> list[str]:
 
 
 def _side_by_side(patterns: Sequence[Pattern], columns: Callable[[Pattern], list[Column]]) -> list[str]:
-    """Lay out groups of points in rows, the same columns for each pattern side by side."""
+    """Lay out groups of points in rows, the same columns for each pattern; nothing without new points."""
+    if not any(pattern.new_points.any() for pattern in patterns):
+        return []
 
     def lines(pattern: Pattern) -> list[str]:
         own = columns(pattern)
@@ -164,7 +166,7 @@ def _control(patterns: Sequence[Pattern]) -> list[str]:
 
 def _comparison(patterns: Sequence[Pattern]) -> list[str]:
     """Say how many times the best pattern is better than the worst."""
-    if len(patterns) < 2:
+    if len(patterns) < 2 or not all(pattern.new_points.any() for pattern in patterns):
         return []
     decimals = _decimals(patterns)
     every = [pattern.points[-1] for pattern in patterns]
@@ -188,7 +190,7 @@ def _comparison(patterns: Sequence[Pattern]) -> list[str]:
 
 def _labelled(labels: list[str], blocks: list[list[str]]) -> list[str]:
     """Put labels before the lines of blocks side by side; lines that stay empty are left out."""
-    width = max(_LABEL, *(len(label) for label in labels))
+    width = max(_LABEL, *(len(label) for label in labels)) + 2
     rows = zip(labels, *blocks, strict=True)
     lines = [f"{label:<{width}}{_GAP.join(cells)}".rstrip() for label, *cells in rows]
     return [line for line in lines if line]
