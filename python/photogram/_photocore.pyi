@@ -200,7 +200,7 @@ def adjust_block(
     covariance
         Whether to compute cofactors and redundancy numbers; NaN otherwise.
     ordering
-        `auto`, `input` or `rcm`.
+        `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
     threads
@@ -303,7 +303,11 @@ class BlockSolution:
 
     @property
     def ordering(self) -> str:
-        """`input` or `rcm`."""
+        """The ordering of photos in force."""
+
+    @property
+    def predictions(self) -> dict[str, float]:
+        """The orderings that were tried, with the predicted multiply-adds of one factorisation."""
 
     @property
     def operations(self) -> dict[str, float]:

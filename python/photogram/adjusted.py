@@ -114,8 +114,9 @@ class AdjustedBlock:
         NaN without redundancy.
     dropped
         Points left out, with the reason.
-    ordering, operations, formations, seconds
-        The ordering of photos in force, predicted multiply-adds of each phase, the number of formations of
+    ordering, predictions, operations, formations, seconds
+        The ordering of photos in force, the predicted multiply-adds of one factorisation in each ordering
+        that was tried, predicted multiply-adds of each phase, the number of formations of
         the normal equations, and seconds spent in each phase.
     """
 
@@ -141,6 +142,7 @@ class AdjustedBlock:
     standardized: Floats
     dropped: Mapping[str, str]
     ordering: str
+    predictions: Mapping[str, float]
     operations: Mapping[str, float]
     formations: int
     seconds: Mapping[str, float]
@@ -173,6 +175,7 @@ class AdjustedBlock:
             standardized=solution.standardized,
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
             ordering=solution.ordering,
+            predictions=solution.predictions,
             operations=solution.operations,
             formations=solution.formations,
             seconds=solution.seconds,

@@ -18,7 +18,7 @@ from photogram.result import Result
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "listed"]
 
 UnitVariance = Literal["free", "constrained", "unity"]
-Ordering = Literal["auto", "input", "rcm"]
+Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 
 MOST_NAMES = 12
 """Names that an error message lists at most."""
@@ -99,8 +99,9 @@ def adjust(
     fix_photos
         Keep positions and attitudes as they are: every point by itself.
     ordering
-        How photos are ordered for elimination: in input order, by reverse Cuthill-McKee, or the cheaper of
-        them.
+        How photos are ordered for elimination: in input order, in a narrow band (reverse Cuthill-McKee), by
+        approximate minimum degree, by nested dissection across their positions, or across their ties alone.
+        `auto` takes the one with the least predicted work.
     threads
         Number of threads; all processors when None. The result does not depend on it, to the last bit.
     progress

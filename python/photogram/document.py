@@ -63,6 +63,7 @@ def _document(result: AdjustedBlock) -> dict[str, Any]:
         "check_points": _check_points(result),
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
         "ordering": result.ordering,
+        "predictions": dict(result.predictions),
         "operations": dict(result.operations),
         "seconds": dict(result.seconds),
     }

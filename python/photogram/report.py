@@ -19,6 +19,13 @@ __all__ = ["composed", "report", "summary"]
 _SUSPECTS = 20
 _BLUNDER = 3.0
 _ARCSEC = 180 * 3600 / math.pi
+_ORDERINGS = {
+    "input": "in input order",
+    "rcm": "by reverse Cuthill-McKee",
+    "amd": "by minimum degree",
+    "dissection": "by nested dissection",
+    "graph-dissection": "by dissection of the graph",
+}
 
 
 def report(result: AdjustedBlock) -> str:
@@ -217,8 +224,13 @@ def _points(result: AdjustedBlock) -> list[str]:
 
 
 def _work(result: AdjustedBlock) -> list[str]:
-    order = {"input": "in input order", "rcm": "by reverse Cuthill-McKee"}[result.ordering]
+    order = _ORDERINGS[result.ordering]
     lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
+    lines += [
+        f"{f'multiply-adds if {_ORDERINGS[name]}':<36}{count:.3e}"
+        for name, count in result.predictions.items()
+        if name != result.ordering
+    ]
     lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
     lines += [f"{f'seconds in {name}':<36}{seconds:.3f} s" for name, seconds in result.seconds.items()]
     return lines

@@ -106,12 +106,7 @@ fn adjust_block(
     };
     let options = Options {
         adjustment: AdjustmentOptions { criterion, max_iterations, covariance },
-        ordering: match ordering {
-            "auto" => Ordering::Auto,
-            "input" => Ordering::Input,
-            "rcm" => Ordering::ReverseCuthillMckee,
-            other => return Err(unknown("ordering", other)),
-        },
+        ordering: Ordering::named(ordering).ok_or_else(|| unknown("ordering", ordering))?,
         unit_variance: match unit_variance {
             "free" => UnitVariance::Free,
             "constrained" => UnitVariance::Constrained,

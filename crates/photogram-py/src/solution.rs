@@ -149,6 +149,15 @@ impl BlockSolution {
     }
 
     #[getter]
+    fn predictions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (ordering, operations) in &self.solution.adjustment.predictions {
+            dict.set_item(ordering.name(), operations)?;
+        }
+        Ok(dict)
+    }
+
+    #[getter]
     fn operations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let operations = self.solution.adjustment.operations;
         let dict = PyDict::new(py);

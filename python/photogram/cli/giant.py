@@ -36,6 +36,9 @@ class Ordering(StrEnum):
     AUTO = "auto"
     INPUT = "input"
     RCM = "rcm"
+    AMD = "amd"
+    DISSECTION = "dissection"
+    GRAPH_DISSECTION = "graph-dissection"
 
 
 def giant(

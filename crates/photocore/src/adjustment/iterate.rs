@@ -131,6 +131,8 @@ pub struct Adjustment {
     pub seconds: Seconds,
     /// The ordering in force.
     pub ordering: Ordering,
+    /// The orderings that were tried, each with the predicted multiply-adds of a factorisation.
+    pub predictions: Vec<(Ordering, f64)>,
 }
 
 /// Why there is no adjustment.
@@ -412,6 +414,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             formations: self.formations,
             seconds: self.seconds,
             ordering: problem.system.symbolic().ordering(),
+            predictions: problem.system.symbolic().predictions().to_vec(),
         })
     }
 

@@ -14,7 +14,7 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Event, Problem};
-use crate::geometry::{ObjectSpace, RotationSense, Vector3};
+use crate::geometry::{self, ObjectSpace, RotationSense, Vector3};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 use model::CentralPerspective;
@@ -218,7 +218,9 @@ impl Block {
         let own_sd = model.points.iter().map(|point| point.sd);
         let sd = own_sd.chain(self.photos.iter().flat_map(photo_sd)).flatten().collect();
         let photo_of = model.images.iter().map(|image| image.photo as u32).collect();
-        let layout = Layout::new(2, 3, &vec![6; self.photos.len()], model.start.clone(), photo_of)?;
+        let places = model.photos(&photos).iter().map(geometry::Photo::centre).collect();
+        let layout = Layout::new(2, 3, &vec![6; self.photos.len()], model.start.clone(), photo_of)?
+            .with_places(places)?;
         Ok(Problem {
             observation_sd: model.images.iter().flat_map(|image| image.sd).collect(),
             system: System::new(layout, options.ordering),
