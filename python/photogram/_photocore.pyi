@@ -310,6 +310,10 @@ class BlockSolution:
         """The orderings that were tried, with the predicted multiply-adds of one factorisation."""
 
     @property
+    def photo_order(self) -> _Indices:
+        """(P,) indices of the photos in the order of their elimination."""
+
+    @property
     def operations(self) -> dict[str, float]:
         """Predicted multiply-adds of `reduction`, `factor` and `inverse`, each time they are carried out."""
 

@@ -114,10 +114,12 @@ class AdjustedBlock:
         NaN without redundancy.
     dropped
         Points left out, with the reason.
-    ordering, predictions, operations, formations, seconds
-        The ordering of photos in force, the predicted multiply-adds of one factorisation in each ordering
-        that was tried, predicted multiply-adds of each phase, the number of formations of
-        the normal equations, and seconds spent in each phase.
+    ordering, photo_order, predictions
+        The ordering of photos in force, (P,) the indices of the photos as they were eliminated, and the
+        predicted multiply-adds of one factorisation in each ordering that was tried.
+    operations, formations, seconds
+        Predicted multiply-adds of each phase, the number of formations of the normal equations, and seconds
+        spent in each phase.
     """
 
     block: Block
@@ -143,6 +145,7 @@ class AdjustedBlock:
     dropped: Mapping[str, str]
     ordering: str
     predictions: Mapping[str, float]
+    photo_order: NDArray[np.int64]
     operations: Mapping[str, float]
     formations: int
     seconds: Mapping[str, float]
@@ -176,6 +179,7 @@ class AdjustedBlock:
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
             ordering=solution.ordering,
             predictions=solution.predictions,
+            photo_order=solution.photo_order,
             operations=solution.operations,
             formations=solution.formations,
             seconds=solution.seconds,

@@ -10,11 +10,12 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.reliability import TESTABLE
+from photogram.structuring import structure
 
 if TYPE_CHECKING:
     from photogram.adjusted import AdjustedBlock, Floats
 
-__all__ = ["composed", "report", "summary"]
+__all__ = ["bandwidths", "composed", "report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
@@ -231,8 +232,22 @@ def _work(result: AdjustedBlock) -> list[str]:
         for name, count in result.predictions.items()
         if name != result.ordering
     ]
+    lines += bandwidths(result)
     lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
     lines += [f"{f'seconds in {name}':<36}{seconds:.3f} s" for name, seconds in result.seconds.items()]
+    return lines
+
+
+def bandwidths(result: AdjustedBlock) -> list[str]:
+    """Return what the 1987 program would have needed, for the order of the input and for the one chosen."""
+    images = result.block.image_photos, result.block.image_points
+    lines = ["bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)"]
+    for name, order in (("of the input", None), ("chosen", result.photo_order)):
+        structured = structure(*images, order)
+        lines.append(
+            f"{f'  in the order {name}':<36}{structured.effective_bandwidth} effective,"
+            f" {structured.naive_bandwidth} without sharing"
+        )
     return lines
 
 

@@ -232,7 +232,7 @@ def test_frames_keep_their_order_and_round_trip():
         (
             replaced(FRAMES, 2, FRAMES[1].replace("900000", "906100")),
             2,
-            r"columns 33-44 \(DMS\): ILLEGAL DMS FIELD",
+            r"columns 33-44 \(DMS\): \*\*ILLEGAL DMS FIELD",
         ),
         (replaced(FRAMES, 3, FRAMES[2].replace("  5.000", " -5.000")), 3, "columns 45-54: .* negative"),
     ],

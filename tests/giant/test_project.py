@@ -146,7 +146,10 @@ def test_frames_missing_in_frames_are_ignored_silently(tmp_path):
     block = project.to_block()
     assert block.photo_ids == ["A"]
     assert len(block.image_xy) == 3
-    assert project.messages == []
+    assert [message.text for message in project.messages] == [
+        "the frame A has 2 points that other frames or control tie: its station rests on its weights,"
+        " which are the weak defaults"
+    ]
 
 
 def test_a_frame_without_images_is_fatal_in_triangulation(tmp_path):

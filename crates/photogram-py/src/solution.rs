@@ -158,6 +158,14 @@ impl BlockSolution {
     }
 
     #[getter]
+    fn photo_order<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let order = &self.solution.adjustment.order;
+        // A border of common unknowns is no photo.
+        let photos = order.iter().filter(|&&block| block < self.solution.photos.len());
+        PyArray1::from_vec(py, photos.map(|&photo| photo as i64).collect())
+    }
+
+    #[getter]
     fn operations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let operations = self.solution.adjustment.operations;
         let dict = PyDict::new(py);

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from photogram.cli import giant, plan, simulate
+from photogram.cli import check, giant, plan, simulate
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
 
@@ -20,13 +20,15 @@ __all__ = ["app", "main"]
 app = typer.Typer(
     name="photogram",
     help="Photogrammetric least-squares adjustment with the covariance of every result.",
-    epilog="Exit codes: 0 converged, 1 input or output at fault, 2 usage, 3 not converged or diverged.",
+    epilog="Exit codes: 0 converged, 1 input or output at fault, 2 usage, 3 not converged, diverged or"
+    " something grave found.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
 giant_app = typer.Typer(name="giant", cls=GroupWithMain, help="Adjust or check a GIANT project.")
 giant_app.command("adjust")(giant.giant)
+giant_app.command("check")(check.check)
 app.add_typer(giant_app)
 app.command()(simulate.simulate)
 app.command()(plan.plan)

@@ -83,6 +83,15 @@ def giant(
             min=1, help="Threads; the results do not depend on it. Default: all.", show_default=False
         ),
     ] = None,
+    limits: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N1=..,N6=..",
+            help="Limits of the 1987 program: N1 stations, N2 points, N3 control, N4 photographs of a point,"
+            " N5 cameras, N6 bandwidth. Default: none.",
+            show_default=False,
+        ),
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
     overwrite: Annotated[
         bool,
@@ -98,14 +107,14 @@ def giant(
     with failures(), ExitStack() as resources:
         from photogram.errors import AdjustmentError
         from photogram.files import write_whole
-        from photogram.giant import read_project
+        from photogram.giant import Limits, read_project
 
         if directory is None:
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
         project = read_project(directory)
-        block = project.to_block()
+        block = project.to_block(Limits.parse(limits) if limits else None)
         try:
             result = _adjust(project, block, as_published, ordering, threads, quiet)
         except AdjustmentError:

@@ -1,19 +1,29 @@
 """The files of GIANT (Elassal and Malhotra, NOAA 1987): COMMON, CAMERAS, IMAGES, FRAMES and GROUND."""
 
 from photogram.giant.cameras import Camera
+from photogram.giant.checks import Check, Finding, Section, check
 from photogram.giant.common import Common
+from photogram.giant.diagnostics import ErrorWarning, error_warnings
 from photogram.giant.frames import Frame
 from photogram.giant.ground import GroundPoint
 from photogram.giant.images import ImageFrame
+from photogram.giant.limits import Limits
 from photogram.giant.project import Project, read_project, write_project
 
 __all__ = [
     "Camera",
+    "Check",
     "Common",
+    "ErrorWarning",
+    "Finding",
     "Frame",
     "GroundPoint",
     "ImageFrame",
+    "Limits",
     "Project",
+    "Section",
+    "check",
+    "error_warnings",
     "read_project",
     "write_project",
 ]

@@ -13,8 +13,11 @@ from photogram.errors import InputError
 from photogram.geometry import Spheroid
 from photogram.giant.frames import ATTITUDE_SD, Frame
 from photogram.giant.images import IMAGE_SD, ImageFrame
-from photogram.giant.records import Record
+from photogram.giant.limits import Limits, allowed_images, check_bandwidth, check_files, check_points
+from photogram.giant.records import error_at, message_at
+from photogram.giant.remarks import remarks
 from photogram.messages import Message
+from photogram.structuring import structure
 
 if TYPE_CHECKING:
     from photogram.giant.common import Common
@@ -28,7 +31,7 @@ LONGEST_METRES = 1e7
 """No semi-major axis in metres is longer than this; in feet all are."""
 
 
-def assemble(project: Contents) -> tuple[Block, list[Message]]:
+def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, list[Message]]:
     """Return the block of a project, and the remarks on what was left out or deserves a look.
 
     Photos stand in the order of FRAMES, points in the order of their first image.
@@ -36,9 +39,11 @@ def assemble(project: Contents) -> tuple[Block, list[Message]]:
     Raises
     ------
     InputError
-        A frame without images, a camera that is not defined, or no frame at all.
+        A frame without images, a camera that is not defined, no frame at all, or a limit that is exceeded.
     """
+    limits = limits or Limits()
     common, messages = project.common, _unsupported(project.common)
+    check_files(project, limits)
     photos = _photos(project, messages)
     if not photos:
         raise InputError("FRAMES lists no frame with images", file=project.directory)
@@ -48,38 +53,34 @@ def assemble(project: Contents) -> tuple[Block, list[Message]]:
     index: dict[str, int] = {}
     image_points = np.array([index.setdefault(name, len(index)) for each in images for name in each.points])
     image_photos = np.repeat(np.arange(len(images)), [len(each.points) for each in images])
+    check_points(index, limits)
     kept = _first_images(images, image_photos, image_points, messages)
+    kept = kept[allowed_images(image_points[kept], list(index), limits, messages)]
+    if limits.bandwidth is not None:
+        structured = structure(image_photos[kept], image_points[kept])
+        check_bandwidth(structured, frames, list(index), limits.bandwidth, common.intersection_only, messages)
     position, sd = _control(project, index, messages)
-    return (
-        Block(
-            photo_ids=[frame.name for frame in frames],
-            photo_positions=_longitudes(np.array([frame.position for frame in frames]), common.geographic),
-            photo_attitudes=np.array([frame.attitude for frame in frames]),
-            principal_distances=_principal_distances(project, images),
-            point_ids=list(index),
-            point_positions=_longitudes(position, common.geographic),
-            image_photos=image_photos[kept],
-            image_points=image_points[kept],
-            image_xy=np.concatenate([each.xy for each in images])[kept],
-            image_sd=_or_default([each.sd for each in images], IMAGE_SD)[image_photos[kept]],
-            photo_position_sd=_or_default([frame.position_sd for frame in frames], common.default_station_sd),
-            photo_attitude_sd=_or_default([frame.attitude_sd for frame in frames], ATTITUDE_SD),
-            point_sd=sd,
-            spheroid=_spheroid(common),
-            photo_to_ground=common.photo_to_ground,
-            title=common.title,
-            linear_unit=_linear_unit(common),
-        ),
-        messages,
+    block = Block(
+        photo_ids=[frame.name for frame in frames],
+        photo_positions=_longitudes(np.array([frame.position for frame in frames]), common.geographic),
+        photo_attitudes=np.array([frame.attitude for frame in frames]),
+        principal_distances=_principal_distances(project, images),
+        point_ids=list(index),
+        point_positions=_longitudes(position, common.geographic),
+        image_photos=image_photos[kept],
+        image_points=image_points[kept],
+        image_xy=np.concatenate([each.xy for each in images])[kept],
+        image_sd=_or_default([each.sd for each in images], IMAGE_SD)[image_photos[kept]],
+        photo_position_sd=_or_default([frame.position_sd for frame in frames], common.default_station_sd),
+        photo_attitude_sd=_or_default([frame.attitude_sd for frame in frames], ATTITUDE_SD),
+        point_sd=sd,
+        spheroid=_spheroid(common),
+        photo_to_ground=common.photo_to_ground,
+        title=common.title,
+        linear_unit=_linear_unit(common),
     )
-
-
-def _error(record: Record | None, text: str) -> InputError:
-    return record.error(text) if record else InputError(text)
-
-
-def _message(record: Record | None, text: str) -> Message:
-    return record.message(text) if record else Message(text)
+    messages += remarks(block, frames)
+    return block, messages
 
 
 def _unsupported(common: Common) -> list[Message]:
@@ -99,15 +100,15 @@ def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, Ima
         first = measured.setdefault(images.name, images)
         if first is not images and images.name in listed:
             where = f" (record {first.record.number})" if first.record else ""
-            raise _error(images.record, f"the frame {images.name!r} already has images{where}")
+            raise error_at(images.record, f"the frame {images.name!r} already has images{where}")
     photos = []
     for frame in project.frames:
         if frame.name in measured and measured[frame.name].points:
             photos.append((frame, measured[frame.name]))
         elif project.common.intersection_only:
-            messages.append(_message(frame.record, f"the frame {frame.name!r} has no images: left out"))
+            messages.append(message_at(frame.record, f"the frame {frame.name!r} has no images: left out"))
         else:
-            raise _error(
+            raise error_at(
                 frame.record,
                 f"the frame {frame.name!r} has no images{_lost_header(project.images, frame.name)}",
             )
@@ -129,7 +130,7 @@ def _principal_distances(project: Contents, images: list[ImageFrame]) -> Floats:
     for each in images:
         if not each.principal_distance and each.camera not in cameras:
             known = ", ".join(repr(name) for name in cameras) or "none"
-            raise _error(
+            raise error_at(
                 each.record,
                 f"the frame {each.name!r} has no principal distance,"
                 f" and its camera {each.camera!r} is not in CAMERAS (there: {known})",
@@ -151,7 +152,7 @@ def _first_images(
         frame = images[image_photos[row]]
         at = row - starts[image_photos[row]]
         text = f"the point {frame.points[at]} stands in the frame {frame.name} twice: the first image is kept"
-        messages.append(_message(frame.point_record(at), text))
+        messages.append(message_at(frame.point_record(at), text))
     return kept
 
 
@@ -159,11 +160,18 @@ def _control(project: Contents, index: dict[str, int], messages: list[Message]) 
     """Return positions and standard deviations of all points: those of GROUND where it has any."""
     position = np.full((len(index), 3), np.nan)
     sd = np.full((len(index), 3), np.inf)
+    placed: set[str] = set()
     for point in project.ground:
+        if point.name in placed:
+            messages.append(
+                message_at(point.record, f"duplicate control point {point.name}: the first is kept")
+            )
+            continue
+        placed.add(point.name)
         row = index.get(point.name)
         if row is None:
             messages.append(
-                _message(point.record, f"control point {point.name} is not photographed: ignored")
+                message_at(point.record, f"control point {point.name} is not photographed: ignored")
             )
             continue
         held = np.array(point.held)

@@ -95,7 +95,7 @@ def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
     sign, degrees, minutes, seconds = unpack_dms(parse_real(field, decimals))
     if degrees > 360 or minutes > 60 or seconds > 60:
         raise ValueError(
-            f"ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is"
+            f"**ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is"
             f" {degrees} degrees {minutes} minutes {seconds} seconds"
         )
     return sign * float(3600 * degrees + 60 * minutes + seconds) * ARCSEC, minutes == 60 or seconds == 60

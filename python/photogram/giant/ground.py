@@ -30,6 +30,8 @@ class GroundPoint:
         Column 80: the sum of 1, 2 and 4 for components that are to be ignored (unheld); 7 is a check point.
     record
         Where the point was read.
+    repeats
+        How many further records of the same name were read; they do not count.
     """
 
     name: str
@@ -37,6 +39,7 @@ class GroundPoint:
     sd: tuple[float, float, float] = (0.0, 0.0, 0.0)
     type_code: int = 0
     record: Record | None = field(default=None, compare=False, repr=False)
+    repeats: int = field(default=0, compare=False, repr=False)
 
     @property
     def held(self) -> tuple[bool, bool, bool]:
@@ -52,7 +55,7 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
     InputError
         A field that is no number or no angle, a type code above 7, or a point without a name.
     """
-    points: list[GroundPoint] = []
+    points: dict[str, GroundPoint] = {}
     spellings: dict[str, Record] = {}
     for record in source.filled():
         name = record.identification(spellings)
@@ -67,14 +70,15 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
         )
         if not 0 <= point.type_code <= CHECK_POINT:
             raise record.error(f"column 80: the type code {point.type_code} is not one of 0 to 7")
-        if spellings[name] is not record:
+        if name in points:
+            points[name].repeats += 1
             record.remark(f"duplicate control point {name}: record {spellings[name].number} is kept")
             continue
         for held, first in zip(point.held, (9, 21, 33), strict=True):
             if held and record.blank(first, first + 11):
                 record.remark(f"columns {first}-{first + 11}: the blank component of {name} is held at zero")
-        points.append(point)
-    return points
+        points[name] = point
+    return list(points.values())
 
 
 def ground_records(points: Iterable[GroundPoint], geographic: bool) -> list[str]:

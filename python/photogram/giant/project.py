@@ -17,6 +17,7 @@ from photogram.giant.files import NAMES, find_files, present_files, to_bytes
 from photogram.giant.frames import parse_frames
 from photogram.giant.ground import parse_ground
 from photogram.giant.images import parse_images
+from photogram.giant.limits import Limits
 from photogram.giant.records import Source
 
 __all__ = ["Project", "project_files", "read_project", "write_project"]
@@ -25,17 +26,23 @@ __all__ = ["Project", "project_files", "read_project", "write_project"]
 class Project(Contents):
     """A project: the content of the five files, and the way to a block and back."""
 
-    def to_block(self) -> Block:
+    def to_block(self, limits: Limits | None = None) -> Block:
         """Return the block: apply the rules that hold between files (GIANT guide, sections II.B and III).
 
         Remarks are added to `messages`, once each.
 
+        Parameters
+        ----------
+        limits
+            The installation parameters of the 1987 program; by default there are none.
+
         Raises
         ------
         InputError
-            A frame without images, a camera that is not defined, or no frame at all.
+            A frame without images, a camera that is not defined, no frame at all, or a limit that is
+            exceeded.
         """
-        block, messages = assemble(self)
+        block, messages = assemble(self, limits)
         known = set(self.messages)
         self.messages += [message for message in messages if message not in known]
         return block

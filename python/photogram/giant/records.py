@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.giant.fields import parse_angle, parse_integer, parse_name, parse_real
 from photogram.messages import Message
 
-__all__ = ["Record", "Source"]
+__all__ = ["Record", "Source", "error_at", "message_at"]
 
 T = TypeVar("T")
 WIDTH = 80
@@ -185,3 +185,13 @@ class Record:
         if " " in columns.strip(" "):
             self.remark(f"columns {first}-{last}: the blanks inside {columns.strip()!r} are ignored")
         return value
+
+
+def error_at(record: Record | None, text: str) -> InputError:
+    """Return an error about a record, or about no place when what it concerns was not read from a file."""
+    return record.error(text) if record else InputError(text)
+
+
+def message_at(record: Record | None, text: str) -> Message:
+    """Return a remark on a record, or on no place when what it concerns was not read from a file."""
+    return record.message(text) if record else Message(text)

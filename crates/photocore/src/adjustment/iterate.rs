@@ -133,6 +133,8 @@ pub struct Adjustment {
     pub ordering: Ordering,
     /// The orderings that were tried, each with the predicted multiply-adds of a factorisation.
     pub predictions: Vec<(Ordering, f64)>,
+    /// Kept blocks (the border is the block after the last) in the order of their elimination.
+    pub order: Vec<usize>,
 }
 
 /// Why there is no adjustment.
@@ -415,6 +417,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             seconds: self.seconds,
             ordering: problem.system.symbolic().ordering(),
             predictions: problem.system.symbolic().predictions().to_vec(),
+            order: problem.system.symbolic().order().to_vec(),
         })
     }
 

@@ -224,6 +224,11 @@ impl Symbolic {
         self.block_at[position]
     }
 
+    /// All blocks (the border is the block after the last) in the order of their elimination.
+    pub fn order(&self) -> &[usize] {
+        &self.block_at
+    }
+
     pub(crate) fn dim(&self, position: usize) -> usize {
         self.offset[position + 1] - self.offset[position]
     }

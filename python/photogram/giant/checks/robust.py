@@ -1,0 +1,55 @@
+"""Robust statistics: what the bulk of the values says, whatever the outliers are."""
+
+from __future__ import annotations
+
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["critical", "fit", "mad_sd"]
+
+Floats = NDArray[np.float64]
+
+MAD_TO_SD = 1 / NormalDist().inv_cdf(0.75)
+ROUNDING = 1e-9
+"""Of the largest residual: a median below it is rounding."""
+TUKEY = 4.685
+"""Tuning constant of Tukey's biweight: 95 % efficiency for normal errors."""
+
+
+def mad_sd(values: Floats) -> float:
+    """Return the standard deviation about zero by the median of absolute values; NaN without values."""
+    finite = np.abs(values[np.isfinite(values)])
+    return MAD_TO_SD * float(np.median(finite)) if finite.size else float("nan")
+
+
+def critical(tests: int, chance: float = 0.01) -> float:
+    """Return what the largest of so many normal values exceeds with a given chance (Bonferroni)."""
+    return NormalDist().inv_cdf(1 - chance / 2 / max(tests, 1))
+
+
+def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:
+    """Fit by Tukey's biweight from a start by least absolute deviations; returns (k, ...) coefficients.
+
+    Parameters
+    ----------
+    design
+        (n, k) with n > k.
+    values
+        (n, d); each row is an outlier or not as a whole.
+    """
+    weights = np.ones(len(values))
+    coefficients: Floats = np.zeros((design.shape[1], values.shape[1]))
+    for iteration in range(iterations):
+        root = np.sqrt(weights)[:, np.newaxis]
+        coefficients = np.asarray(np.linalg.lstsq(design * root, values * root, rcond=None)[0])
+        size = np.linalg.norm(values - design @ coefficients, axis=1)
+        middle = max(float(np.median(size)), ROUNDING * float(size.max()))
+        if middle == 0:
+            break
+        if iteration < iterations // 2:
+            weights = middle / np.maximum(size, 1e-3 * middle)
+        else:
+            weights = (1 - np.minimum(size / (TUKEY * MAD_TO_SD * middle), 1) ** 2) ** 2
+    return coefficients

@@ -1,0 +1,192 @@
+"""The installation parameters N1 to N6 of the 1987 program (GIANT guide, section I.E)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.errors import InputError
+from photogram.giant.records import error_at, message_at
+from photogram.messages import Message
+
+if TYPE_CHECKING:
+    from photogram.giant.contents import Contents
+    from photogram.giant.frames import Frame
+    from photogram.giant.ground import GroundPoint
+    from photogram.structuring import Structure
+
+__all__ = ["Limits", "allowed_images", "check_bandwidth", "check_files", "check_points"]
+
+NAMES = {
+    "N1": "stations",
+    "N2": "points",
+    "N3": "control",
+    "N4": "photos_per_point",
+    "N5": "cameras",
+    "N6": "bandwidth",
+}
+SHOWN = 40
+"""Names of points that a message lists at most."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a job; None, the default of each, is no limit.
+
+    Parameters
+    ----------
+    stations
+        N1: camera stations.
+    points
+        N2: different points with images.
+    control
+        N3: records of GROUND.
+    photos_per_point
+        N4: photographs on which one point may appear; of the others its images are dropped.
+    cameras
+        N5: camera systems.
+    bandwidth
+        N6: effective bandwidth of the normal equations, in sets of three parameters.
+
+    Raises
+    ------
+    InputError
+        A limit that is not a positive whole number.
+    """
+
+    stations: int | None = None
+    points: int | None = None
+    control: int | None = None
+    photos_per_point: int | None = None
+    cameras: int | None = None
+    bandwidth: int | None = None
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if value is not None and (not isinstance(value, int) or value < 1):
+                raise InputError(f"the limit of {each.name} must be a positive whole number, not {value!r}")
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Read limits as the guide names them: `N1=300,N4=8`.
+
+        Raises
+        ------
+        InputError
+            Another name, or a limit that is not a positive whole number.
+        """
+        values: dict[str, int] = {}
+        for each in text.split(","):
+            name, _, value = (part.strip() for part in each.partition("="))
+            if name.upper() not in NAMES or not (value.isascii() and value.isdigit()):
+                raise InputError(f"limits are written N1=300,N4=8 with N1 to N6, not {each.strip()!r}")
+            values[NAMES[name.upper()]] = int(value)
+        return cls(**values)
+
+
+def check_files(project: Contents, limits: Limits) -> None:
+    """Refuse more stations, control or cameras than the limits allow.
+
+    Raises
+    ------
+    InputError
+        In the words of the guide, with the first record that is too much.
+    """
+    control = sum(1 + point.repeats for point in project.ground)
+    _check("CAMERA STATIONS", project.frames, len(project.frames), limits.stations)
+    _check("GROUND CONTROL", project.ground, control, limits.control)
+    # The guide has no message for N5; this one follows the others.
+    _check("CAMERA SYSTEMS", [], len(project.cameras), limits.cameras)
+
+
+def check_points(names: Sequence[str] | dict[str, int], limits: Limits) -> None:
+    """Refuse more different points than the limits allow.
+
+    Raises
+    ------
+    InputError
+        In the words of the guide.
+    """
+    _check("IMAGE POINTS", [], len(names), limits.points)
+
+
+def _check(what: str, items: Sequence[Frame] | Sequence[GroundPoint], count: int, limit: int | None) -> None:
+    if limit is None or count <= limit:
+        return
+    text = f"**{what} EXCEEDED {limit}: there are {count}"
+    record = items[limit].record if len(items) > limit else None
+    raise error_at(record, text)
+
+
+def allowed_images(
+    image_points: NDArray[np.int64], names: list[str], limits: Limits, messages: list[Message]
+) -> NDArray[np.bool_]:
+    """Return which images the limit of photographs of a point leaves: the first ones, in the order given.
+
+    Parameters
+    ----------
+    image_points
+        (m,) indices of points, photo by photo.
+    names
+        Of the points.
+    limits
+        N4 is `photos_per_point`.
+    messages
+        Gets the warning of the guide.
+    """
+    limit = limits.photos_per_point
+    if limit is None:
+        return np.ones(len(image_points), dtype=bool)
+    by_point = np.argsort(image_points, kind="stable")
+    ordered = image_points[by_point]
+    number = np.arange(len(ordered)) - np.searchsorted(ordered, ordered)
+    allowed = np.empty(len(ordered), dtype=bool)
+    allowed[by_point] = number < limit
+    over = np.unique(image_points[~allowed]).tolist()
+    if over:
+        listed = ", ".join(names[point] for point in over[:SHOWN])
+        more = f" and {len(over) - SHOWN} more" if len(over) > SHOWN else ""
+        text = f"PASS POINTS APPEARING ON MORE THAN {limit} PHOTOGRAPHS: {listed}{more}"
+        messages.append(Message(f"{text}: of each the first {limit} images are kept"))
+    return allowed
+
+
+def check_bandwidth(
+    structure: Structure,
+    frames: list[Frame],
+    points: list[str],
+    limit: int,
+    intersection_only: bool,
+    messages: list[Message],
+) -> None:
+    """Refuse a block whose effective bandwidth in the order of the input exceeds a limit (N6).
+
+    Intersection needs no normal equations of stations: then the point that would break the limit is remarked
+    on only.
+
+    Raises
+    ------
+    InputError
+        In the words of the guide; stations have their numbers in FRAMES, from 1.
+    """
+    overflow = structure.overflow(limit)
+    if overflow is None:
+        return
+    frame, point = frames[overflow.photo], points[overflow.point]
+    text = (
+        f"the effective bandwidth exceeds {limit} when the point {point} calls for the frame {frame.name};"
+        " is its name used for two points? Another order of FRAMES may help too"
+    )
+    if intersection_only:
+        messages.append(message_at(frame.record, text))
+        return
+    stored = [f"{photo + 1:4d}" for photo in overflow.photos]
+    lines = [f"VARIABLES {' '.join(stored[first : first + 5])}" for first in range(0, len(stored), 5)]
+    head = ["**ERROR IN SUBROUTINE MODID", f"ADDING VARIABLE {overflow.photo + 1}", *lines]
+    text = "\n".join([*head, text])
+    raise error_at(frame.record, text)

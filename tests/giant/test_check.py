@@ -1,0 +1,557 @@
+"""The check of a project: faults planted in simulated blocks are found and named, clean blocks pass."""
+
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from photogram import simulate
+from photogram.cli import app
+from photogram.geometry import Spheroid
+from photogram.giant import Limits, Project, check, write_project
+from photogram.giant.checks.editing import kept_images, without_photos
+from photogram.giant.checks.heights import neighbours
+from photogram.giant.checks.rays import Rays
+from photogram.giant.checks.robust import critical, fit, mad_sd
+from photogram.giant.checks.stations import strips_of
+from photogram.giant.checks.structure import parts_of
+from photogram.messages import Message
+
+GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
+
+
+@pytest.fixture(scope="module")
+def block():
+    """Four strips of ten photos, 40 points on a photo, coarse stations."""
+    return simulate(points_per_photo=40, seed=1).block
+
+
+def checked(block, **options):
+    return check(Project.from_block(block), **options)
+
+
+def found(outcome, kind):
+    return [finding for finding in outcome.findings if finding.kind == kind]
+
+
+def changed(block, name, row, column, amount):
+    values = getattr(block, name).copy()
+    values[row, column] += amount
+    return block.replace(**{name: values})
+
+
+def image(block, photo, least_rays=3, skip=5):
+    """Row of an image on a photo whose point has several rays and is a pass point."""
+    rays = np.bincount(block.image_points)
+    rows = np.flatnonzero(block.image_photos == block.photo_ids.index(photo))
+    plain = np.isnan(block.point_positions[block.image_points[rows]]).all(axis=1)
+    return int(rows[(rays[block.image_points[rows]] >= least_rays) & plain][skip])
+
+
+# Clean blocks
+
+
+@pytest.mark.giant("13", "a clean block gives no grave finding")
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("space", [{}, GULF], ids=["rectangular", "geographic"])
+def test_section_13_a_clean_block_has_no_grave_finding(seed, space):
+    block = simulate(
+        strips=1 + seed % 4,
+        points_per_photo=20 + 10 * (seed % 3),
+        photo_to_ground=seed % 2 == 1,
+        seed=seed,
+        **space,
+    ).block
+    outcome = checked(block)
+    assert outcome.grave == []
+    assert outcome.result.converged
+    assert len(outcome.findings) <= 3
+
+
+def test_the_packaged_example_passes():
+    from importlib.resources import as_file, files
+
+    from photogram.giant import read_project
+
+    with as_file(files("photogram") / "examples" / "galveston") as directory:
+        outcome = check(read_project(directory))
+    assert outcome.grave == []
+
+
+# Step 1: intersection
+
+
+@pytest.mark.giant("13", "control above its camera: sign of the principal distance?")
+@pytest.mark.parametrize("space", [{}, GULF], ids=["rectangular", "geographic"])
+def test_section_13_the_sign_of_the_principal_distance(space):
+    block = simulate(points_per_photo=30, seed=2, **space).block
+    outcome = checked(block.replace(principal_distances=-block.principal_distances))
+    (sign,) = found(outcome, "sign-of-principal-distance")
+    assert sign.level == "grave"
+    assert "all photos" in sign.text
+    assert sign.photos == block.photo_ids
+    above = found(outcome, "control-above-camera")
+    control = np.isfinite(block.point_sd).any(axis=1)
+    assert sorted(name for finding in above for name in finding.points) == [
+        name for name, of in zip(block.point_ids, control, strict=True) if of
+    ]
+    # The sign comes before kappa in the text, and with it put right the rest of the block is clean.
+    assert above[0].text.index("sign of the principal distance?") < above[0].text.index("kappa?")
+    assert {finding.kind for finding in outcome.grave} == {
+        "sign-of-principal-distance",
+        "control-above-camera",
+    }
+    assert outcome.result.converged
+
+
+@pytest.mark.giant("13", "control above its camera: sign of one camera")
+def test_section_13_the_sign_of_one_of_two_cameras(block):
+    distances = block.principal_distances.copy()
+    xy = block.image_xy.copy()
+    distances[20:] *= 2
+    xy[block.image_photos >= 20] *= 2
+    distances[20:] *= -1
+    (sign,) = found(
+        checked(block.replace(principal_distances=distances, image_xy=xy)), "sign-of-principal-distance"
+    )
+    assert sign.photos == block.photo_ids[20:]
+    assert "principal distance 305.48 mm" in sign.text
+
+
+@pytest.mark.giant("13", "control above its camera: kappa?")
+@pytest.mark.parametrize(("turn", "text"), [(np.pi, "by 180"), (np.pi / 2, "by -90"), (-np.pi / 2, "by 90")])
+@pytest.mark.parametrize("photo_to_ground", [False, True])
+def test_section_13_the_kappa_of_one_photo(turn, text, photo_to_ground):
+    block = simulate(points_per_photo=30, seed=3, photo_to_ground=photo_to_ground).block
+    outcome = checked(changed(block, "photo_attitudes", block.photo_ids.index("0304"), 2, turn))
+    (kappa,) = found(outcome, "kappa")
+    assert (kappa.level, kappa.photos) == ("grave", ["0304"])
+    assert f"turned {text} degrees" in kappa.text
+    assert {finding.kind for finding in outcome.grave} <= {"kappa", "control-above-camera"}
+
+
+@pytest.mark.giant("13", "control above its camera: kappa of all photos")
+def test_section_13_the_kappa_of_all_photos(block):
+    outcome = checked(changed(block, "photo_attitudes", slice(None), 2, np.pi / 2))
+    (kappa,) = found(outcome, "kappa")
+    assert kappa.photos == block.photo_ids
+    assert "the kappa of all photos is wrong: turned by -90 degrees" in kappa.text
+
+
+def test_the_sense_of_rotation():
+    # North to the right, so that the senses differ.
+    block = simulate(points_per_photo=30, seed=3).block
+    turned = block.photo_positions[:, [1, 0, 2]] * [-1, 1, 1]
+    known = block.point_positions[:, [1, 0, 2]] * [-1, 1, 1]
+    block = block.replace(
+        photo_positions=turned,
+        point_positions=known,
+        point_sd=block.point_sd[:, [1, 0, 2]],
+        photo_attitudes=block.photo_attitudes + np.array([0, 0, np.pi / 2]),
+    )
+    kinds = {True: checked(block), False: checked(block.replace(photo_to_ground=True))}
+    assert {finding.kind for finding in kinds[True].grave} & {"kappa", "sense-of-rotation"} == set()
+    (finding,) = [each for each in kinds[False].grave if each.kind != "control-above-camera"]
+    # With kappa near +-90 degrees the other sense turns every photo over, as the sign would.
+    assert "sense" in finding.text
+
+
+@pytest.mark.giant("13", "blunder edit: wrong frame and point pairs")
+def test_section_13_exchanged_point_names(block):
+    one, other = image(block, "0203"), image(block, "0203", skip=9)
+    xy = block.image_xy.copy()
+    xy[[one, other]] = xy[[other, one]]
+    outcome = checked(block.replace(image_xy=xy))
+    (exchanged,) = outcome.grave
+    assert (exchanged.kind, exchanged.photos) == ("exchanged-points", ["0203"])
+    assert set(exchanged.points) == {block.point_ids[block.image_points[row]] for row in (one, other)}
+
+
+@pytest.mark.giant("13", "blunder edit: gross plate errors")
+def test_section_13_a_gross_plate_error_is_seen_by_intersection(block):
+    row = image(block, "0305", least_rays=4)
+    outcome = checked(changed(block, "image_xy", row, 1, 40.0))
+    (gross,) = outcome.grave
+    assert (gross.kind, gross.photos) == ("gross-error", ["0305"])
+    assert gross.points == [block.point_ids[block.image_points[row]]]
+
+
+@pytest.mark.giant("13", "blunder edit: consistently bad frames")
+def test_section_13_a_bad_frame(block):
+    xy = block.image_xy.copy()
+    xy[block.image_photos == block.photo_ids.index("0205"), 0] *= -1
+    outcome = checked(block.replace(image_xy=xy))
+    (bad,) = outcome.grave
+    assert (bad.kind, bad.photos) == ("bad-photo", ["0205"])
+    assert "0205" not in outcome.result.block.photo_ids
+    assert outcome.result.converged
+
+
+@pytest.mark.giant("13", "blunder edit: control differences")
+def test_section_13_control_far_off_is_seen_by_intersection(block):
+    point = int(np.flatnonzero(np.isfinite(block.point_sd[:, 0]))[3])
+    outcome = checked(changed(block, "point_positions", point, 1, 3000.0))
+    (difference,) = found(outcome, "control-difference")
+    assert (difference.level, difference.points) == ("grave", [block.point_ids[point]])
+    assert "given Y" in difference.text
+
+
+# Step 2: adjustment
+
+
+@pytest.mark.giant("13", "3-sigma blunder list")
+@pytest.mark.parametrize(("photo", "axis"), [("0106", 1), ("0302", 0), ("0409", 1)])
+def test_section_13_a_gross_error_of_a_fifth_of_a_millimetre(block, photo, axis):
+    row = image(block, photo, least_rays=4, skip=2)
+    outcome = checked(changed(block, "image_xy", row, axis, 0.2))
+    (blunder,) = outcome.grave
+    assert (blunder.kind, blunder.photos) == ("blunder", [photo])
+    assert blunder.points == [block.point_ids[block.image_points[row]]]
+    assert blunder.values["error_um"] == pytest.approx(200, abs=60)
+    assert f"error of {'xy'[axis]}" in blunder.text
+
+
+@pytest.mark.giant("13", "3-sigma blunder list")
+def test_section_13_with_two_rays_both_images_are_named(block):
+    row = image(block, "0105", least_rays=2, skip=0)
+    rays = np.bincount(block.image_points)
+    row = next(
+        row for row in np.flatnonzero(block.image_photos == 4).tolist() if rays[block.image_points[row]] == 2
+    )
+    others = block.image_photos[block.image_points == block.image_points[row]]
+    outcome = checked(changed(block, "image_xy", row, 1, 0.3))
+    (blunder,) = outcome.grave
+    assert set(blunder.photos) == {block.photo_ids[photo] for photo in others}
+    assert "it may as well be the image on photo" in blunder.text
+
+
+@pytest.mark.giant("13", "3-sigma blunder list: several errors, small ones beside large ones")
+def test_section_13_blunders_do_not_drag_others_along():
+    simulation = simulate(points_per_photo=40, blunders=8, blunder_size=0.3, seed=21)
+    block = changed(simulation.block, "image_xy", image(simulation.block, "0203", 4), 0, 3.0)
+    outcome = checked(block)
+    points = {block.point_ids[block.image_points[row]] for row in simulation.blunders.images}
+    points.add(block.point_ids[block.image_points[image(simulation.block, "0203", 4)]])
+    named = {point for finding in outcome.grave for point in finding.points}
+    assert named <= points
+    assert len(named) >= 6
+
+
+@pytest.mark.giant("13", "control that does not fit, with its remedies")
+@pytest.mark.parametrize(
+    ("axes", "remedy"),
+    [([2], "the height only: lower the type (column 80: 4)"), ([0], "the planimetry only")],
+)
+def test_section_13_a_wrong_control_coordinate(block, axes, remedy):
+    point = int(np.flatnonzero(np.isfinite(block.point_sd[:, 0]))[3])
+    outcome = checked(changed(block, "point_positions", point, axes, 20.0))
+    (misfit,) = outcome.grave
+    assert (misfit.kind, misfit.points) == ("control-misfit", [block.point_ids[point]])
+    assert remedy in misfit.text
+    (number,) = [line for line in misfit.text.split("about ")[1].split() if line.replace(".", "").isdigit()][
+        :1
+    ]
+    assert float(number) == pytest.approx(20, abs=4)
+
+
+@pytest.mark.giant("13", "outlying stations")
+def test_section_13_an_outlying_initial_station(block):
+    outcome = checked(changed(block, "photo_positions", 7, 1, 2000.0))
+    moved = found(outcome, "moved-station") + found(outcome, "bad-photo")
+    assert {name for finding in moved for name in finding.photos} == {"0108"}
+    assert outcome.result.converged
+
+
+@pytest.mark.giant("13", "outlying stations: off the path of their strip")
+def test_section_13_a_station_off_the_path_without_an_adjustment(block):
+    from photogram.giant.checks.stations import stations
+
+    one = changed(block, "photo_positions", block.photo_ids.index("0305"), 2, 900.0)
+    one = changed(one, "photo_attitudes", block.photo_ids.index("0407"), 2, 0.6)
+    section = stations(one, None)
+    assert {(finding.kind, *finding.photos) for finding in section.findings} == {
+        ("outlying-station", "0305"),
+        ("outlying-station", "0407"),
+    }
+    assert any("height by 9" in finding.text for finding in section.findings)
+    assert any("kappa by 3" in finding.text for finding in section.findings)
+
+
+@pytest.mark.giant("13", "two-ray heights")
+def test_section_13_the_height_of_a_two_ray_point():
+    # Along the flight line, here x, so that no residual shows it.
+    block = simulate(points_per_photo=60, image_sd=0.005, relief=30.0, seed=5).block
+    rays = np.bincount(block.image_points)
+    row = next(
+        row
+        for row in np.flatnonzero(block.image_photos == block.photo_ids.index("0205")).tolist()
+        if rays[block.image_points[row]] == 2 and abs(block.image_xy[row]).max() < 100
+    )
+    outcome = checked(changed(block, "image_xy", row, 0, 0.5))
+    (height,) = found(outcome, "two-ray-height")
+    assert height.points == [block.point_ids[block.image_points[row]]]
+    assert abs(height.values["departure"]) > 10
+
+
+@pytest.mark.giant("13", "residual patterns: systematic components")
+def test_section_13_a_pattern_that_all_photos_share(block):
+    # A bent fiducial edge: no position or attitude takes that up.
+    bent = np.column_stack([np.zeros(len(block.image_xy)), 0.03 * (block.image_xy[:, 0] / 115) ** 2])
+    outcome = checked(block.replace(image_xy=block.image_xy + bent))
+    patterns = found(outcome, "systematic-pattern")
+    assert "bend of y over x" in max(patterns, key=lambda each: each.values["significance_sd"]).text
+    assert found(checked(block), "systematic-pattern") == []
+
+
+@pytest.mark.giant("13", "residual patterns: one photo")
+def test_section_13_a_pattern_of_one_photo():
+    block = simulate(points_per_photo=100, seed=8).block
+    xy = block.image_xy.copy()
+    rows = block.image_photos == block.photo_ids.index("0305")
+    # Sheared film: what position and attitude take up is little.
+    xy[rows] += 0.03 * np.column_stack([xy[rows, 1], xy[rows, 0]]) / 115
+    outcome = checked(block.replace(image_xy=xy))
+    assert "0305" in {name for finding in found(outcome, "photo-pattern") for name in finding.photos}
+
+
+@pytest.mark.giant("13", "control has its own pattern: something common")
+def test_section_13_a_lens_that_is_not_corrected_shows_in_the_control(block):
+    # Radial distortion bends the whole block and leaves hardly a residual.
+    radius2 = (block.image_xy**2).sum(axis=1, keepdims=True) / 115**2
+    outcome = checked(block.replace(image_xy=block.image_xy + 0.06 * radius2 * block.image_xy / 115))
+    (common,) = found(outcome, "control-system")
+    assert common.level == "grave"
+    assert {finding.level for finding in found(outcome, "control-misfit")} == {"look"}
+
+
+@pytest.mark.giant("13", "residual patterns: by the number of rays")
+def test_section_13_residuals_grow_with_the_number_of_rays(block):
+    outcome = checked(block)
+    (section,) = [section for section in outcome.sections if section.title.startswith("Patterns")]
+    head = next(index for index, line in enumerate(section.lines) if "rms x um" in line)
+    rows = [line.split() for line in section.lines[head + 1 :]]
+    rows = [row for row in rows if row[0].isdigit()]
+    assert [int(row[0]) for row in rows] == sorted(set(np.bincount(block.image_points)))
+    assert sum(int(row[1]) for row in rows) == len(block.image_xy)
+    assert float(rows[0][2]) < float(rows[-1][2]) / 2
+
+
+@pytest.mark.giant("13", "key numbers")
+def test_section_13_the_key_numbers(block):
+    outcome = checked(block)
+    (section,) = [section for section in outcome.sections if section.title == "Key numbers"]
+    text = "\n".join(section.lines)
+    assert f"{outcome.result.variance_of_unit_weight:.4f}" in text
+    for iteration in outcome.result.iterations:
+        assert f"iteration {iteration.number}" in text
+    (weights,) = found(checked(block.replace(image_sd=np.array(0.03))), "weights")[:1]
+    assert "variance of unit weight is 0.1" in weights.text
+
+
+def test_standard_deviations_beyond_the_usual_are_remarked_on(block):
+    texts = [finding.text for finding in found(checked(block.replace(image_sd=np.array(0.03))), "weights")]
+    assert any("usually 5 to 15 um" in text for text in texts)
+
+
+# What cannot be adjusted, and structure
+
+
+def test_a_block_that_cannot_be_adjusted_says_why(block):
+    rng = np.random.default_rng(2)
+    outcome = checked(block.replace(image_xy=rng.uniform(-100, 100, block.image_xy.shape)))
+    assert found(outcome, "rays-do-not-meet")
+    assert outcome.grave
+    assert "Key numbers" in outcome.report()
+
+
+@pytest.mark.giant("13", "do not delete all ties: parts that hang together")
+def test_section_13_parts_without_a_common_point(block):
+    points = block.image_points.copy()
+    upper = block.image_photos >= 20
+    names = [*block.point_ids, *(f"U{name}" for name in block.point_ids)]
+    points[upper] += len(block.point_ids)
+    unknown = np.full_like(block.point_positions, np.nan)
+    split = block.replace(
+        image_points=points,
+        point_ids=names,
+        point_positions=np.vstack([block.point_positions, unknown]),
+        point_sd=np.vstack([block.point_sd, np.full_like(unknown, np.inf)]),
+    )
+    (part,) = found(checked(split), "separate-part")
+    assert part.photos in (block.photo_ids[20:], block.photo_ids[:20])
+    assert sorted(set(parts_of(split).tolist())) == [0, 20]
+
+
+def test_photos_with_few_ties_are_named(block):
+    kept = np.ones(len(block.image_xy), dtype=bool)
+    rows = np.flatnonzero(block.image_photos == 12)
+    kept[rows[2:]] = False
+    names = ("image_photos", "image_points", "image_xy", "image_sd")
+    outcome = checked(block.replace(**{name: getattr(block, name)[kept] for name in names}))
+    (few,) = found(outcome, "few-ties")
+    assert few.photos == ["0203"]
+
+
+@pytest.mark.giant("11", "station without enough rays; warnings in the check")
+def test_section_11_warnings_stand_in_the_check(block):
+    project = Project.from_block(block)
+    project.ground.append(type(project.ground[0])("NOWHERE", (1.0, 2.0, 3.0)))
+    outcome = check(project, limits=Limits(photos_per_point=5))
+    text = outcome.report()
+    assert "ERROR WARNINGS\nPOINTS NOT PHOTOGRAPHED\n  NOWHERE" in text
+    assert "PASS POINTS APPEARING ON MORE THAN 5 PHOTOGRAPHS" in text
+    assert [finding.points for finding in found(outcome, "warning")][-1] == ["NOWHERE"]
+
+
+@pytest.mark.giant("4", "State Plane or UTM coordinates")
+def test_section_4_coordinates_of_a_map_projection_are_remarked_on():
+    options = {"points_per_photo": 20, "seed": 4}
+    utm = Project.from_block(simulate(origin=(500000.0, 5400000.0, 200.0), **options).block)
+    utm.to_block()
+    (message,) = utm.messages
+    assert isinstance(message, Message)
+    assert "look like those of a map projection" in message.text
+    # H r^3 / 2 R c^2 for H = 4500 m, c = 152.74 mm at a radius of 120 to 140 mm.
+    (shift,) = [int(word) for word in message.text.split() if word.isdigit() and int(word) > 1]
+    assert 25 < shift < 45
+    for plain in (simulate(**options), simulate(**options, **GULF)):
+        project = Project.from_block(plain.block)
+        project.to_block()
+        assert project.messages == []
+
+
+# The parts
+
+
+def test_rays_meet_where_the_points_are():
+    for space in ({}, GULF):
+        truth = simulate(points_per_photo=20, seed=6, **space).truth
+        rays = Rays.of(truth)
+        met = rays.intersect()
+        assert met.in_front.all()
+        assert np.abs(met.residuals).max() < 1e-6
+        np.testing.assert_allclose(met.positions, rays.axes.positions(truth.point_positions), atol=1e-4)
+        back = rays.axes.from_local(met.positions) - truth.point_positions
+        assert np.abs(back).max() < 1e-4
+
+
+def test_neighbours_are_the_nearest():
+    rng = np.random.default_rng(3)
+    for plan in (rng.random((300, 2)), rng.random((300, 2)) ** 6, rng.random((50, 2)) * [1, 0]):
+        rows = np.arange(0, len(plan), 7)
+        near = neighbours(plan, rows, 8)
+        distances = np.linalg.norm(plan[rows][:, None] - plan, axis=2)
+        distances[np.arange(len(rows)), rows] = np.inf
+        expected = np.sort(distances, axis=1)[:, :8]
+        np.testing.assert_allclose(np.take_along_axis(distances, near, axis=1), expected)
+
+
+def test_strips_are_cut_where_the_flight_turns():
+    truth = simulate(strips=3, photos_per_strip=6, points_per_photo=10, seed=1).truth
+    strips = strips_of(truth.photo_positions)
+    assert [strip.tolist() for strip in strips] == [list(range(first, first + 6)) for first in (0, 6, 12)]
+    stray = truth.photo_positions.copy()
+    stray[8] += [20000.0, 9000.0, 0]
+    assert [strip.tolist() for strip in strips_of(stray)] == [strip.tolist() for strip in strips]
+    assert [strip.tolist() for strip in strips_of(stray[:1])] == [[0]]
+
+
+def test_a_robust_fit_does_not_see_outliers():
+    rng = np.random.default_rng(9)
+    x = np.linspace(-1, 1, 40)
+    design = np.vander(x, 2)
+    values = design @ [[2.0], [1.0]] + 0.01 * rng.standard_normal((40, 1))
+    values[::5] += 50
+    np.testing.assert_allclose(fit(design, values).ravel(), [2, 1], atol=0.02)
+    assert mad_sd(values - design @ [[2.0], [1.0]]) < 0.03
+    assert critical(1, 0.05) == pytest.approx(1.96, abs=0.001)
+
+
+@pytest.mark.giant("13", "the check of whatever can be read")
+@pytest.mark.parametrize("seed", range(40))
+def test_section_13_no_block_is_too_poor_or_too_bad_for_a_check(seed):
+    rng = np.random.default_rng(seed)
+    block = simulate(
+        strips=1 + seed % 2,
+        photos_per_strip=2 + seed % 4,
+        points_per_photo=4 + seed % 9,
+        control=("perimeter", "corners", "none")[seed % 3],
+        seed=seed,
+        **(GULF if seed % 2 else {}),
+    ).block
+    keep = rng.random(len(block.image_xy)) < rng.random()
+    keep[0] = True
+    block = kept_images(block, keep)
+    without = np.ones(len(block.photo_ids), dtype=bool)
+    without[np.unique(block.image_photos)] = False
+    block = without_photos(block, without)
+    gross = rng.random((len(block.image_xy), 1)) < 0.2 * (seed % 3)
+    block = block.replace(image_xy=(block.image_xy + 30 * gross * rng.standard_normal(2)) * (seed % 10 > 0))
+    outcome = checked(block)
+    assert [section.title for section in outcome.sections][-1] == "Key numbers"
+    assert json.loads(outcome.to_json())["grave"] == len(outcome.grave)
+    assert outcome.report().endswith("\n")
+
+
+def test_intersection_only_is_checked_with_fixed_stations(block):
+    project = Project.from_block(block)
+    project.common.intersection_only = True
+    outcome = check(project)
+    (none,) = found(outcome, "no-adjustment")
+    assert none.level == "look"
+    assert "the stations are not adjusted ones" in none.text
+    adjusted = checked(block).result
+    final = block.replace(photo_positions=adjusted.photo_positions, photo_attitudes=adjusted.photo_attitudes)
+    row = image(block, "0302", least_rays=4)
+    project = Project.from_block(changed(final, "image_xy", row, 0, 0.3))
+    project.common.intersection_only = True
+    outcome = check(project)
+    np.testing.assert_array_equal(outcome.result.photo_positions, outcome.result.block.photo_positions)
+    (blunder,) = outcome.grave
+    assert blunder.photos == ["0302"]
+
+
+def test_every_kind_of_finding_is_documented():
+    root = Path(__file__).parents[2]
+    sources = (root / "python" / "photogram" / "giant" / "checks").glob("*.py")
+    kinds = {kind for path in sources for kind in re.findall(r'"([a-z]+(?:-[a-z]+)+)"', path.read_text())}
+    text = (root / "docs" / "giant-check.md").read_text()
+    assert {kind for kind in kinds if f"`{kind}`" not in text} == set()
+    assert len(kinds) > 15
+
+
+# Command line
+
+
+@pytest.mark.giant("13", "photogram giant check")
+def test_section_13_the_command(block, tmp_path):
+    runner = CliRunner()
+    write_project(Project.from_block(block), tmp_path / "clean")
+    faulty = changed(block, "image_xy", image(block, "0302", least_rays=4), 0, 0.3)
+    write_project(Project.from_block(faulty), tmp_path / "faulty")
+    before = {path.name: path.read_bytes() for path in (tmp_path / "faulty").iterdir()}
+
+    result = runner.invoke(app, ["giant", "check", str(tmp_path / "clean"), "--threads", "1"])
+    assert result.exit_code == 0, result.output
+    assert "0 grave" in result.stdout
+    document = tmp_path / "check.json"
+    result = runner.invoke(
+        app, ["giant", "check", str(tmp_path / "faulty"), "--json", str(document), "--quiet"]
+    )
+    assert (result.exit_code, result.stdout) == (3, "")
+    found = json.loads(document.read_text())
+    (blunder,) = [f for section in found["sections"] for f in section["findings"] if f["level"] == "grave"]
+    assert (found["grave"], blunder["kind"], blunder["photos"]) == (1, "blunder", ["0302"])
+    assert {path.name: path.read_bytes() for path in (tmp_path / "faulty").iterdir()} == before
+
+    result = runner.invoke(app, ["giant", "check", str(tmp_path / "clean"), "--limits", "N1=39"])
+    assert result.exit_code == 1
+    assert "**CAMERA STATIONS EXCEEDED 39: there are 40" in result.output
+    assert runner.invoke(app, ["giant", "check", str(tmp_path / "nowhere")]).exit_code == 1
+    result = runner.invoke(app, ["giant", str(tmp_path / "clean"), "--limits", "N6=7"])
+    assert result.exit_code == 1
+    assert "**ERROR IN SUBROUTINE MODID\nADDING VARIABLE" in result.output
