@@ -7,6 +7,7 @@ from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
+from photogram.refraction import Refraction
 from photogram.result import Result
 from photogram.simulation import Simulation, simulate
 
@@ -20,6 +21,7 @@ __all__ = [
     "PhotogramError",
     "Progress",
     "RankError",
+    "Refraction",
     "Result",
     "Simulation",
     "Spheroid",

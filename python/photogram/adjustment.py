@@ -13,6 +13,7 @@ from photogram.adjusted import Iteration
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
+from photogram.refraction import check_cameras, remarks
 from photogram.result import Result
 
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
@@ -77,7 +78,7 @@ def adjust(
 
     Every unknown is a weighted parameter, from free to fixed. Points that their image points cannot determine
     are left out (the result's `messages` and `dropped` say which); the others start from the intersection of
-    their rays.
+    their rays. Refraction, where the block has it, is applied in every iteration.
 
     Parameters
     ----------
@@ -117,11 +118,12 @@ def adjust(
     AdjustmentError
         There is nothing to adjust, or the initial values give no finite image coordinates.
     InputError
-        An option that cannot be.
+        An option that cannot be, or a photo that is not above the water of the block.
     KeyboardInterrupt
         Ctrl-C.
     """
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads)
+    check_cameras(block)
     if fix_photos:
         block = block.replace(photo_position_sd=np.array(0.0), photo_attitude_sd=np.array(0.0))
 
@@ -140,6 +142,7 @@ def adjust(
             block.image_sd,
             spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
             photo_to_ground=block.photo_to_ground,
+            refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
             criterion="percent" if as_published else "fraction",
             limit=as_published.percent if as_published else tolerance,
             max_iterations=as_published.max_iterations if as_published else max_iterations,
@@ -198,7 +201,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
         messages.insert(
             0, Message("there is no control: the datum of the block rests on the weights of its photos")
         )
-    return messages
+    return messages + remarks(block, solution.photo_positions)
 
 
 def _named(

@@ -15,6 +15,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
     from rich.status import Status
@@ -74,6 +75,26 @@ def giant(
     ordering: Annotated[
         Ordering, typer.Option(help="Order of the photographs in the normal equations.")
     ] = Ordering.AUTO,
+    air_refraction: Annotated[
+        AirModel | None,
+        typer.Option(
+            help="Refraction in air by the guide (to 9,000 m) or by a standard atmosphere; giving it"
+            " applies it even where COMMON does not ask for it. Default when it does: giant.",
+            show_default=False,
+        ),
+    ] = None,
+    water_refraction: Annotated[
+        WaterModel | None,
+        typer.Option(
+            help="Refraction in water by the guide or by Snell's law, below the level in COMMON; giving it"
+            " applies it even where COMMON does not ask for it. Default when it does: giant.",
+            show_default=False,
+        ),
+    ] = None,
+    water_index: Annotated[
+        float | None,
+        typer.Option(min=1, help="Refractive index of the water. Default: 1.340.", show_default=False),
+    ] = None,
     threads: Annotated[
         int | None,
         typer.Option(
@@ -102,7 +123,7 @@ def giant(
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
         project = read_project(directory)
-        block = project.to_block()
+        block = _refracted(project, air_refraction, water_refraction, water_index)
         try:
             result = _adjust(project, block, as_published, ordering, threads, quiet)
         except AdjustmentError:
@@ -140,6 +161,20 @@ def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Pat
         if inputs:
             raise InputError(f"holds another project ({', '.join(inputs)}); --overwrite allows it", file=out)
     return out
+
+
+def _refracted(
+    project: Project, air: AirModel | None, water: WaterModel | None, index: float | None
+) -> Block:
+    """Make the block of a project, with the refraction of COMMON and the options."""
+    from photogram.giant.assembly import job_refraction
+
+    refraction = job_refraction(
+        project.common, air=air.value if air else None, water=water.value if water else None, index=index
+    )
+    if index is not None and (refraction is None or refraction.water is None):
+        raise typer.BadParameter("there is no refraction in water", param_hint="--water-index")
+    return project.to_block().replace(refraction=refraction)
 
 
 def _adjust(

@@ -11,6 +11,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import errors, failures, output
+from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
     from photogram.simulation import Simulation
@@ -90,6 +91,16 @@ def simulate(
         bool,
         typer.Option("--photo-to-ground", help="Write photo-to-ground angles instead of ground-to-photo."),
     ] = False,
+    air_refraction: Annotated[
+        AirModel | None,
+        typer.Option(help="What bends the rays in air. Default: nothing.", show_default=False),
+    ] = None,
+    water_refraction: Annotated[
+        WaterModel | None,
+        typer.Option(help="What bends the rays in water. Default: nothing.", show_default=False),
+    ] = None,
+    water_level: Annotated[float, typer.Option(help="Height of the water, m.")] = 0.0,
+    water_index: Annotated[float, typer.Option(min=1, help="Refractive index of the water.")] = 1.340,
     seed: Annotated[int, typer.Option(min=0, help="Equal seeds give equal blocks.")] = 0,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a project that is there already.")
@@ -101,6 +112,7 @@ def simulate(
     (rad) of the photographs, the true positions of the points, and the gross errors.
     """
     with failures():
+        from photogram import Refraction
         from photogram.files import write_whole
         from photogram.geometry import Spheroid
         from photogram.giant import Project
@@ -136,6 +148,14 @@ def simulate(
             spheroid=spheroids[spheroid]() if spheroid in spheroids else None,
             origin=origin,
             photo_to_ground=photo_to_ground,
+            refraction=Refraction(
+                air_refraction.value if air_refraction else None,
+                water_refraction.value if water_refraction else None,
+                water_level,
+                water_index,
+            )
+            if air_refraction or water_refraction
+            else None,
             seed=seed,
         )
         project = Project.from_block(simulation.block)
