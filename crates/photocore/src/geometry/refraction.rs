@@ -15,6 +15,9 @@ const REFRACTIVITY: f64 = 277.0e-6;
 /// Points less than this below the camera, in metres, or above it, are not corrected for air: K_a tan alpha is no model of
 /// horizontal rays.
 const LEAST_DROP: f64 = 1.0;
+/// How far from the water level, as part of the height of the camera above it, the depth is rounded off: by a quarter of
+/// this at most, of which refraction leaves a quarter, 2e-6 of the height or 0.3 micrometres in a photograph.
+const SHORE: f64 = 3e-5;
 
 /// How rays are bent by air.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -194,6 +197,16 @@ impl Bending {
     }
 }
 
+/// The depth of a point, and its partials.
+#[derive(Debug, Clone, Copy)]
+struct Depth {
+    value: f64,
+    /// With respect to the depth as it is.
+    by_depth: f64,
+    /// With respect to the height of the camera above the water.
+    by_height: f64,
+}
+
 /// d - d', what the true depth d exceeds the apparent one by, and its partials.
 #[derive(Debug, Clone, Copy)]
 struct Shallowing {
@@ -203,49 +216,59 @@ struct Shallowing {
 }
 
 impl Water {
-    /// How deep a point lies and how high the camera stands above the water, where both are as they should be.
-    fn depth_and_height(&self, foot: &Vertical, height: f64) -> Option<(f64, f64)> {
-        let depth = self.level - foot.height;
-        (depth > 0.0 && height > 0.0).then_some((depth, height))
+    /// The depth of a point for a camera at `height` above the water; None for a camera below it, and for points above.
+    ///
+    /// max(0, d) has a kink, and where the sum of squares has its least value on a kink no iteration ends: within
+    /// e = `SHORE` x height of the level the depth is (d + e)^2 / (4 e) instead.
+    fn depth(&self, foot: &Vertical, height: f64) -> Option<Depth> {
+        let (depth, shore) = (self.level - foot.height, SHORE * height);
+        if height <= 0.0 || depth <= -shore {
+            None
+        } else if depth >= shore {
+            Some(Depth { value: depth, by_depth: 1.0, by_height: 0.0 })
+        } else {
+            let part = (depth + shore) / (2.0 * shore);
+            Some(Depth { value: part * part * shore, by_depth: part, by_height: SHORE * part * (1.0 - part) })
+        }
     }
 
     /// K_w of the GIANT guide, Appendix G, heights of camera and point being those above the ellipsoid:
     /// (d - d') / (Hc + d') / (1 + L^2 / (Hc + d)^2).
     fn bending(&self, across: f64, station: &Vertical, foot: &Vertical) -> Bending {
-        let Some((depth, height)) = self.depth_and_height(foot, station.height - self.level) else {
-            return Bending::default();
-        };
-        let Shallowing { value, by: [by_across, by_height, by_depth] } =
-            self.shallowing(across, height, depth);
-        let (drop, apparent) = (height + depth, height + depth - value);
+        let height = station.height - self.level;
+        let Some(depth) = self.depth(foot, height) else { return Bending::default() };
+        let Shallowing { value, by } = self.shallowing(across, height, depth.value);
+        let (drop, apparent) = (height + depth.value, height + depth.value - value);
         let slant = drop * drop + across;
         let steep = drop * drop / slant;
-        // d K_w = steep / apparent [drop / apparent d(d - d') - (d - d') / apparent d(drop)] + K_w d(ln steep)
-        let by_value = steep * drop / (apparent * apparent);
+        // K_w = steep (d - d') / apparent, where steep and apparent depend on drop
         let bending = steep * value / apparent;
+        let by_value = steep * drop / (apparent * apparent);
         let by_drop = bending * (2.0 * across / (drop * slant) - 1.0 / apparent);
+        let [by_height, by_depth] = [by[1], by[2]].map(|each| by_value * each + by_drop);
         Bending {
             value: bending,
-            by_across: by_value * by_across - bending / slant,
+            by_across: by_value * by[0] - bending / slant,
             // A higher point is less deep.
-            by_heights: [by_value * by_height + by_drop, -by_value * by_depth - by_drop],
+            by_heights: [by_height + by_depth * depth.by_height, -by_depth * depth.by_depth],
         }
     }
 
     /// The lift of the rigorous ray, d - d', in the frame of the point; `drop` is that of the point below the camera there.
     fn rise(&self, square: f64, drop: f64, foot: &Vertical) -> Rise {
         let height = drop - (self.level - foot.height);
-        let Some((depth, height)) = self.depth_and_height(foot, height) else {
+        let Some(depth) = self.depth(foot, height) else {
             return Rise { value: 0.0, by_square: 0.0, by_drop: 0.0, by_heights: [0.0; 2] };
         };
         let Shallowing { value, by: [by_across, by_height, by_depth] } =
-            self.shallowing(square - drop * drop, height, depth);
+            self.shallowing(square - drop * drop, height, depth.value);
+        let by_height = by_height + by_depth * depth.by_height;
         Rise {
             value,
             by_square: by_across,
             by_drop: by_height - 2.0 * drop * by_across,
             // A higher point is less deep, and at the same drop its camera stands higher above the water.
-            by_heights: [0.0, by_height - by_depth],
+            by_heights: [0.0, by_height - by_depth * depth.by_depth],
         }
     }
 
