@@ -19,7 +19,7 @@ TANGENTS = (0.0, 0.5, 1.0)
 
 
 def lift(refraction: Refraction, camera: float, across: float, point: float) -> float:
-    """Return the lift, in metres, of a point `across` metres away from the nadir of a camera; both as heights."""
+    """Return the lift of a point `across` from the nadir; `camera` and `point` are heights; metres."""
     shift = geometry.refraction_shift([[across, 0.0, point]], [[0.0, 0.0, camera]], refraction)
     return float(shift[0, 2])
 
