@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.adjusted import Iteration
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, RankError
-from photogram.messages import Message
+from photogram.messages import Message, listed
 from photogram.refraction import check_cameras, remarks
 from photogram.result import Result
 
@@ -20,9 +20,6 @@ __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
 
 UnitVariance = Literal["free", "constrained", "unity"]
 Ordering = Literal["auto", "input", "rcm"]
-
-MOST_NAMES = 12
-"""Names that an error message lists at most."""
 
 
 @dataclass(frozen=True)
@@ -212,7 +209,7 @@ def _named(
     if kind == "undetermined points":
         seen = sorted({int(p) for p in block.image_photos[np.isin(block.image_points, points)]})
         photo_names = [block.photo_ids[p] for p in seen]
-        text = f"the rays on photos {_listed(photo_names)} do not determine the points {_listed(point_names)}"
+        text = f"the rays on photos {listed(photo_names)} do not determine the points {listed(point_names)}"
         return RankError(text, photo_names, point_names)
     if kind == "undetermined photos":
         return _undetermined_photos(block, photos)
@@ -233,9 +230,9 @@ def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankErr
         moved = (
             f"all {len(each)} photos together"
             if len(each) == len(block.photo_ids) > 1
-            else f"photos {_listed([block.photo_ids[photo] for photo in each])}"
+            else f"photos {listed([block.photo_ids[photo] for photo in each])}"
         )
-        held = f"hold the points {_listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
+        held = f"hold the points {listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
         lines.append(f"  {count} moving {moved}, which {held}")
     if not np.isfinite(block.point_sd).any():
         weighted = np.isfinite(block.photo_position_sd).any()
@@ -246,8 +243,3 @@ def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankErr
         )
         lines.append(f"  there is no control; {remedy}")
     return RankError("\n".join(lines), names, point_names)
-
-
-def _listed(names: list[str]) -> str:
-    shown = ", ".join(names[:MOST_NAMES])
-    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.errors import InputError
-from photogram.messages import Message
+from photogram.messages import Message, listed
 
 if TYPE_CHECKING:
     from photogram._photocore import RefractionRow
@@ -143,11 +143,10 @@ def remarks(block: Block, photo_positions: NDArray[np.float64]) -> list[Message]
     heights = metres_per_unit(block.linear_unit) * photo_positions[:, 2]
     high = [block.photo_ids[photo] for photo in np.flatnonzero(heights > HIGHEST_GIANT)]
     if refraction.air == "giant" and high:
-        shown = ", ".join(high[:12]) + (f" and {len(high) - 12} more" if len(high) > 12 else "")
         messages.append(
             Message(
-                f"the air refraction of GIANT holds up to {HIGHEST_GIANT:g} m, below the photos {shown}:"
-                ' the model "standard" has no such limit'
+                f"the air refraction of GIANT holds up to {HIGHEST_GIANT:g} m, below the photos"
+                f' {listed(high)}: the model "standard" has no such limit'
             )
         )
     if not block.geographic:

@@ -30,10 +30,7 @@ struct Case {
 
 impl Case {
     fn space(&self) -> ObjectSpace {
-        match self.spheroid {
-            None => ObjectSpace::Rectangular,
-            Some((a, b)) => ObjectSpace::Geographic(Ellipsoid::new(a, b).unwrap()),
-        }
+        forward::object_space(self.spheroid)
     }
 
     fn photo(&self) -> Photo {

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use num_complex::Complex64 as C;
 use photocore::geometry::atmosphere::Air;
 use photocore::geometry::{
-    AirModel, Ellipsoid, ObjectSpace, Photo, Point, Refraction, RotationSense, Vector3, Water, WaterModel,
+    AirModel, ObjectSpace, Photo, Point, Refraction, RotationSense, Vector3, Water, WaterModel,
 };
 use proptest::prelude::*;
 
@@ -144,10 +144,7 @@ struct Case {
 
 impl Case {
     fn space(&self) -> ObjectSpace {
-        match self.spheroid {
-            None => ObjectSpace::Rectangular,
-            Some((a, b)) => ObjectSpace::Geographic(Ellipsoid::new(a, b).unwrap()),
-        }
+        forward::object_space(self.spheroid)
     }
 
     fn refraction(&self) -> Refraction {

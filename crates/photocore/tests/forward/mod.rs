@@ -1,6 +1,12 @@
 //! The collinearity equations written out once more, as a chain of single rotations about axes, for complex arguments.
 
 use num_complex::Complex64 as C;
+use photocore::geometry::{Ellipsoid, ObjectSpace};
+
+/// Geographic space on a spheroid of these semi-axes; rectangular space without.
+pub fn object_space(spheroid: Option<(f64, f64)>) -> ObjectSpace {
+    spheroid.map_or(ObjectSpace::Rectangular, |(a, b)| ObjectSpace::Geographic(Ellipsoid::new(a, b).unwrap()))
+}
 
 fn about_axis(axis: usize, angle: C, v: [C; 3]) -> [C; 3] {
     let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
