@@ -9,6 +9,7 @@ from photogram.geometry import Spheroid
 from photogram.messages import Message
 from photogram.planning import Plan, plan
 from photogram.prediction import predict
+from photogram.refraction import Refraction
 from photogram.result import Result
 from photogram.simulation import Simulation, simulate
 
@@ -23,6 +24,7 @@ __all__ = [
     "Plan",
     "Progress",
     "RankError",
+    "Refraction",
     "Result",
     "Simulation",
     "Spheroid",

@@ -12,16 +12,14 @@ from photogram import _photocore
 from photogram.adjusted import Iteration
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, RankError
-from photogram.messages import Message
+from photogram.messages import Message, listed
+from photogram.refraction import check_cameras, remarks
 from photogram.result import Result
 
-__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "listed"]
+__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
 
 UnitVariance = Literal["free", "constrained", "unity"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
-
-MOST_NAMES = 12
-"""Names that an error message lists at most."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ def adjust(
 
     Every unknown is a weighted parameter, from free to fixed. Points that their image points cannot determine
     are left out (the result's `messages` and `dropped` say which); the others start from the intersection of
-    their rays.
+    their rays. Refraction, where the block has it, is applied in every iteration.
 
     Parameters
     ----------
@@ -118,11 +116,12 @@ def adjust(
     AdjustmentError
         There is nothing to adjust, or the initial values give no finite image coordinates.
     InputError
-        An option that cannot be.
+        An option that cannot be, or a photo that is not above the water of the block.
     KeyboardInterrupt
         Ctrl-C.
     """
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads)
+    check_cameras(block)
     if fix_photos:
         block = block.replace(photo_position_sd=np.array(0.0), photo_attitude_sd=np.array(0.0))
 
@@ -141,6 +140,7 @@ def adjust(
             block.image_sd,
             spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
             photo_to_ground=block.photo_to_ground,
+            refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
             criterion="percent" if as_published else "fraction",
             limit=as_published.percent if as_published else tolerance,
             max_iterations=as_published.max_iterations if as_published else max_iterations,
@@ -199,7 +199,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
         messages.insert(
             0, Message("there is no control: the datum of the block rests on the weights of its photos")
         )
-    return messages
+    return messages + remarks(block, solution.photo_positions)
 
 
 def _named(
@@ -244,9 +244,3 @@ def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankErr
         )
         lines.append(f"  there is no control; {remedy}")
     return RankError("\n".join(lines), names, point_names)
-
-
-def listed(names: list[str]) -> str:
-    """Join names, the first ones of many."""
-    shown = ", ".join(names[:MOST_NAMES])
-    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.errors import InputError
+from photogram.refraction import Refraction
 
 __all__ = [
     "Spheroid",
@@ -22,6 +23,7 @@ __all__ = [
     "lengths_of_units",
     "local_frames",
     "project",
+    "refraction_shift",
     "rotation_angles",
     "rotation_matrix",
     "viewing_directions",
@@ -160,6 +162,8 @@ def project(
     *,
     spheroid: Spheroid | None = None,
     photo_to_ground: bool = False,
+    refraction: Refraction | None = None,
+    linear_unit: str = "m",
 ) -> Floats:
     """Project points into photos, row by row: point i into the photo of row i.
 
@@ -177,6 +181,10 @@ def project(
         None for rectangular space.
     photo_to_ground
         The sense of the angles; False is ground-to-photo.
+    refraction
+        What bends the rays; None: they are straight.
+    linear_unit
+        Of the object space, "m" or "ft": refraction needs its length.
 
     Returns
     -------
@@ -185,7 +193,7 @@ def project(
     Raises
     ------
     ValueError
-        Other shapes, or different numbers of rows.
+        Other shapes, or different numbers of rows; refraction in another linear unit (an InputError).
     """
     return _photocore.project(
         _floats(points),
@@ -194,6 +202,47 @@ def project(
         _floats(principal_distances),
         spheroid=None if spheroid is None else (spheroid.a, spheroid.b),
         photo_to_ground=photo_to_ground,
+        refraction=None if refraction is None else refraction.row(linear_unit),
+    )
+
+
+def refraction_shift(
+    points: ArrayLike,
+    positions: ArrayLike,
+    refraction: Refraction,
+    *,
+    spheroid: Spheroid | None = None,
+    linear_unit: str = "m",
+) -> Floats:
+    """From points to where cameras see them, row by row: point i from the position of row i.
+
+    Parameters
+    ----------
+    points, positions
+        (n, 3) object points and projection centres, as for :func:`project`.
+    refraction
+        What bends the rays.
+    spheroid
+        None for rectangular space.
+    linear_unit
+        Of the object space, "m" or "ft".
+
+    Returns
+    -------
+    (n, 3) vectors in the linear unit, along X, Y, Z or the geocentric axes: the lift dZ of the GIANT guide
+    (Appendices F and G), along the up at the camera, and the lift of the ray by Snell's law, along the up at
+    the point. Zero for points that the models leave alone.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, or different numbers of rows; another linear unit (an InputError).
+    """
+    return _photocore.refraction_shift(
+        _floats(points),
+        _floats(positions),
+        spheroid=None if spheroid is None else (spheroid.a, spheroid.b),
+        refraction=refraction.row(linear_unit),
     )
 
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import geometry
-from photogram.adjustment import Ordering, Progress, adjust, listed
+from photogram.adjustment import Ordering, Progress, adjust
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError
-from photogram.messages import Message
+from photogram.messages import Message, listed
 from photogram.result import Result
 
 __all__ = ["at_adjusted", "image_depths", "predict"]

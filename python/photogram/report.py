@@ -98,6 +98,7 @@ def _adjustment(result: AdjustedBlock) -> list[str]:
         ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
         ("object space", "geographic" if block.geographic else "rectangular"),
         ("rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
+        ("refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
     ]
     return [f"{name:<36}{value}" for name, value in rows]
 

@@ -19,6 +19,7 @@ from photogram import geometry
 from photogram.block import Block
 from photogram.errors import InputError
 from photogram.geometry import Spheroid
+from photogram.refraction import Refraction
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
@@ -116,6 +117,7 @@ def simulate(
     spheroid: Spheroid | None = None,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     photo_to_ground: bool = False,
+    refraction: Refraction | None = None,
     seed: int | np.random.Generator = 0,
 ) -> Simulation:
     """Simulate a block of vertical photographs.
@@ -165,6 +167,8 @@ def simulate(
         height (m).
     photo_to_ground
         The sense of the attitude angles.
+    refraction
+        What bends the rays, in the images and in the block; None: they are straight.
     seed
         Equal seeds and equal arguments give equal blocks.
 
@@ -225,6 +229,7 @@ def simulate(
         frame_size,
         spheroid,
         photo_to_ground,
+        refraction,
     )
     used, image_points = np.unique(image_points, return_inverse=True)
     ground, terrain = ground[used], terrain[used]
@@ -255,6 +260,7 @@ def simulate(
         point_sd=point_sd,
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
+        refraction=refraction,
         title=f"simulated block, {strips} strips of {photos_per_strip} photographs",
     )
     faults = _blunders(len(xy), blunders, blunder_size, blunder_random)
@@ -342,6 +348,7 @@ def _photograph(
     frame_size: float,
     spheroid: Spheroid | None,
     photo_to_ground: bool,
+    refraction: Refraction | None,
 ) -> tuple[Indices, Indices, Floats]:
     """Photos, points and coordinates of the images in the frame whose points are seen at least twice."""
     photos, points = candidates
@@ -352,6 +359,7 @@ def _photograph(
         np.full(len(photos), principal_distance),
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
+        refraction=refraction,
     )
     seen = np.flatnonzero((np.abs(xy) <= frame_size / 2).all(axis=1))
     rays = np.bincount(points[seen])

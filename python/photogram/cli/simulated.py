@@ -12,6 +12,8 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
+from photogram.cli.refraction import AirModel, WaterModel
+
 __all__ = ["Control", "Ellipsoid", "NetworkOptions", "takes_network"]
 
 
@@ -78,11 +80,22 @@ class NetworkOptions:
         bool,
         typer.Option("--photo-to-ground", help="Photo-to-ground angles instead of ground-to-photo."),
     ] = False
+    air_refraction: Annotated[
+        AirModel | None,
+        typer.Option(help="What bends the rays in air. Default: nothing.", show_default=False),
+    ] = None
+    water_refraction: Annotated[
+        WaterModel | None,
+        typer.Option(help="What bends the rays in water. Default: nothing.", show_default=False),
+    ] = None
+    water_level: Annotated[float, typer.Option(help="Height of the water, m.")] = 0.0
+    water_index: Annotated[float, typer.Option(min=1, help="Refractive index of the water.")] = 1.340
     seed: Annotated[int, typer.Option(min=0, help="Equal seeds give equal blocks.")] = 0
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments of :func:`photogram.simulate`."""
         from photogram.geometry import Spheroid
+        from photogram.refraction import Refraction
 
         arguments: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         arguments["control"] = self.control.value
@@ -91,6 +104,10 @@ class NetworkOptions:
         if arguments["spheroid"]:
             longitude, latitude, height = self.origin
             arguments["origin"] = (math.radians(longitude), math.radians(latitude), height)
+        air, water = arguments.pop("air_refraction"), arguments.pop("water_refraction")
+        level, index = arguments.pop("water_level"), arguments.pop("water_index")
+        if air or water:
+            arguments["refraction"] = Refraction(air and air.value, water and water.value, level, index)
         return arguments
 
 
