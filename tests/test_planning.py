@@ -21,6 +21,7 @@ from photogram import (
     PhotogramError,
     Plan,
     RankError,
+    Refraction,
     Result,
     Spheroid,
     adjust,
@@ -80,6 +81,17 @@ def test_a_prediction_is_one_linearization_at_the_given_positions(space, photo_t
     )
     assert np.abs(moved / result.photo_sd).max() < 1e-6
     assert "computed, not observed" in str(result.messages[0])
+
+
+@SPACES
+def test_a_prediction_bends_the_rays_of_a_block_with_refraction(space):
+    block = network(refraction=Refraction("standard"), **space)
+    result = predict(block)
+    # Points start where straight rays meet, some tenths of a metre off, and come back.
+    assert np.nanmax(np.abs(result.point_differences) / result.point_sd) < 1e-4
+    straight = predict(block.replace(refraction=None))
+    np.testing.assert_allclose(result.photo_sd, straight.photo_sd, rtol=1e-2)
+    assert (result.photo_sd != straight.photo_sd).all()
 
 
 @SPACES

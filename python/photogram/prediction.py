@@ -70,6 +70,8 @@ def predict(
         block.principal_distances[images[0]],
         spheroid=block.spheroid,
         photo_to_ground=block.photo_to_ground,
+        refraction=block.refraction,
+        linear_unit=block.linear_unit,
     )
     result = adjust(
         block.replace(image_xy=computed),
