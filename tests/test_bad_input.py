@@ -197,7 +197,10 @@ def test_tables_that_cannot_be(tables):
     ("options", "message"),
     [
         ({"unit_variance": "two"}, "unit_variance is one of free, constrained, unity, not 'two'"),
-        ({"ordering": "random"}, "ordering is one of auto, input, rcm, not 'random'"),
+        (
+            {"ordering": "random"},
+            "ordering is one of auto, input, rcm, amd, dissection, graph-dissection, not 'random'",
+        ),
         ({"max_iterations": 0}, "one iteration at least"),
         ({"as_published": AsPublished(5.0, 0)}, "one iteration at least"),
         ({"tolerance": 0.0}, "must be positive"),

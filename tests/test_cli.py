@@ -266,9 +266,10 @@ def test_as_a_process(project):
 def test_the_options_of_simulate_are_the_arguments_of_the_function():
     arguments = inspect.signature(simulate_function).parameters
     options = inspect.signature(simulate_command).parameters
-    assert set(options) - set(arguments) == {"out", "overwrite"}
-    assert set(arguments) <= set(options)
-    for name in set(arguments) - {"spheroid"}:
+    refraction = {"air_refraction", "water_refraction", "water_level", "water_index"}
+    assert set(options) - set(arguments) == {"out", "overwrite", *refraction}
+    assert set(arguments) - set(options) == {"refraction"}
+    for name in set(arguments) - {"spheroid", "refraction"}:
         assert options[name].default == arguments[name].default
 
 

@@ -127,3 +127,46 @@ def test_shapes_are_checked(function, arguments, message):
 def test_spheroids_are_checked(a, b):
     with pytest.raises(InputError, match="0 < b <= a"):
         Spheroid(a, b)
+
+
+def test_lengths_of_units_are_those_of_small_steps():
+    spheroid = Spheroid.wgs84()
+    positions = np.array([[0.1, 0.85, 500.0], [3.1, -0.2, 0.0]])
+    for axis, step in enumerate((1e-6, 1e-6, 1.0)):
+        moved = positions.copy()
+        moved[:, axis] += step
+        xyz, other = (geometry.geographic_to_geocentric(each, spheroid) for each in (positions, moved))
+        lengths = np.linalg.norm(other - xyz, axis=1) / step
+        np.testing.assert_allclose(
+            geometry.lengths_of_units(positions, spheroid)[:, axis], lengths, rtol=1e-6
+        )
+    np.testing.assert_array_equal(geometry.lengths_of_units(positions, None), 1.0)
+
+
+def test_local_frames_point_east_north_and_up():
+    spheroid = Spheroid.wgs84()
+    positions = np.array([[0.1, 0.85, 500.0], [3.1, -0.2, 0.0]])
+    frames = geometry.local_frames(positions)
+    for axis, step in enumerate((1e-6, 1e-6, 1.0)):
+        moved = positions.copy()
+        moved[:, axis] += step
+        xyz, other = (geometry.geographic_to_geocentric(each, spheroid) for each in (positions, moved))
+        directions = (other - xyz) / np.linalg.norm(other - xyz, axis=1)[:, None]
+        np.testing.assert_allclose(frames[:, axis], directions, atol=1e-6)
+
+
+@pytest.mark.parametrize("spheroid", [None, Spheroid.clarke_1866()], ids=["rectangular", "geographic"])
+@pytest.mark.parametrize("photo_to_ground", [False, True])
+def test_a_point_in_the_viewing_direction_is_at_the_principal_point(spheroid, photo_to_ground):
+    space = {"spheroid": spheroid, "photo_to_ground": photo_to_ground}
+    positions = np.array([[0.3, 0.7, 3000.0], [-2.0, -0.4, 1500.0]])
+    attitudes = np.array([[0.1, -0.2, 2.0], [-0.3, 0.1, -1.0]])
+    directions = geometry.viewing_directions(positions, attitudes, **space)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, rtol=1e-15)
+    centres = positions if spheroid is None else geometry.geographic_to_geocentric(positions, spheroid)
+    points = centres + 1000.0 * directions
+    if spheroid is not None:
+        points = geometry.geocentric_to_geographic(points, spheroid)
+    xy = geometry.project(points, positions, attitudes, np.full(2, -150.0), **space)
+    np.testing.assert_allclose(xy, 0.0, atol=1e-6)
+    assert (points[:, 2] < positions[:, 2]).all()  # down, not up

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from photogram import Block, Result, Simulation, Spheroid, adjust, geometry, simulate
+from photogram.errors import RankError
 
 Floats = NDArray[np.float64]
 
@@ -398,11 +399,27 @@ def test_bits_do_not_depend_on_the_number_of_threads(space):
 
 
 def test_orderings_agree(block):
-    by_input, by_rcm = (adjust(block, ordering=ordering) for ordering in ("input", "rcm"))
-    assert (by_input.ordering, by_rcm.ordering) == ("input", "rcm")
-    np.testing.assert_allclose(by_input.photo_positions, by_rcm.photo_positions, rtol=0, atol=1e-8)
-    np.testing.assert_allclose(by_input.photo_sd, by_rcm.photo_sd, rtol=1e-9)
-    np.testing.assert_allclose(by_input.redundancy, by_rcm.redundancy, rtol=0, atol=1e-10)
+    by_input = adjust(block, ordering="input")
+    for ordering in ("rcm", "amd", "dissection", "graph-dissection"):
+        other = adjust(block, ordering=ordering)
+        assert other.ordering == ordering
+        assert set(other.predictions) == {ordering}
+        np.testing.assert_allclose(by_input.photo_positions, other.photo_positions, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(by_input.photo_sd, other.photo_sd, rtol=1e-9)
+        np.testing.assert_allclose(by_input.redundancy, other.redundancy, rtol=0, atol=1e-10)
+
+
+def test_the_ordering_with_the_least_predicted_work_is_taken():
+    # Wide enough that cutting it pays.
+    block = simulate(strips=12, photos_per_strip=14, points_per_photo=12).block
+    auto = adjust(block)
+    assert set(auto.predictions) == {"input", "rcm", "amd", "dissection", "graph-dissection"}
+    assert auto.predictions[auto.ordering] == min(auto.predictions.values())
+    assert auto.ordering in ("amd", "dissection", "graph-dissection")
+    for ordering, operations in auto.predictions.items():
+        one = adjust(block, ordering=ordering, covariance=False)
+        # Panels carry explicit zeros beyond the counted entries.
+        assert operations <= one.operations["factor"] <= 1.5 * operations
 
 
 @given(st.integers(0, 10_000), st.tuples(*[st.sampled_from([-1e6, 0.0, 1e6])] * 3))
@@ -500,7 +517,13 @@ def test_hopeless_starts_end_in_good_order(degrees, seed):
     best = adjust(
         block.replace(photo_positions=truth.photo_positions, photo_attitudes=truth.photo_attitudes)
     ).sums_of_squares.total
-    result = adjust(block)
+    try:
+        result = adjust(block)
+    except RankError:
+        # Linearized there, even the images may leave unknowns undetermined.
+        if degrees < 30:
+            raise
+        return
     sums = [result.initial_weighted_sum_of_squares]
     sums += [iteration.weighted_sum_of_squares for iteration in result.iterations]
     assert (np.diff(sums) <= 1e-9 * np.array(sums[:-1])).all()

@@ -300,7 +300,7 @@ def test_members_of_the_document(result, document):
         "program", "title", "units", "conventions", "status", "messages", "initial_weighted_sum_of_squares",
         "iterations", "weighted_sum_of_squares", "degrees_of_freedom", "unit_variance",
         "variance_of_unit_weight", "covariance_scale", "photos", "points", "observations", "check_points",
-        "dropped_points", "ordering", "operations", "seconds",
+        "dropped_points", "ordering", "predictions", "operations", "refraction", "seconds",
     }  # fmt: skip
     assert document["status"] == "converged"
     assert document["title"] == "A BLOCK OF TWO STRIPS"
@@ -325,7 +325,7 @@ def test_units_and_conventions_of_the_document(result, document):
     units, conventions = document["units"], document["conventions"]
     assert set(units) == {
         "position", "position_covariance", "attitude", "attitude_covariance", "covariance", "residual_mm",
-        "difference", "operations", "seconds",
+        "difference", "operations", "seconds", "water_level",
     }  # fmt: skip
     assert units["residual_mm"] == "mm"
     assert units["attitude"] == "rad"

@@ -7,6 +7,9 @@ from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
+from photogram.planning import Plan, plan
+from photogram.prediction import predict
+from photogram.refraction import Refraction
 from photogram.result import Result
 from photogram.simulation import Simulation, simulate
 
@@ -18,12 +21,16 @@ __all__ = [
     "Iteration",
     "Message",
     "PhotogramError",
+    "Plan",
     "Progress",
     "RankError",
+    "Refraction",
     "Result",
     "Simulation",
     "Spheroid",
     "__version__",
     "adjust",
+    "plan",
+    "predict",
     "simulate",
 ]

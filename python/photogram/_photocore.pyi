@@ -16,6 +16,10 @@ _Indices = NDArray[np.int64]
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
+RefractionRow = tuple[str | None, str | None, float, float, float]
+"""Model of the air (`giant`, `standard` or None), model of the water (`giant`, `snell` or None), water level
+(linear unit), refractive index of the water, metres in the linear unit."""
+
 __version__: str
 
 def rotation_matrix(angles: _Floats) -> _Floats:
@@ -105,6 +109,7 @@ def project(
     *,
     spheroid: tuple[float, float] | None,
     photo_to_ground: bool,
+    refraction: RefractionRow | None,
 ) -> _Floats:
     """Image coordinates of points, row by row: point i on the photo of row i.
 
@@ -126,6 +131,8 @@ def project(
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
         The sense of the angles.
+    refraction
+        What bends the rays; None for straight ones.
 
     Returns
     -------
@@ -134,8 +141,37 @@ def project(
     Raises
     ------
     ValueError
-        An argument of another shape or length (the message names it and its shape) or axes that make no
-        spheroid.
+        An argument of another shape or length (the message names it and its shape), axes that make no
+        spheroid, or refraction that cannot be.
+    """
+
+def refraction_shift(
+    points: _Floats,
+    positions: _Floats,
+    *,
+    spheroid: tuple[float, float] | None,
+    refraction: RefractionRow,
+) -> _Floats:
+    """From points to where cameras see them, row by row.
+
+    Parameters
+    ----------
+    points, positions
+        (n, 3) points and projection centres: X, Y, Z, or longitude (rad), latitude (rad), height.
+    spheroid
+        Semi-axes (a, b) for geographic space, None for rectangular space.
+    refraction
+        What bends the rays.
+
+    Returns
+    -------
+    (n, 3) vectors in the linear unit along X, Y, Z or the geocentric axes.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape or length (the message names it and its shape), axes that make no
+        spheroid, or refraction that cannot be.
     """
 
 class BlockError(Exception):
@@ -161,6 +197,7 @@ def adjust_block(
     *,
     spheroid: tuple[float, float] | None,
     photo_to_ground: bool,
+    refraction: RefractionRow | None,
     criterion: str,
     limit: float,
     max_iterations: int,
@@ -192,6 +229,8 @@ def adjust_block(
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
         The sense of the angles.
+    refraction
+        What bends the rays, applied in every iteration; None for image coordinates that are free of it.
     criterion, limit
         `fraction`: no unknown changes by more than `limit` of its standard deviation; `percent`: the sum of
         squares changes by less than `limit` percent.
@@ -200,7 +239,7 @@ def adjust_block(
     covariance
         Whether to compute cofactors and redundancy numbers; NaN otherwise.
     ordering
-        `auto`, `input` or `rcm`.
+        `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
     threads
@@ -311,7 +350,11 @@ class BlockSolution:
 
     @property
     def ordering(self) -> str:
-        """`input` or `rcm`."""
+        """The ordering of photos in force."""
+
+    @property
+    def predictions(self) -> dict[str, float]:
+        """The orderings that were tried, with the predicted multiply-adds of one factorisation."""
 
     @property
     def photo_order(self) -> _Indices:

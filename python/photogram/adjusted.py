@@ -119,8 +119,9 @@ class AdjustedBlock:
         NaN without redundancy.
     dropped
         Points left out, with the reason.
-    ordering, photo_order
-        The ordering of photos in force, and (P,) the indices of the photos as they were eliminated.
+    ordering, photo_order, predictions
+        The ordering of photos in force, (P,) the indices of the photos as they were eliminated, and the
+        predicted multiply-adds of one factorisation in each ordering that was tried.
     operations, formations, seconds
         Predicted multiply-adds of each phase, the number of formations of the normal equations, and seconds
         spent in each phase.
@@ -150,6 +151,7 @@ class AdjustedBlock:
     standardized: Floats
     dropped: Mapping[str, str]
     ordering: str
+    predictions: Mapping[str, float]
     photo_order: NDArray[np.int64]
     operations: Mapping[str, float]
     formations: int
@@ -185,6 +187,7 @@ class AdjustedBlock:
             standardized=solution.standardized,
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
             ordering=solution.ordering,
+            predictions=solution.predictions,
             photo_order=solution.photo_order,
             operations=solution.operations,
             formations=solution.formations,

@@ -12,16 +12,14 @@ from photogram import _photocore
 from photogram.adjusted import Iteration
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, RankError
-from photogram.messages import Message
+from photogram.messages import Message, listed
+from photogram.refraction import check_cameras, remarks
 from photogram.result import Result
 
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
 
 UnitVariance = Literal["free", "constrained", "unity"]
-Ordering = Literal["auto", "input", "rcm"]
-
-MOST_NAMES = 12
-"""Names that an error message lists at most."""
+Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ def adjust(
 
     Every unknown is a weighted parameter, from free to fixed. Points that their image points cannot determine
     are left out (the result's `messages` and `dropped` say which); the others start from the intersection of
-    their rays.
+    their rays. Refraction, where the block has it, is applied in every iteration.
 
     Parameters
     ----------
@@ -99,8 +97,9 @@ def adjust(
     fix_photos
         Keep positions and attitudes as they are: every point by itself.
     ordering
-        How photos are ordered for elimination: in input order, by reverse Cuthill-McKee, or the cheaper of
-        them.
+        How photos are ordered for elimination: in input order, in a narrow band (reverse Cuthill-McKee), by
+        approximate minimum degree, by nested dissection across their positions, or across their ties alone.
+        `auto` takes the one with the least predicted work.
     threads
         Number of threads; all processors when None. The result does not depend on it, to the last bit.
     progress
@@ -117,11 +116,12 @@ def adjust(
     AdjustmentError
         There is nothing to adjust, or the initial values give no finite image coordinates.
     InputError
-        An option that cannot be.
+        An option that cannot be, or a photo that is not above the water of the block.
     KeyboardInterrupt
         Ctrl-C.
     """
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads)
+    check_cameras(block)
     if fix_photos:
         block = block.replace(photo_position_sd=np.array(0.0), photo_attitude_sd=np.array(0.0))
 
@@ -140,6 +140,7 @@ def adjust(
             block.image_sd,
             spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
             photo_to_ground=block.photo_to_ground,
+            refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
             criterion="percent" if as_published else "fraction",
             limit=as_published.percent if as_published else tolerance,
             max_iterations=as_published.max_iterations if as_published else max_iterations,
@@ -198,7 +199,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
         messages.insert(
             0, Message("there is no control: the datum of the block rests on the weights of its photos")
         )
-    return messages
+    return messages + remarks(block, solution.photo_positions)
 
 
 def _named(
@@ -209,7 +210,7 @@ def _named(
     if kind == "undetermined points":
         seen = sorted({int(p) for p in block.image_photos[np.isin(block.image_points, points)]})
         photo_names = [block.photo_ids[p] for p in seen]
-        text = f"the rays on photos {_listed(photo_names)} do not determine the points {_listed(point_names)}"
+        text = f"the rays on photos {listed(photo_names)} do not determine the points {listed(point_names)}"
         return RankError(text, photo_names, point_names)
     if kind == "undetermined photos":
         return _undetermined_photos(block, photos)
@@ -230,9 +231,9 @@ def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankErr
         moved = (
             f"all {len(each)} photos together"
             if len(each) == len(block.photo_ids) > 1
-            else f"photos {_listed([block.photo_ids[photo] for photo in each])}"
+            else f"photos {listed([block.photo_ids[photo] for photo in each])}"
         )
-        held = f"hold the points {_listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
+        held = f"hold the points {listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
         lines.append(f"  {count} moving {moved}, which {held}")
     if not np.isfinite(block.point_sd).any():
         weighted = np.isfinite(block.photo_position_sd).any()
@@ -243,8 +244,3 @@ def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankErr
         )
         lines.append(f"  there is no control; {remedy}")
     return RankError("\n".join(lines), names, point_names)
-
-
-def _listed(names: list[str]) -> str:
-    shown = ", ".join(names[:MOST_NAMES])
-    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram.errors import InputError
+from photogram.refraction import Refraction, metres_per_unit
 
 if TYPE_CHECKING:
     from photogram.geometry import Spheroid
@@ -62,12 +63,15 @@ class Block:
     title
         One line for the report.
     linear_unit
-        The linear unit of the object space, for the report.
+        The linear unit of the object space, for the report; "m" or "ft" where there is refraction.
+    refraction
+        What bends the rays, applied in every iteration; None for image coordinates that are free of it.
 
     Raises
     ------
     InputError
-        Arrays of the wrong shape, values that are not finite, indices out of range, names that repeat.
+        Arrays of the wrong shape, values that are not finite, indices out of range, names that repeat;
+        refraction in a linear unit whose length is not known.
     """
 
     photo_ids: list[str]
@@ -87,6 +91,7 @@ class Block:
     photo_to_ground: bool = False
     title: str = ""
     linear_unit: str = "m"
+    refraction: Refraction | None = None
 
     def __post_init__(self) -> None:
         self.photo_ids = _names("photo_ids", self.photo_ids)
@@ -108,6 +113,8 @@ class Block:
         for name, count in (("image_photos", photos), ("image_points", points)):
             setattr(self, name, _index(name, getattr(self, name), images, count))
         self._check_values()
+        if self.refraction is not None:
+            metres_per_unit(self.linear_unit)
 
     def _check_values(self) -> None:
         owners = {"photo": self.photo_ids, "princ": self.photo_ids, "point": self.point_ids}
@@ -153,6 +160,7 @@ class Block:
         photo_to_ground: bool = False,
         title: str = "",
         linear_unit: str = "m",
+        refraction: Refraction | None = None,
     ) -> Block:
         """Build a block from tables: pandas or polars data frames, or any mapping of column names to columns.
 
@@ -172,7 +180,7 @@ class Block:
             Millimetres, signed, for all photos, when the column is not there.
         image_sd
             Millimetres, for image coordinates without a column of their own.
-        spheroid, photo_to_ground, title, linear_unit
+        spheroid, photo_to_ground, title, linear_unit, refraction
             As in the class.
 
         Raises
@@ -214,6 +222,7 @@ class Block:
             photo_to_ground=photo_to_ground,
             title=title,
             linear_unit=linear_unit,
+            refraction=refraction,
         )
 
     def replace(self, **changes: Any) -> Block:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,6 +36,7 @@ def _document(result: AdjustedBlock) -> dict[str, Any]:
             "covariance": "cofactors times covariance_scale",
             "difference": "adjusted minus supplied",
         },
+        "refraction": asdict(result.block.refraction) if result.block.refraction else None,
         "status": result.status,
         "messages": [str(message) for message in result.messages],
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
@@ -63,6 +65,7 @@ def _document(result: AdjustedBlock) -> dict[str, Any]:
         "check_points": _check_points(result),
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
         "ordering": result.ordering,
+        "predictions": dict(result.predictions),
         "operations": dict(result.operations),
         "seconds": dict(result.seconds),
     }
@@ -73,6 +76,7 @@ def _units(result: AdjustedBlock) -> dict[str, str]:
     geographic = result.block.geographic
     return {
         "position": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "water_level": linear,
         "position_covariance": f"longitude rad, latitude rad, height {linear}; products"
         if geographic
         else f"{linear}^2",

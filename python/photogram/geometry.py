@@ -14,15 +14,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.errors import InputError
+from photogram.refraction import Refraction
 
 __all__ = [
     "Spheroid",
-    "east_north_up",
     "geocentric_to_geographic",
     "geographic_to_geocentric",
+    "lengths_of_units",
+    "local_frames",
     "project",
+    "refraction_shift",
     "rotation_angles",
     "rotation_matrix",
+    "viewing_directions",
 ]
 
 Floats = NDArray[np.float64]
@@ -107,18 +111,47 @@ def geocentric_to_geographic(xyz: ArrayLike, spheroid: Spheroid) -> Floats:
     return _photocore.geocentric_to_geographic(_floats(xyz), spheroid.a, spheroid.b)
 
 
-def east_north_up(positions: ArrayLike) -> Floats:
-    """Rows east, north and up of the local vertical frames, (n, 3, 3), in geocentric axes.
+def lengths_of_units(positions: ArrayLike, spheroid: Spheroid | None) -> Floats:
+    """Lengths of the units of the coordinates at (n, 3) positions, (n, 3), in the linear unit.
 
-    Parameters
-    ----------
-    positions
-        (n, 2 or 3) longitude and latitude in radians; a height does not matter.
+    Ones in rectangular space. In geographic space a radian of longitude is as long as the radius of the
+    parallel, one of latitude as that of the meridian's curvature, both at the height of the position.
     """
+    values = _floats(positions)
+    if spheroid is None:
+        return np.ones_like(values)
+    latitude, height = values[:, 1], values[:, 2]
+    w = np.sqrt(1 - (1 - (spheroid.b / spheroid.a) ** 2) * np.sin(latitude) ** 2)
+    parallel = (spheroid.a / w + height) * np.cos(latitude)
+    meridian = spheroid.b**2 / spheroid.a / w**3 + height
+    return np.stack([parallel, meridian, np.ones_like(height)], axis=1)
+
+
+def local_frames(positions: ArrayLike) -> Floats:
+    """Rows east, north, up, (n, 3, 3), of the local frames at (n, 3) longitude, latitude (rad), height."""
     longitude, latitude = _floats(positions)[:, :2].T
-    (sl, cl), (sp, cp) = ((np.sin(angle), np.cos(angle)) for angle in (longitude, latitude))
+    sl, cl, sp, cp = np.sin(longitude), np.cos(longitude), np.sin(latitude), np.cos(latitude)
     rows = [[-sl, cl, np.zeros_like(sl)], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
+
+
+def viewing_directions(
+    positions: ArrayLike,
+    attitudes: ArrayLike,
+    *,
+    spheroid: Spheroid | None = None,
+    photo_to_ground: bool = False,
+) -> Floats:
+    """Directions in which photos look, the negative z axes of their frames, (n, 3) unit vectors.
+
+    Arguments are those of :func:`project`; with a spheroid the directions are geocentric.
+    """
+    rotations = rotation_matrix(attitudes)
+    directions = -(rotations[:, :, 2] if photo_to_ground else rotations[:, 2, :])
+    if spheroid is None:
+        return directions
+    turned: Floats = np.einsum("nij,ni->nj", local_frames(positions), directions)
+    return turned
 
 
 def project(
@@ -129,6 +162,8 @@ def project(
     *,
     spheroid: Spheroid | None = None,
     photo_to_ground: bool = False,
+    refraction: Refraction | None = None,
+    linear_unit: str = "m",
 ) -> Floats:
     """Project points into photos, row by row: point i into the photo of row i.
 
@@ -146,6 +181,10 @@ def project(
         None for rectangular space.
     photo_to_ground
         The sense of the angles; False is ground-to-photo.
+    refraction
+        What bends the rays; None: they are straight.
+    linear_unit
+        Of the object space, "m" or "ft": refraction needs its length.
 
     Returns
     -------
@@ -154,7 +193,7 @@ def project(
     Raises
     ------
     ValueError
-        Other shapes, or different numbers of rows.
+        Other shapes, or different numbers of rows; refraction in another linear unit (an InputError).
     """
     return _photocore.project(
         _floats(points),
@@ -163,6 +202,47 @@ def project(
         _floats(principal_distances),
         spheroid=None if spheroid is None else (spheroid.a, spheroid.b),
         photo_to_ground=photo_to_ground,
+        refraction=None if refraction is None else refraction.row(linear_unit),
+    )
+
+
+def refraction_shift(
+    points: ArrayLike,
+    positions: ArrayLike,
+    refraction: Refraction,
+    *,
+    spheroid: Spheroid | None = None,
+    linear_unit: str = "m",
+) -> Floats:
+    """From points to where cameras see them, row by row: point i from the position of row i.
+
+    Parameters
+    ----------
+    points, positions
+        (n, 3) object points and projection centres, as for :func:`project`.
+    refraction
+        What bends the rays.
+    spheroid
+        None for rectangular space.
+    linear_unit
+        Of the object space, "m" or "ft".
+
+    Returns
+    -------
+    (n, 3) vectors in the linear unit, along X, Y, Z or the geocentric axes: the lift dZ of the GIANT guide
+    (Appendices F and G), along the up at the camera, and the lift of the ray by Snell's law, along the up at
+    the point. Zero for points that the models leave alone.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, or different numbers of rows; another linear unit (an InputError).
+    """
+    return _photocore.refraction_shift(
+        _floats(points),
+        _floats(positions),
+        spheroid=None if spheroid is None else (spheroid.a, spheroid.b),
+        refraction=refraction.row(linear_unit),
     )
 
 

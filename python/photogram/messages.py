@@ -7,6 +7,9 @@ from pathlib import Path
 
 __all__ = ["Message"]
 
+MOST_NAMES = 12
+"""Names that a message lists at most."""
+
 
 def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
     """Put the place (file, record number, record text) before and after a message."""
@@ -15,6 +18,12 @@ def locate(message: str, file: Path | None, record: int | None, text: str | None
     )
     head = f"{place}: {message}" if place else message
     return head if text is None else f"{head}\n    |{text}|"
+
+
+def listed(names: list[str]) -> str:
+    """Name all of a few, and some of many."""
+    shown = ", ".join(names[:MOST_NAMES])
+    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
 
 
 @dataclass(frozen=True)

@@ -10,18 +10,24 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.angles import degrees_minutes_seconds
+from photogram.reliability import TESTABLE
 from photogram.structuring import structure
 
 if TYPE_CHECKING:
     from photogram.adjusted import AdjustedBlock, Floats
 
-__all__ = ["bandwidths", "report", "summary"]
+__all__ = ["bandwidths", "composed", "report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
-# With less redundancy a blunder hides in the unknowns; the test value repeats that of another coordinate.
-_TESTABLE = 0.01
 _ARCSEC = 180 * 3600 / math.pi
+_ORDERINGS = {
+    "input": "in input order",
+    "rcm": "by reverse Cuthill-McKee",
+    "amd": "by minimum degree",
+    "dissection": "by nested dissection",
+    "graph-dissection": "by dissection of the graph",
+}
 
 
 def report(result: AdjustedBlock) -> str:
@@ -36,6 +42,11 @@ def report(result: AdjustedBlock) -> str:
         ("Work", _work(result)),
     ]
     head = f"photogram {_photocore.__version__}  block adjustment  {result.block.title}".rstrip()
+    return composed(head, sections)
+
+
+def composed(head: str, sections: Iterable[tuple[str, list[str]]]) -> str:
+    """Return a report: its first line, then titled sections; those without lines are left out."""
     parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
     return "\n\n".join([head, *parts]) + "\n"
 
@@ -88,6 +99,7 @@ def _adjustment(result: AdjustedBlock) -> list[str]:
         ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
         ("object space", "geographic" if block.geographic else "rectangular"),
         ("rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
+        ("refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
     ]
     return [f"{name:<36}{value}" for name, value in rows]
 
@@ -131,7 +143,7 @@ def _iterations(result: AdjustedBlock) -> list[str]:
 
 
 def _suspects(result: AdjustedBlock) -> list[str]:
-    testable = result.redundancy > _TESTABLE
+    testable = result.redundancy > TESTABLE
     size = np.where(testable, np.nan_to_num(np.abs(result.standardized)), 0.0)
     images, axes = np.nonzero(size > _BLUNDER)
     if not images.size:
@@ -215,8 +227,13 @@ def _points(result: AdjustedBlock) -> list[str]:
 
 
 def _work(result: AdjustedBlock) -> list[str]:
-    order = {"input": "in input order", "rcm": "by reverse Cuthill-McKee"}[result.ordering]
+    order = _ORDERINGS[result.ordering]
     lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
+    lines += [
+        f"{f'multiply-adds if {_ORDERINGS[name]}':<36}{count:.3e}"
+        for name, count in result.predictions.items()
+        if name != result.ordering
+    ]
     lines += bandwidths(result)
     lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
     lines += [f"{f'seconds in {name}':<36}{seconds:.3f} s" for name, seconds in result.seconds.items()]

@@ -19,6 +19,7 @@ from photogram import geometry
 from photogram.block import Block
 from photogram.errors import InputError
 from photogram.geometry import Spheroid
+from photogram.refraction import Refraction
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
@@ -116,6 +117,7 @@ def simulate(
     spheroid: Spheroid | None = None,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     photo_to_ground: bool = False,
+    refraction: Refraction | None = None,
     seed: int | np.random.Generator = 0,
 ) -> Simulation:
     """Simulate a block of vertical photographs.
@@ -165,6 +167,8 @@ def simulate(
         height (m).
     photo_to_ground
         The sense of the attitude angles.
+    refraction
+        What bends the rays, in the images and in the block; None: they are straight.
     seed
         Equal seeds and equal arguments give equal blocks.
 
@@ -225,6 +229,7 @@ def simulate(
         frame_size,
         spheroid,
         photo_to_ground,
+        refraction,
     )
     used, image_points = np.unique(image_points, return_inverse=True)
     ground, terrain = ground[used], terrain[used]
@@ -234,11 +239,11 @@ def simulate(
     checks = control_random.choice(free, min(check_points, len(free)), replace=False)
     known = held.copy()
     known[checks] = True
-    metres = _metres_per_unit(ground, spheroid)
+    metres = geometry.lengths_of_units(ground, spheroid)
     point_sd = np.where(held, control_sd / metres, np.inf)
     control_noise = control_sd / metres * control_random.standard_normal(ground.shape)
 
-    metres = _metres_per_unit(positions, spheroid)
+    metres = geometry.lengths_of_units(positions, spheroid)
     truth = Block(
         photo_ids=_photo_ids(plan),
         photo_positions=positions,
@@ -255,6 +260,7 @@ def simulate(
         point_sd=point_sd,
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
+        refraction=refraction,
         title=f"simulated block, {strips} strips of {photos_per_strip} photographs",
     )
     faults = _blunders(len(xy), blunders, blunder_size, blunder_random)
@@ -342,6 +348,7 @@ def _photograph(
     frame_size: float,
     spheroid: Spheroid | None,
     photo_to_ground: bool,
+    refraction: Refraction | None,
 ) -> tuple[Indices, Indices, Floats]:
     """Photos, points and coordinates of the images in the frame whose points are seen at least twice."""
     photos, points = candidates
@@ -352,6 +359,7 @@ def _photograph(
         np.full(len(photos), principal_distance),
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
+        refraction=refraction,
     )
     seen = np.flatnonzero((np.abs(xy) <= frame_size / 2).all(axis=1))
     rays = np.bincount(points[seen])
@@ -399,7 +407,7 @@ def _into_object_space(
     positions = plan_positions + np.asarray(origin)
     if spheroid is not None:
         tangent_point = np.array([[origin[0], origin[1], 0.0]])
-        (frame,) = geometry.east_north_up(tangent_point)
+        frame = geometry.local_frames(tangent_point)[0]
         plane = plan_positions * [1.0, 1.0, 0.0]
         xyz = geometry.geographic_to_geocentric(tangent_point, spheroid) + plane @ frame
         positions = geometry.geocentric_to_geographic(xyz, spheroid)
@@ -409,23 +417,11 @@ def _into_object_space(
     if spheroid is not None:
         # East at the station, seen from the plan: turned about the vertical by the convergence of the
         # meridians.
-        east = np.stack([-np.sin(positions[:, 0]), np.cos(positions[:, 0]), np.zeros(len(positions))], axis=1)
-        in_plan = east @ frame.T
+        in_plan = geometry.local_frames(positions)[:, 0] @ frame.T
         convergence = np.zeros_like(positions)
         convergence[:, 2] = -np.arctan2(in_plan[:, 1], in_plan[:, 0])
         rotations = rotations @ geometry.rotation_matrix(convergence)
     return positions, geometry.rotation_angles(rotations.transpose(0, 2, 1) if photo_to_ground else rotations)
-
-
-def _metres_per_unit(positions: Floats, spheroid: Spheroid | None) -> Floats:
-    """Lengths of the units of the coordinates: ones, or radii of curvature for longitude and latitude."""
-    if spheroid is None:
-        return np.ones_like(positions)
-    latitude, height = positions[:, 1], positions[:, 2]
-    w = np.sqrt(1 - (1 - (spheroid.b / spheroid.a) ** 2) * np.sin(latitude) ** 2)
-    parallel = (spheroid.a / w + height) * np.cos(latitude)
-    meridian = spheroid.b**2 / spheroid.a / w**3 + height
-    return np.stack([parallel, meridian, np.ones_like(height)], axis=1)
 
 
 def _control(plan: _Plan, terrain: Floats, pattern: str, spacing: int) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import AsPublished, Block, Result, adjust, simulate
+from photogram import AsPublished, Block, Refraction, Result, adjust, simulate
 from photogram.cli import app
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame, Project, listing, read_project
 from photogram.giant.listing.control import control_pages
@@ -129,8 +129,8 @@ def test_section_10_angles_are_rounded_as_a_whole_and_have_their_ranges():
 # Page 0
 
 
-def line_of(space=GEOGRAPHIC, **switches):
-    return options_page(Common(geographic=space.geographic, **switches), space)
+def line_of(space=GEOGRAPHIC, refraction=None, **switches):
+    return options_page(Common(geographic=space.geographic, **switches), space, refraction)
 
 
 @pytest.mark.giant("10", "page 0: options")
@@ -155,9 +155,9 @@ def line_of(space=GEOGRAPHIC, **switches):
         ),
         ({"error_propagation": True, "unit_variance": "unity"}, "UNIT VARIANCE WILL BE SET TO UNITY"),
         ({}, "ATMOSPHERIC REFRACTION WILL NOT BE INCLUDED IN THE ADJUSTMENT"),
-        ({"air_refraction": True}, "ATMOSPHERIC REFRACTION WILL BE INCLUDED IN THE ADJUSTMENT"),
+        ({"refraction": Refraction("standard")}, "ATMOSPHERIC REFRACTION WILL BE INCLUDED IN THE ADJUSTMENT"),
         ({}, "WATER REFRACTION WILL NOT BE INCLUDED IN THE ADJUSTMENT"),
-        ({"water_refraction": True}, "WATER REFRACTION WILL BE INCLUDED IN THE ADJUSTMENT"),
+        ({"refraction": Refraction(None, "giant")}, "WATER REFRACTION WILL BE INCLUDED IN THE ADJUSTMENT"),
         ({}, "ALL IMAGE RESIDUALS WILL BE LISTED"),
         ({"residual_limit": 0.010}, "IMAGE RESIDUALS GREATER THAN 0.010 (MM) WILL BE LISTED"),
         ({"residual_limit": -1.0}, "NO IMAGE RESIDUALS WILL BE LISTED"),

@@ -82,12 +82,12 @@ CASE_2 = Common(geographic=True, strip="0", error_propagation=True)
 
 @pytest.mark.giant("10", "page 0: options")
 def test_section_10_options_of_the_first_case():
-    assert [line for line in options_page(CASE_1, GEOGRAPHIC) if line] == SUMMARY["case1_options"]
+    assert [line for line in options_page(CASE_1, GEOGRAPHIC, None) if line] == SUMMARY["case1_options"]
 
 
 @pytest.mark.giant("10", "page 0: options")
 def test_section_10_options_of_the_second_case():
-    lines = [line for line in options_page(CASE_2, GEOGRAPHIC) if line]
+    lines = [line for line in options_page(CASE_2, GEOGRAPHIC, None) if line]
     expected = list(SUMMARY["case1_options"])
     propagation, unit_variance, residuals = SUMMARY["case2_options_changed"]
     expected[7 - 1] = residuals

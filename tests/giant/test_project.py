@@ -26,6 +26,7 @@ from photogram.errors import InputError
 from photogram.files import write_whole
 from photogram.giant import Project, read_project, write_project
 from photogram.giant.export import adjusted_frames, adjusted_ground
+from photogram.refraction import Refraction
 
 STRASBOURG = Path(__file__).parents[3] / "shared" / "data" / "strasbourg" / "giant"
 
@@ -224,13 +225,10 @@ def test_no_control_at_all_is_remarked_on(tmp_path, ground):
     assert texts(project) == ["GROUND holds no component of a photographed point"]
 
 
-def test_refraction_that_is_not_applied_is_remarked_on(tmp_path):
+def test_refraction_is_that_of_the_guide(tmp_path):
     project = project_of(tmp_path, COMMON=replaced(COMMON, 2, "01000000001009 11 1"))
-    project.to_block()
-    assert texts(project) == [
-        "COMMON asks for air refraction, which is not applied yet",
-        "COMMON asks for water refraction, which is not applied yet",
-    ]
+    assert project.to_block().refraction == Refraction("giant", "giant", 0.0)
+    assert texts(project) == []
 
 
 def test_no_frames(tmp_path):

@@ -40,7 +40,7 @@ fn strips(strips: usize, photos_per_strip: usize) -> Block {
             (position, [0.01 * wave(1), 0.01 * wave(2), 0.03 * wave(3)])
         })
         .collect();
-    let mut block = Block { space, sense, photos: vec![], points: vec![], images: vec![] };
+    let mut block = Block { space, sense, refraction: None, photos: vec![], points: vec![], images: vec![] };
     for (photo, (position, attitude)) in true_photos.iter().enumerate() {
         let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();
         block.photos.push(Photo {

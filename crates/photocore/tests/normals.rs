@@ -104,6 +104,15 @@ fn done<T>(flow: ControlFlow<(), T>) -> T {
     }
 }
 
+const ALL: [Ordering; 6] = [
+    Ordering::Auto,
+    Ordering::Input,
+    Ordering::ReverseCuthillMckee,
+    Ordering::MinimumDegree,
+    Ordering::DissectionByPlace,
+    Ordering::DissectionByGraph,
+];
+
 /// Random systems: local blocks of 1 to 3 unknowns, kept blocks of 1 to 7, with and without border, several groups of
 /// a local block on the same kept block.
 fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
@@ -111,9 +120,9 @@ fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
     shape
         .prop_flat_map(|(l, rows, kept, border)| {
             let groups = prop::collection::vec(prop::collection::vec(0..kept.len() as u32, 0..5), 1..25);
-            (Just((l, rows, kept, border)), groups, any::<u64>(), any::<bool>())
+            (Just((l, rows, kept, border)), groups, any::<u64>(), prop::sample::select(ALL.to_vec()))
         })
-        .prop_map(|((l, rows, kept, border), locals, seed, input)| {
+        .prop_map(|((l, rows, kept, border), locals, seed, ordering)| {
             let mut ptr = vec![0];
             for groups in &locals {
                 ptr.push(ptr[ptr.len() - 1] + groups.len());
@@ -123,7 +132,7 @@ fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
                 (0..group_kept.len() as u32).map(|g| g % (border as u32 + 1)..border as u32).collect();
             let layout =
                 Layout::new(rows, l, &kept, ptr, group_kept).unwrap().with_border(border, ranges).unwrap();
-            (Dense::new(layout, seed), if input { Ordering::Input } else { Ordering::ReverseCuthillMckee })
+            (Dense::new(layout, seed), ordering)
         })
 }
 
@@ -143,7 +152,9 @@ fn block(strips: usize, length: usize, border: usize) -> Dense {
     let ranges = vec![0..border as u32; kept.len()];
     let layout =
         Layout::new(2, 3, &vec![6; strips * length], ptr, kept).unwrap().with_border(border, ranges).unwrap();
-    Dense::new(layout, 7)
+    let places =
+        (0..strips * length).map(|k| [(k % length) as f64, (k / length) as f64 * 1.7, 0.0]).collect();
+    Dense::new(layout.with_places(places).unwrap(), 7)
 }
 
 fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
@@ -221,7 +232,7 @@ proptest! {
 
 #[test]
 fn strip_and_block_agree_with_dense_algebra() {
-    for ordering in [Ordering::Input, Ordering::ReverseCuthillMckee, Ordering::Auto] {
+    for ordering in ALL {
         compare_with_dense(&block(1, 60, 0), ordering);
         compare_with_dense(&block(7, 12, 0), ordering);
         compare_with_dense(&block(7, 12, 9), ordering);
@@ -282,5 +293,6 @@ fn layouts_that_contradict_themselves_are_refused() {
     assert!(Layout::new(2, 3, &[6], vec![0, 1], vec![1]).is_err());
     let layout = Layout::new(2, 3, &[6], vec![0, 1], vec![0]).unwrap();
     assert!(layout.clone().with_border(3, std::iter::once(1..4).collect()).is_err());
-    assert!(layout.with_border(3, vec![]).is_err());
+    assert!(layout.clone().with_border(3, vec![]).is_err());
+    assert!(layout.with_places(vec![]).is_err());
 }

@@ -12,7 +12,7 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{check_lengths, indices, numbers, rows};
-use crate::geometry::{object_space, rotation_sense};
+use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
 use crate::solution::{BlockSolution, iteration_row};
 
 create_exception!(
@@ -32,7 +32,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyfunction]
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd, principal_distances, point_positions, point_sd,
-    image_photos, image_points, image_xy, image_sd, *, spheroid, photo_to_ground, criterion, limit, max_iterations,
+    image_photos, image_points, image_xy, image_sd, *, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
     covariance, ordering, unit_variance, threads, progress
 ))]
 fn adjust_block(
@@ -50,6 +50,7 @@ fn adjust_block(
     image_sd: PyReadonlyArrayDyn<'_, f64>,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
+    refraction: Option<RefractionRow>,
     criterion: &str,
     limit: f64,
     max_iterations: usize,
@@ -95,6 +96,7 @@ fn adjust_block(
     let block = Block {
         space: object_space(spheroid)?,
         sense: rotation_sense(photo_to_ground),
+        refraction: refraction.map(refraction_of).transpose()?,
         photos: (0..positions.len()).map(photo).collect(),
         points: (0..sd.len()).map(|i| Point { coordinates: coordinates[i], sd: sd[i] }).collect(),
         images: (0..xy.len()).map(image).collect(),
@@ -106,12 +108,7 @@ fn adjust_block(
     };
     let options = Options {
         adjustment: AdjustmentOptions { criterion, max_iterations, covariance },
-        ordering: match ordering {
-            "auto" => Ordering::Auto,
-            "input" => Ordering::Input,
-            "rcm" => Ordering::ReverseCuthillMckee,
-            other => return Err(unknown("ordering", other)),
-        },
+        ordering: Ordering::named(ordering).ok_or_else(|| unknown("ordering", ordering))?,
         unit_variance: match unit_variance {
             "free" => UnitVariance::Free,
             "constrained" => UnitVariance::Constrained,

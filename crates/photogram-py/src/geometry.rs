@@ -3,7 +3,8 @@
 use crate::arrays::{check_lengths, matrices, numbers, rows, table};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::geometry::{
-    self, Ellipsoid, GeometryError, ObjectSpace, Photo, Point, RotationSense, Vector3,
+    self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Photo, Point, Refraction, RotationSense,
+    Vector3, Water, WaterModel,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -14,6 +15,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(rotation_angles, module)?)?;
     module.add_function(wrap_pyfunction!(geographic_to_geocentric, module)?)?;
     module.add_function(wrap_pyfunction!(geocentric_to_geographic, module)?)?;
+    module.add_function(wrap_pyfunction!(refraction_shift, module)?)?;
     module.add_function(wrap_pyfunction!(project, module)?)
 }
 
@@ -60,7 +62,9 @@ fn geocentric_to_geographic<'py>(
 }
 
 #[pyfunction]
-#[pyo3(signature = (points, positions, attitudes, principal_distances, *, spheroid, photo_to_ground))]
+#[pyo3(signature = (
+    points, positions, attitudes, principal_distances, *, spheroid, photo_to_ground, refraction
+))]
 fn project<'py>(
     py: Python<'py>,
     points: PyReadonlyArrayDyn<'py, f64>,
@@ -69,6 +73,7 @@ fn project<'py>(
     principal_distances: PyReadonlyArrayDyn<'py, f64>,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
+    refraction: Option<RefractionRow>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let points: Vec<Vector3> = rows("points", &points)?;
     let positions: Vec<Vector3> = rows("positions", &positions)?;
@@ -84,15 +89,85 @@ fn project<'py>(
     )?;
     let space = object_space(spheroid)?;
     let sense = rotation_sense(photo_to_ground);
+    let refraction = refraction.map(self::refraction).transpose()?;
     let image = |i: usize| {
         let photo = Photo::new(space, sense, positions[i], attitudes[i], principal_distances[i]);
-        photo.project(&Point::new(space, points[i]))
+        let point = Point::new(space, points[i]);
+        match &refraction {
+            None => photo.project(&point),
+            Some(refraction) => {
+                let lift = lift(refraction, space, (&photo, positions[i]), (&point, points[i]));
+                photo.project(&point.lifted(&lift))
+            }
+        }
     };
     table(py, py.detach(|| (0..points.len()).map(image).collect()))
 }
 
+#[pyfunction]
+#[pyo3(signature = (points, positions, *, spheroid, refraction))]
+fn refraction_shift<'py>(
+    py: Python<'py>,
+    points: PyReadonlyArrayDyn<'py, f64>,
+    positions: PyReadonlyArrayDyn<'py, f64>,
+    spheroid: Option<(f64, f64)>,
+    refraction: RefractionRow,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let points: Vec<Vector3> = rows("points", &points)?;
+    let positions: Vec<Vector3> = rows("positions", &positions)?;
+    check_lengths(("points", points.len()), &[("positions", positions.len())])?;
+    let space = object_space(spheroid)?;
+    let refraction = self::refraction(refraction)?;
+    let shift = |i: usize| {
+        // Where the camera looks does not matter.
+        let photo = Photo::new(space, RotationSense::GroundToPhoto, positions[i], [0.0; 3], -1.0);
+        let point = Point::new(space, points[i]);
+        lift(&refraction, space, (&photo, positions[i]), (&point, points[i])).vector
+    };
+    table(py, py.detach(|| (0..points.len()).map(shift).collect()))
+}
+
+/// The lift of one point for one photo, each with its coordinates.
+fn lift(
+    refraction: &Refraction,
+    space: ObjectSpace,
+    (photo, position): (&Photo, Vector3),
+    (point, coordinates): (&Point, Vector3),
+) -> Lift {
+    let at = |coordinates| refraction.vertical(space, coordinates);
+    refraction.lift(photo, &at(position), point, &at(coordinates))
+}
+
+/// Model of the air, model of the water, its level (linear unit), its refractive index, metres in the linear unit.
+pub type RefractionRow = (Option<String>, Option<String>, f64, f64, f64);
+
+/// The refraction of a row.
+pub fn refraction((air, water, level, index, metres_per_unit): RefractionRow) -> PyResult<Refraction> {
+    let refused = |medium: &str, model: &str| {
+        Err(PyValueError::new_err(format!("the refraction in {medium} cannot be {model:?}")))
+    };
+    let air = match air.as_deref() {
+        None => None,
+        Some("giant") => Some(AirModel::Giant),
+        Some("standard") => Some(AirModel::Standard),
+        Some(other) => return refused("air", other),
+    };
+    let water = match water.as_deref() {
+        None => None,
+        Some("giant") => Some(WaterModel::Giant),
+        Some("snell") => Some(WaterModel::Snell),
+        Some(other) => return refused("water", other),
+    };
+    let water = water.map(|model| Water::new(model, level, index).map_err(geometry_error)).transpose()?;
+    Ok(Refraction { air, water, metres_per_unit, datum: 0.0 })
+}
+
+fn geometry_error(error: GeometryError) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
 fn ellipsoid((a, b): (f64, f64)) -> PyResult<Ellipsoid> {
-    Ellipsoid::new(a, b).map_err(|error: GeometryError| PyValueError::new_err(error.to_string()))
+    Ellipsoid::new(a, b).map_err(geometry_error)
 }
 
 /// The object space: geographic when a spheroid is given by its semi-axes.

@@ -162,6 +162,15 @@ impl BlockSolution {
     }
 
     #[getter]
+    fn predictions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (ordering, operations) in &self.solution.adjustment.predictions {
+            dict.set_item(ordering.name(), operations)?;
+        }
+        Ok(dict)
+    }
+
+    #[getter]
     fn photo_order<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         let order = &self.solution.adjustment.order;
         // A border of common unknowns is no photo.

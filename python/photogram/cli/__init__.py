@@ -1,4 +1,4 @@
-"""The command line: `photogram giant`, `photogram simulate`.
+"""The command line: `photogram giant`, `photogram simulate`, `photogram plan`.
 
 Results go to files and standard output, errors and progress to standard error. Heavy modules are imported by
 the commands that need them, so that `photogram --help` is quick.
@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from photogram.cli import check, giant, simulate
+from photogram.cli import check, giant, plan, simulate
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
 
@@ -31,6 +31,7 @@ giant_app.command("adjust")(giant.giant)
 giant_app.command("check")(check.check)
 app.add_typer(giant_app)
 app.command()(simulate.simulate)
+app.command()(plan.plan)
 
 
 def main() -> None:

@@ -15,12 +15,14 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
     from rich.status import Status
 
     from photogram import Block, Progress, Result
     from photogram.giant import Project
+    from photogram.giant.common import Common
 
 __all__ = ["giant"]
 
@@ -38,6 +40,9 @@ class Ordering(StrEnum):
     AUTO = "auto"
     INPUT = "input"
     RCM = "rcm"
+    AMD = "amd"
+    DISSECTION = "dissection"
+    GRAPH_DISSECTION = "graph-dissection"
 
 
 def giant(
@@ -85,6 +90,26 @@ def giant(
     ordering: Annotated[
         Ordering, typer.Option(help="Order of the photographs in the normal equations.")
     ] = Ordering.AUTO,
+    air_refraction: Annotated[
+        AirModel | None,
+        typer.Option(
+            help="Refraction in air by the guide (to 9,000 m) or by a standard atmosphere; giving it"
+            " applies it even where COMMON does not ask for it. Default when it does: giant.",
+            show_default=False,
+        ),
+    ] = None,
+    water_refraction: Annotated[
+        WaterModel | None,
+        typer.Option(
+            help="Refraction in water by the guide or by Snell's law, below the level in COMMON; giving it"
+            " applies it even where COMMON does not ask for it. Default when it does: giant.",
+            show_default=False,
+        ),
+    ] = None,
+    water_index: Annotated[
+        float | None,
+        typer.Option(min=1, help="Refractive index of the water. Default: 1.340.", show_default=False),
+    ] = None,
     threads: Annotated[
         int | None,
         typer.Option(
@@ -124,7 +149,9 @@ def giant(
         _check_listing(listing, directory, out)
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
-        block = project.to_block(allowed)
+        block = _refracted(
+            project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
+        )
         try:
             result = _adjust(project, block, as_published, ordering, threads, quiet)
         except AdjustmentError:
@@ -181,6 +208,20 @@ def _check_listing(listing: Path | None, directory: Path, out: Path) -> None:
         raise InputError("the listing would be written over the input", file=listing)
     if listing.resolve() in {(out / name).resolve() for name in RESULTS}:
         raise InputError("another result has this name", file=listing)
+
+
+def _refracted(
+    block: Block, common: Common, air: AirModel | None, water: WaterModel | None, index: float | None
+) -> Block:
+    """Give the block of a project the refraction of COMMON and the options."""
+    from photogram.giant.assembly import job_refraction
+
+    refraction = job_refraction(
+        common, air=air.value if air else None, water=water.value if water else None, index=index
+    )
+    if index is not None and (refraction is None or refraction.water is None):
+        raise typer.BadParameter("there is no refraction in water", param_hint="--water-index")
+    return block.replace(refraction=refraction)
 
 
 def _adjust(

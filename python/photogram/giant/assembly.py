@@ -17,13 +17,14 @@ from photogram.giant.limits import Limits, allowed_images, check_bandwidth, chec
 from photogram.giant.records import error_at, message_at
 from photogram.giant.remarks import remarks
 from photogram.messages import Message
+from photogram.refraction import Air, Refraction, Water, metres_per_unit
 from photogram.structuring import structure
 
 if TYPE_CHECKING:
     from photogram.giant.common import Common
     from photogram.giant.contents import Contents
 
-__all__ = ["assemble"]
+__all__ = ["assemble", "job_refraction"]
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
         A frame without images, a camera that is not defined, no frame at all, or a limit that is exceeded.
     """
     limits = limits or Limits()
-    common, messages = project.common, _unsupported(project.common)
+    common, messages = project.common, list[Message]()
     check_files(project, limits)
     photos = _photos(project, messages)
     if not photos:
@@ -78,18 +79,34 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
         photo_to_ground=common.photo_to_ground,
         title=common.title,
         linear_unit=_linear_unit(common),
+        refraction=job_refraction(common),
     )
     messages += remarks(block, frames)
     return block, messages
 
 
-def _unsupported(common: Common) -> list[Message]:
-    asked = {"air": common.air_refraction, "water": common.water_refraction}
-    return [
-        Message(f"COMMON asks for {name} refraction, which is not applied yet")
-        for name, on in asked.items()
-        if on
-    ]
+def job_refraction(
+    common: Common, *, air: Air | None = None, water: Water | None = None, index: float | None = None
+) -> Refraction | None:
+    """Return the refraction of a job: the guide's models where COMMON has the switch, or those named here.
+
+    Parameters
+    ----------
+    common
+        Switches and water level (metres).
+    air, water
+        Models applied whether or not COMMON asks for them; None: as COMMON says.
+    index
+        Refractive index of the water; None for the default of :class:`photogram.Refraction`.
+    """
+    air = air or ("giant" if common.air_refraction else None)
+    water = water or ("giant" if common.water_refraction else None)
+    if air is None and water is None:
+        return None
+    if water is None:
+        return Refraction(air)
+    level = common.water_level / metres_per_unit(_linear_unit(common))
+    return Refraction(air, water, level) if index is None else Refraction(air, water, level, index)
 
 
 def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:

@@ -19,6 +19,7 @@ from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
 from photogram.giant.images import ImageFrame
 from photogram.messages import Message
+from photogram.refraction import Refraction, metres_per_unit
 
 if TYPE_CHECKING:
     from photogram.giant.contents import Contents
@@ -40,7 +41,7 @@ def block_files(
         photo_to_ground=block.photo_to_ground,
         strip="",
     )
-    messages = []
+    messages = _write_refraction(common, block)
     if block.spheroid is not None:
         common.semi_major, common.semi_minor = round(block.spheroid.a, 2), round(block.spheroid.b, 2)
         if (common.semi_major, common.semi_minor) != (block.spheroid.a, block.spheroid.b):
@@ -51,6 +52,34 @@ def block_files(
     frames = _frames(block)
     images = _images(block, [names[distance] for distance in block.principal_distances.tolist()])
     return common, cameras, frames, images, _ground(block), messages
+
+
+def _write_refraction(common: Common, block: Block) -> list[Message]:
+    """Put the refraction of a block into COMMON; say what cannot be written."""
+    refraction = block.refraction or Refraction()
+    common.air_refraction, common.water_refraction = refraction.air is not None, refraction.water is not None
+    if refraction.water:
+        common.water_level = metres_per_unit(block.linear_unit) * refraction.water_level
+    said = Refraction(
+        "giant" if refraction.air else None, "giant" if refraction.water else None, refraction.water_level
+    )
+    messages = []
+    unit = block.linear_unit
+    if refraction.describe(unit) != said.describe(unit):
+        messages.append(
+            Message(
+                f"COMMON can only switch refraction on: {refraction.describe(unit)} is read as"
+                f" {said.describe(unit)}"
+            )
+        )
+    if block.refraction and not block.geographic and block.linear_unit != "m":
+        messages.append(
+            Message(
+                "rectangular space is read in metres: refraction will not be that of this block in"
+                f" {block.linear_unit}"
+            )
+        )
+    return messages
 
 
 def _frames(block: Block) -> list[Frame]:

@@ -135,6 +135,8 @@ pub struct Adjustment {
     pub seconds: Seconds,
     /// The ordering in force.
     pub ordering: Ordering,
+    /// The orderings that were tried, each with the predicted multiply-adds of a factorisation.
+    pub predictions: Vec<(Ordering, f64)>,
     /// Kept blocks (the border is the block after the last) in the order of their elimination.
     pub order: Vec<usize>,
 }
@@ -432,6 +434,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             formations: self.formations,
             seconds: self.seconds,
             ordering: problem.system.symbolic().ordering(),
+            predictions: problem.system.symbolic().predictions().to_vec(),
             order: problem.system.symbolic().order().to_vec(),
         })
     }

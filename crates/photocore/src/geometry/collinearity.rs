@@ -66,6 +66,30 @@ impl Point {
     pub fn partials(&self) -> &Matrix3 {
         &self.partials
     }
+
+    /// The point where the lift puts it.
+    pub fn lifted(&self, lift: &Lift) -> Self {
+        let position = std::array::from_fn(|i| self.position[i] + lift.vector[i]);
+        let row = |i: usize| std::array::from_fn(|k| self.partials[i][k] + lift.by_point[i][k]);
+        Self { position, partials: std::array::from_fn(row) }
+    }
+}
+
+/// By how much one photo sees a point away from its place (see [`super::refraction`]): a cartesian vector, and its partials
+/// as columns.
+#[derive(Debug, Clone, Copy)]
+pub struct Lift {
+    /// From the point to where it is seen.
+    pub vector: Vector3,
+    /// With respect to the position of the photo.
+    pub by_photo: Matrix3,
+    /// With respect to the coordinates of the point.
+    pub by_point: Matrix3,
+}
+
+impl Lift {
+    /// The point is seen where it is.
+    pub const NONE: Self = Self { vector: [0.0; 3], by_photo: [[0.0; 3]; 3], by_point: [[0.0; 3]; 3] };
 }
 
 /// An image position and its partials.
@@ -153,6 +177,16 @@ impl Photo {
         Projection { xy, photo: [x_photo, y_photo], point: [x_point, y_point] }
     }
 
+    /// The image position of a lifted point and its partials, those of the lift included.
+    ///
+    /// The lifted point less the centre is all that counts: what the photo's position does to the lift is taken off the
+    /// partials of the centre.
+    pub fn linearize_lifted(&self, point: &Point, lift: &Lift) -> Projection {
+        let row = |i: usize| std::array::from_fn(|k| self.centre_partials[i][k] - lift.by_photo[i][k]);
+        let photo = Self { centre_partials: std::array::from_fn(row), ..*self };
+        photo.linearize(&point.lifted(lift))
+    }
+
     /// Partials of one image coordinate, given its gradient g with respect to u.
     ///
     /// du = G dP - G dC + w x u dq, and g . (w x u) = (u x g) . w.
@@ -183,6 +217,12 @@ impl Photo {
     #[inline]
     pub fn centre(&self) -> Vector3 {
         self.centre
+    }
+
+    /// Partials of the projection centre with respect to the position of the photo, as columns.
+    #[inline]
+    pub fn centre_partials(&self) -> &Matrix3 {
+        &self.centre_partials
     }
 }
 

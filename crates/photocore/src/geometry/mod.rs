@@ -3,17 +3,21 @@
 //! * [`vector`]: products of 3-vectors and 3x3 matrices;
 //! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix;
 //! * [`ellipsoid`]: longitude, latitude, height, geocentric coordinates, and the local vertical frame;
-//! * [`collinearity`]: the projection of a point into a photo and its linearization.
+//! * [`collinearity`]: the projection of a point into a photo and its linearization;
+//! * [`refraction`]: how air and water displace a point, [`atmosphere`]: the air.
 //!
 //! Angles are radians, image coordinates millimetres, lengths the linear unit of the object space.
 
+pub mod atmosphere;
 pub mod collinearity;
 pub mod ellipsoid;
+pub mod refraction;
 pub mod rotation;
 pub mod vector;
 
-pub use collinearity::{ObjectSpace, Photo, Point, Projection, Ray, RotationSense};
+pub use collinearity::{Lift, ObjectSpace, Photo, Point, Projection, Ray, RotationSense};
 pub use ellipsoid::{Ellipsoid, local_vertical, local_vertical_with_partials};
+pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
 pub use rotation::{rotation, rotation_angles, rotation_with_partials};
 pub use vector::{Matrix3, Vector3};
 
@@ -27,5 +31,15 @@ pub enum GeometryError {
         a: f64,
         /// The semi-minor axis as given.
         b: f64,
+    },
+    /// A water level or refractive index that cannot be.
+    #[error(
+        "water needs a finite level and a finite refractive index of at least 1, not {level} and {index}"
+    )]
+    Water {
+        /// The level as given.
+        level: f64,
+        /// The index as given.
+        index: f64,
     },
 }

@@ -18,6 +18,7 @@ pub struct Layout {
     group_ptr: Vec<usize>,
     group_kept: Vec<u32>,
     group_border: Vec<Range<u32>>,
+    places: Option<Vec<[f64; 3]>>,
 }
 
 /// A layout that contradicts itself.
@@ -37,6 +38,14 @@ pub enum LayoutError {
         /// The block it names.
         kept: usize,
         /// How many there are.
+        blocks: usize,
+    },
+    /// There is not one place for each kept block.
+    #[error("{places} places for {blocks} kept blocks")]
+    Places {
+        /// How many places were given.
+        places: usize,
+        /// How many blocks there are.
         blocks: usize,
     },
     /// A group touches unknowns beyond the end of the border.
@@ -86,7 +95,26 @@ impl Layout {
         kept_offset.push(offset);
         let locals = group_ptr.len() - 1;
         let group_border = Vec::new();
-        Ok(Self { rows, local_dim, locals, kept_offset, border_dim: 0, group_ptr, group_kept, group_border })
+        Ok(Self {
+            rows,
+            local_dim,
+            locals,
+            kept_offset,
+            border_dim: 0,
+            group_ptr,
+            group_kept,
+            group_border,
+            places: None,
+        })
+    }
+
+    /// Adds the place of each kept block in some cartesian space: nested dissection cuts across it.
+    pub fn with_places(mut self, places: Vec<[f64; 3]>) -> Result<Self, LayoutError> {
+        if places.len() != self.kept() {
+            return Err(LayoutError::Places { places: places.len(), blocks: self.kept() });
+        }
+        self.places = Some(places);
+        Ok(self)
     }
 
     /// Adds a border of `dim` common unknowns; `ranges` says which of them each group touches.
@@ -117,6 +145,11 @@ impl Layout {
     /// Number of local blocks.
     pub fn locals(&self) -> usize {
         self.locals
+    }
+
+    /// The places of the kept blocks, where they are known.
+    pub fn places(&self) -> Option<&[[f64; 3]]> {
+        self.places.as_deref()
     }
 
     /// Number of kept blocks.

@@ -12,12 +12,15 @@
 
 mod cofactors;
 mod dense;
+mod dissection;
 mod elimination;
 mod factor;
 mod floors;
 mod form;
+mod graph;
 mod invert;
 mod layout;
+mod minimum_degree;
 mod ordering;
 mod panels;
 mod solve;
@@ -29,9 +32,10 @@ pub use cofactors::Cofactors;
 pub use elimination::{Equations, GroupRows};
 pub use factor::{Deficiency, Factor};
 pub use form::Normals;
+pub use graph::Graph;
 pub use invert::SelectedInverse;
 pub use layout::{Layout, LayoutError};
-pub use ordering::{Graph, Ordering};
+pub use ordering::Ordering;
 pub use solve::Solution;
 pub use symbolic::{Operations, Symbolic};
 pub use system::{Between, Prior, System};

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::graph::Graph;
 use super::layout::Layout;
-use super::ordering::{Graph, Ordering};
+use super::ordering::Ordering;
 
 /// The order of elimination and the pattern of the factor of the reduced normal equations.
 ///
@@ -13,6 +14,7 @@ use super::ordering::{Graph, Ordering};
 #[derive(Debug, Clone)]
 pub struct Symbolic {
     ordering: Ordering,
+    predictions: Vec<(Ordering, f64)>,
     position_of: Vec<usize>,
     block_at: Vec<usize>,
     offset: Vec<usize>,
@@ -53,8 +55,7 @@ impl Supernode {
 
     /// Multiply-adds of its part of the factorisation.
     fn operations(&self) -> f64 {
-        let (w, r) = (self.width as f64, self.below() as f64);
-        w * w * w / 6.0 + w * w * r / 2.0 + w * r * r / 2.0
+        multiply_adds(self.width, self.below())
     }
 }
 
@@ -73,19 +74,23 @@ impl Symbolic {
     /// Orders the kept blocks of a layout and finds the pattern of the factor.
     pub fn new(layout: &Layout, ordering: Ordering) -> Self {
         let graph = Graph::new(layout);
-        let mut best: Option<Self> = None;
+        let mut predictions = Vec::new();
+        let mut best: Option<(f64, Ordering, Vec<usize>)> = None;
         for &candidate in ordering.candidates() {
-            let symbolic = Self::with_order(layout, &graph, candidate);
-            if best.as_ref().is_none_or(|b| symbolic.factor_operations() < b.factor_operations()) {
-                best = Some(symbolic);
+            let order = candidate.order(&graph, layout);
+            let operations = predicted_operations(layout, &graph, &order);
+            predictions.push((candidate, operations));
+            if best.as_ref().is_none_or(|(least, ..)| operations < *least) {
+                best = Some((operations, candidate, order));
             }
         }
-        best.unwrap_or_else(|| Self::with_order(layout, &graph, Ordering::Input))
+        let (ordering, order) =
+            best.map_or((Ordering::Input, Vec::new()), |(_, candidate, order)| (candidate, order));
+        Self { predictions, ..Self::with_order(layout, &graph, ordering, &order) }
     }
 
-    fn with_order(layout: &Layout, graph: &Graph, ordering: Ordering) -> Self {
-        let order = ordering.order(graph);
-        let order = postorder(graph, &order);
+    fn with_order(layout: &Layout, graph: &Graph, ordering: Ordering, order: &[usize]) -> Self {
+        let order = postorder(graph, order);
         let border = layout.border_dim() > 0;
         let mut block_at = order;
         let mut dims: Vec<usize> = block_at.iter().map(|&block| layout.kept_dim(block)).collect();
@@ -93,10 +98,7 @@ impl Symbolic {
             block_at.push(layout.kept());
             dims.push(layout.border_dim());
         }
-        let mut position_of = vec![0; block_at.len()];
-        for (position, &block) in block_at.iter().enumerate() {
-            position_of[block] = position;
-        }
+        let position_of = places(&block_at);
         let mut offset = vec![0];
         for dim in &dims {
             offset.push(offset[offset.len() - 1] + dim);
@@ -104,6 +106,7 @@ impl Symbolic {
         let columns = column_patterns(graph, &block_at, &position_of, border);
         let mut symbolic = Self {
             ordering,
+            predictions: Vec::new(),
             position_of,
             block_at,
             offset,
@@ -150,6 +153,11 @@ impl Symbolic {
     /// The ordering in force (never [`Ordering::Auto`]).
     pub fn ordering(&self) -> Ordering {
         self.ordering
+    }
+
+    /// The orderings that were tried, each with the predicted multiply-adds of a factorisation.
+    pub fn predictions(&self) -> &[(Ordering, f64)] {
+        &self.predictions
     }
 
     /// Number of blocks in the order of elimination, the border counted.
@@ -295,13 +303,47 @@ fn elimination_tree(graph: &Graph, order: &[usize], place: &[usize]) -> Vec<Opti
     parent
 }
 
-/// Reorders so that every subtree of the elimination tree is contiguous; the fill stays the same.
-fn postorder(graph: &Graph, order: &[usize]) -> Vec<usize> {
+/// Multiply-adds of the factorisation in a given order, from the heights of the columns of the factor. Each row of the factor is a
+/// subtree of the elimination tree, whose leaves are neighbours (Liu 1990, section 4.1): it is walked, not stored.
+fn predicted_operations(layout: &Layout, graph: &Graph, order: &[usize]) -> f64 {
+    let place = places(order);
+    let parent = elimination_tree(graph, order, &place);
+    let mut below = vec![layout.border_dim(); order.len()];
+    let mut seen_by = vec![usize::MAX; order.len()];
+    for (k, &block) in order.iter().enumerate() {
+        seen_by[k] = k;
+        for other in graph.neighbours(block).filter(|&other| place[other] < k) {
+            let mut i = place[other];
+            while seen_by[i] != k {
+                seen_by[i] = k;
+                below[i] += layout.kept_dim(block);
+                // The walk ends at k itself, the root of the subtree, at the latest.
+                i = parent[i].unwrap_or(k);
+            }
+        }
+    }
+    let columns = order.iter().zip(below).map(|(&block, below)| multiply_adds(layout.kept_dim(block), below));
+    columns.sum::<f64>() + multiply_adds(layout.border_dim(), 0)
+}
+
+/// Multiply-adds of eliminating `width` unknowns that are coupled to `below` others.
+fn multiply_adds(width: usize, below: usize) -> f64 {
+    let (w, r) = (width as f64, below as f64);
+    w * w * w / 6.0 + w * w * r / 2.0 + w * r * r / 2.0
+}
+
+/// Where each block stands in an order.
+fn places(order: &[usize]) -> Vec<usize> {
     let mut place = vec![0; order.len()];
     for (k, &block) in order.iter().enumerate() {
         place[block] = k;
     }
-    let parent = elimination_tree(graph, order, &place);
+    place
+}
+
+/// Reorders so that every subtree of the elimination tree is contiguous; the fill stays the same.
+fn postorder(graph: &Graph, order: &[usize]) -> Vec<usize> {
+    let parent = elimination_tree(graph, order, &places(order));
     let mut children = vec![Vec::new(); order.len()];
     for (k, above) in parent.iter().enumerate() {
         if let Some(above) = above {

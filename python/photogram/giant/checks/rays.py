@@ -49,7 +49,7 @@ class LocalAxes:
         to_ground = matrices if self.block.photo_to_ground else matrices.transpose(0, 2, 1)
         if self.block.spheroid is None:
             return to_ground
-        vertical = geometry.east_north_up(self.block.photo_positions)
+        vertical = geometry.local_frames(self.block.photo_positions)
         rotations: Floats = self.frame @ vertical.transpose(0, 2, 1) @ to_ground
         return rotations
 
@@ -65,7 +65,7 @@ def local_axes(block: Block) -> LocalAxes:
         return LocalAxes(block, np.median(block.photo_positions, axis=0) * [1.0, 1.0, 0.0], np.eye(3))
     middle = np.median(block.photo_positions, axis=0)[np.newaxis] * [1.0, 1.0, 0.0]
     origin = geometry.geographic_to_geocentric(middle, block.spheroid)[0]
-    return LocalAxes(block, origin, geometry.east_north_up(middle)[0])
+    return LocalAxes(block, origin, geometry.local_frames(middle)[0])
 
 
 def frame_radius(block: Block) -> float:

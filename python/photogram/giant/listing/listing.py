@@ -52,7 +52,7 @@ def listing(
     Parameters
     ----------
     project, block
-        What was adjusted: `block` is `project.to_block()`, with or without limits.
+        What was adjusted: `block` is `project.to_block()`, with or without limits or another refraction.
     result
         The adjustment of the block, whether it converged or not.
     as_published
@@ -67,7 +67,7 @@ def listing(
     """
     space = Space(block.geographic, block.linear_unit)
     pages = [
-        options_page(project.common, space),
+        options_page(project.common, space, block.refraction),
         *_input_pages(project, block, space),
         *warning_pages(error_warnings(project, block, limits)),
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from photogram.giant.common import Common, UnitVariance
 from photogram.giant.listing.formats import Space
 from photogram.giant.listing.pages import Page
+from photogram.refraction import Refraction
 
 __all__ = ["options_page"]
 
@@ -15,11 +16,22 @@ UNIT_VARIANCE: dict[UnitVariance, str] = {
 }
 
 
-def options_page(common: Common, space: Space) -> Page:
+def options_page(common: Common, space: Space, refraction: Refraction | None) -> Page:
     """Return the page of the options.
 
     The sample shows one choice of most options only; `docs/giant-listing.md` says which lines are ours.
+
+    Parameters
+    ----------
+    common
+        What is asked for.
+    space
+        The object space and its linear unit.
+    refraction
+        What is applied, which may be more than COMMON asks for.
     """
+    air = refraction is not None and refraction.air is not None
+    water = refraction is not None and refraction.water is not None
     lines = [
         f"OBJECT SPACE REFERENCE SYSTEM IS {'GEOGRAPHIC' if space.geographic else 'RECTANGULAR'}",
         f"ROTATION ANGLES ARE {'PHOTO-TO-GROUND' if common.photo_to_ground else 'GROUND-TO-PHOTO'}",
@@ -29,21 +41,26 @@ def options_page(common: Common, space: Space) -> Page:
     ]
     if common.error_propagation:
         lines.append(UNIT_VARIANCE[common.unit_variance])
-    for medium, applied in (("ATMOSPHERIC", common.air_refraction), ("WATER", common.water_refraction)):
+    for medium, applied in (("ATMOSPHERIC", air), ("WATER", water)):
         lines.append(f"{medium} REFRACTION WILL {'' if applied else 'NOT '}BE INCLUDED IN THE ADJUSTMENT")
     lines.append(_residuals(common.residual_limit))
     if common.strip:
         lines.append(f"LEADING '{common.strip}' WILL BE ELIMINATED FROM ALL IDENTIFICATIONS")
-    if space.geographic:
-        for axis, length in (("MAJOR", common.semi_major), ("MINOR", common.semi_minor)):
-            lines.append(f"SEMI-{axis} AXIS OF SPHEROID = {length:.3f} {space.linear_unit}")
-    else:
-        lines.append(f"LINEAR UNIT OF OBJECT SPACE = {space.linear_unit}")
+    lines += _lengths(common, space)
     if common.save_points:
         lines.append("TRIANGULATED GROUND COORDINATES WILL BE SAVED")
     if common.save_stations:
         lines.append("ADJUSTED CAMERA STATION PARAMETERS WILL BE SAVED")
     return ["", *(line for option in lines for line in (option, ""))]
+
+
+def _lengths(common: Common, space: Space) -> list[str]:
+    if not space.geographic:
+        return [f"LINEAR UNIT OF OBJECT SPACE = {space.linear_unit}"]
+    return [
+        f"SEMI-{axis} AXIS OF SPHEROID = {length:.3f} {space.linear_unit}"
+        for axis, length in (("MAJOR", common.semi_major), ("MINOR", common.semi_minor))
+    ]
 
 
 def _residuals(limit: float) -> str:

@@ -14,7 +14,7 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Event, Problem};
-use crate::geometry::{ObjectSpace, RotationSense, Vector3};
+use crate::geometry::{self, ObjectSpace, Refraction, RotationSense, Vector3};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 use model::CentralPerspective;
@@ -72,6 +72,8 @@ pub struct Block {
     pub space: ObjectSpace,
     /// Sense of the attitude angles.
     pub sense: RotationSense,
+    /// What bends the rays, applied in every iteration; None for images that are free of it.
+    pub refraction: Option<Refraction>,
     /// Its photographs.
     pub photos: Vec<Photo>,
     /// Its points.
@@ -137,7 +139,7 @@ impl Block {
     /// Adjusts the block by least squares.
     ///
     /// Points that their image points cannot determine are left out first (see [`Dropped`]); the others start from the
-    /// intersection of their rays. `watch` is called on the calling thread; when it breaks, the adjustment stops.
+    /// intersection of their rays (straight ones). `watch` is called on the calling thread; when it breaks, the adjustment stops.
     ///
     /// # Errors
     /// A block that contradicts itself, has nothing to adjust, or leaves unknowns undetermined; an interruption.
@@ -202,6 +204,10 @@ impl Block {
         let model = CentralPerspective {
             space: self.space,
             sense: self.sense,
+            // Coordinates are counted from the origin; heights are not.
+            refraction: self
+                .refraction
+                .map(|refraction| Refraction { datum: refraction.datum + origin[2], ..refraction }),
             principal_distances: self.photos.iter().map(|photo| photo.principal_distance).collect(),
             points: points.iter().map(local_point).collect(),
             images: order.iter().map(|&image| self.images[image]).collect(),
@@ -218,7 +224,9 @@ impl Block {
         let own_sd = model.points.iter().map(|point| point.sd);
         let sd = own_sd.chain(self.photos.iter().flat_map(photo_sd)).flatten().collect();
         let photo_of = model.images.iter().map(|image| image.photo as u32).collect();
-        let layout = Layout::new(2, 3, &vec![6; self.photos.len()], model.start.clone(), photo_of)?;
+        let places = model.photos(&photos).iter().map(geometry::Photo::centre).collect();
+        let layout = Layout::new(2, 3, &vec![6; self.photos.len()], model.start.clone(), photo_of)?
+            .with_places(places)?;
         Ok(Problem {
             observation_sd: model.images.iter().flat_map(|image| image.sd).collect(),
             system: System::new(layout, options.ordering),

@@ -2,7 +2,7 @@
 
 use super::Image;
 use crate::adjustment::Model;
-use crate::geometry::{ObjectSpace, Photo, Point, RotationSense};
+use crate::geometry::{ObjectSpace, Photo, Point, Projection, Refraction, RotationSense, Vertical};
 use crate::normals::GroupRows;
 
 /// Central perspective images: the collinearity equations.
@@ -10,6 +10,8 @@ use crate::normals::GroupRows;
 pub struct CentralPerspective {
     pub space: ObjectSpace,
     pub sense: RotationSense,
+    /// None where images are free of refraction.
+    pub refraction: Option<Refraction>,
     /// Of each photograph, in millimetres.
     pub principal_distances: Vec<f64>,
     /// The points, the local blocks; coordinates counted from the local origin.
@@ -27,6 +29,25 @@ pub struct CentralPerspective {
 pub struct Stations {
     photos: Vec<Photo>,
     points: Vec<Point>,
+    refracted: Option<Refracted>,
+}
+
+/// What refraction needs besides.
+#[derive(Debug)]
+struct Refracted {
+    refraction: Refraction,
+    at_photos: Vec<Vertical>,
+    at_points: Vec<Vertical>,
+}
+
+impl Refracted {
+    /// Out of line, so that images without refraction do not pay for it.
+    #[inline(never)]
+    fn linearize(&self, stations: &Stations, photo: usize, point: usize) -> Projection {
+        let (from, to) = (&stations.photos[photo], &stations.points[point]);
+        let lift = self.refraction.lift(from, &self.at_photos[photo], to, &self.at_points[point]);
+        from.linearize_lifted(to, &lift)
+    }
 }
 
 impl CentralPerspective {
@@ -45,8 +66,14 @@ impl Model for CentralPerspective {
 
     fn prepare(&self, unknowns: &[f64]) -> Stations {
         let (points, photos) = unknowns.split_at(3 * self.points.len());
-        let points = points.as_chunks().0.iter().map(|&coordinates| Point::new(self.space, coordinates));
-        Stations { photos: self.photos(photos), points: points.collect() }
+        let coordinates = points.as_chunks().0;
+        let refracted = self.refraction.map(|refraction| Refracted {
+            refraction,
+            at_photos: verticals(&refraction, self.space, photos.as_chunks::<6>().0),
+            at_points: verticals(&refraction, self.space, coordinates),
+        });
+        let points = coordinates.iter().map(|&coordinates| Point::new(self.space, coordinates));
+        Stations { photos: self.photos(photos), points: points.collect(), refracted }
     }
 
     /// Intersects the points anew.
@@ -60,11 +87,24 @@ impl Model for CentralPerspective {
     #[inline(always)]
     fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let image = &self.images[group];
-        let projection = stations.photos[image.photo].linearize(&stations.points[local]);
+        let projection = match &stations.refracted {
+            None => stations.photos[image.photo].linearize(&stations.points[local]),
+            Some(refracted) => refracted.linearize(stations, image.photo, local),
+        };
         for row in 0..2 {
             rows.constant[row] = image.xy[row] - projection.xy[row];
             rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
             rows.kept[6 * row..][..6].copy_from_slice(&projection.photo[row]);
         }
     }
+}
+
+/// The verticals at positions, the first three unknowns of each.
+fn verticals<const N: usize>(
+    refraction: &Refraction,
+    space: ObjectSpace,
+    unknowns: &[[f64; N]],
+) -> Vec<Vertical> {
+    let position = |values: &[f64; N]| std::array::from_fn(|k| values[k]);
+    unknowns.iter().map(|values| refraction.vertical(space, position(values))).collect()
 }

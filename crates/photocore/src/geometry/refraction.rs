@@ -1,0 +1,345 @@
+//! Refraction in air and water as a lift of the ground point before it is projected.
+//!
+//! In the report's form (GIANT guide, Appendices F and G) a point at D from the camera is lifted along the up of the local
+//! frame at the camera by dZ = (K_a + K_w) D.D / dZ0, dZ0 = -up . D, which turns its ray by (K_a + K_w) tan alpha away from
+//! the nadir. The rigorous ray through water lifts it along the up at the point. `docs/refraction.md` derives both.
+
+use super::GeometryError;
+use super::atmosphere::{Air, SCALE_HEIGHT};
+use super::collinearity::{Lift, ObjectSpace, Photo, Point};
+use super::ellipsoid::local_vertical;
+use super::vector::{Matrix3, Vector3, apply_transposed, difference, dot};
+
+/// Refractivity n - 1 of air at sea level (Saastamoinen 1974).
+const REFRACTIVITY: f64 = 277.0e-6;
+/// Points less than this below the camera, in metres, or above it, are not corrected for air: K_a tan alpha is no model of
+/// horizontal rays.
+const LEAST_DROP: f64 = 1.0;
+/// How far from the water level, as part of the height of the camera above it, the depth is rounded off: by a quarter of
+/// this at most, of which refraction leaves some 30 %: up to 45 degrees less than half a micrometre in a photograph.
+const SHORE: f64 = 3e-5;
+
+/// How rays are bent by air.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AirModel {
+    /// K_a = 13 (H - h) [1 - 0.02 (2 H + h)] microradians, km (GIANT guide, Appendix F), to 9 km.
+    Giant,
+    /// K_a = mean of n - n(H) between point and camera, in horizontal layers of the standard atmosphere.
+    Standard,
+}
+
+/// How rays are bent by water.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WaterModel {
+    /// K_w = [(Hc + d) / (Hc + d') - 1] / (1 + tan^2 alpha) (GIANT guide, Appendix G).
+    Giant,
+    /// The ray itself, by Snell's law at a plane perpendicular to the up at the point.
+    Snell,
+}
+
+/// Water below a level; points above it are not concerned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Water {
+    model: WaterModel,
+    level: f64,
+    index: f64,
+}
+
+impl Water {
+    /// Water with its surface at the height `level` (linear unit) and a refractive index relative to air.
+    ///
+    /// # Errors
+    /// A level that is not finite, or an index that is not finite and at least 1.
+    pub fn new(model: WaterModel, level: f64, index: f64) -> Result<Self, GeometryError> {
+        if level.is_finite() && index.is_finite() && index >= 1.0 {
+            Ok(Self { model, level, index })
+        } else {
+            Err(GeometryError::Water { level, index })
+        }
+    }
+}
+
+/// Air and water between points and cameras. The third coordinate of the object space is the height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Refraction {
+    /// The air; None for no refraction in it.
+    pub air: Option<AirModel>,
+    /// The water; None where there is none.
+    pub water: Option<Water>,
+    /// Metres in the linear unit.
+    pub metres_per_unit: f64,
+    /// Height of the zero of the third coordinate, in the linear unit.
+    pub datum: f64,
+}
+
+/// The vertical at one end of a ray.
+#[derive(Debug, Clone, Copy)]
+pub struct Vertical {
+    /// Cartesian unit vector.
+    up: Vector3,
+    /// Its partials with respect to the three coordinates, as columns.
+    turning: Matrix3,
+    /// Linear unit.
+    height: f64,
+    /// The air at this height; none unless the model of the air needs it.
+    air: Air,
+}
+
+/// How far a point is lifted along a vertical, and the partials of that.
+#[derive(Debug, Clone, Copy)]
+struct Rise {
+    value: f64,
+    /// With respect to D.D.
+    by_square: f64,
+    /// With respect to -up . D.
+    by_drop: f64,
+    /// With respect to the heights of the camera and of the point.
+    by_heights: [f64; 2],
+}
+
+/// K, and its partials.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bending {
+    value: f64,
+    /// With respect to the square of the horizontal distance.
+    by_across: f64,
+    /// With respect to the heights of the camera and of the point.
+    by_heights: [f64; 2],
+}
+
+impl Refraction {
+    /// The vertical at a position of the object space.
+    pub fn vertical(&self, space: ObjectSpace, coordinates: Vector3) -> Vertical {
+        let height = coordinates[2] + self.datum;
+        let air = match self.air {
+            Some(AirModel::Standard) => Air::at(height * self.metres_per_unit),
+            _ => Air::NONE,
+        };
+        let (up, turning) = match space {
+            ObjectSpace::Rectangular => ([0.0, 0.0, 1.0], [[0.0; 3]; 3]),
+            ObjectSpace::Geographic(_) => {
+                // d(up)/d(latitude) is north, d(up)/d(longitude) is east times the cosine of the latitude.
+                let [_, north, up] = local_vertical(coordinates[0], coordinates[1]);
+                (up, [[-up[1], north[0], 0.0], [up[0], north[1], 0.0], [0.0, north[2], 0.0]])
+            }
+        };
+        Vertical { up, turning, height, air }
+    }
+
+    /// What lifts a point to where a photo sees it; `station` and `foot` are the verticals at the two.
+    pub fn lift(&self, photo: &Photo, station: &Vertical, point: &Point, foot: &Vertical) -> Lift {
+        let d = difference(&point.position(), &photo.centre());
+        let (square, drop) = (dot(&d, &d), -dot(&station.up, &d));
+        let mut bending = self.air(station, foot);
+        let mut lift = Lift::NONE;
+        if let Some(water) = &self.water {
+            match water.model {
+                WaterModel::Giant => bending.add(&water.bending(square - drop * drop, station, foot)),
+                WaterModel::Snell => {
+                    let rise = water.rise(square, -dot(&foot.up, &d), foot);
+                    let turned = add(&mut lift, &rise, foot, &d, photo, point);
+                    add_to(&mut lift.by_point, &turned);
+                }
+            }
+        }
+        if bending.value != 0.0 {
+            let turned = add(&mut lift, &bending.rise(square, drop), station, &d, photo, point);
+            add_to(&mut lift.by_photo, &turned);
+        }
+        lift
+    }
+
+    /// K_a between a camera and a point.
+    fn air(&self, station: &Vertical, foot: &Vertical) -> Bending {
+        let metres = self.metres_per_unit;
+        let drop = metres * (station.height - foot.height);
+        let Some(model) = self.air.filter(|_| drop >= LEAST_DROP) else { return Bending::default() };
+        let (value, by_heights) = match model {
+            AirModel::Giant => appendix_f(1e-3 * metres * station.height, 1e-3 * metres * foot.height),
+            AirModel::Standard => layered(&station.air, &foot.air, drop),
+        };
+        Bending { value, by_across: 0.0, by_heights: by_heights.map(|each| metres * each) }
+    }
+}
+
+/// K_a of the GIANT guide, Appendix F, heights in km; partials per metre.
+fn appendix_f(station: f64, point: f64) -> (f64, [f64; 2]) {
+    let (drop, thinning) = (station - point, 1.0 - 0.02 * (2.0 * station + point));
+    (13e-6 * drop * thinning, [13e-9 * (thinning - 0.04 * drop), 13e-9 * (-thinning - 0.02 * drop)])
+}
+
+/// K_a = N0 [R T0 / (M g) (p_h - p_H) / (H - h) - rho_H], p and rho relative to sea level; partials per metre.
+///
+/// The mean of n - n(H) over the height: in equilibrium the integral of the density is the difference of the pressures.
+fn layered(station: &Air, point: &Air, drop: f64) -> (f64, [f64; 2]) {
+    let mean = SCALE_HEIGHT * (point.pressure - station.pressure) / drop;
+    let by_station = (station.density - mean) / drop - station.gradient;
+    let by_point = (mean - point.density) / drop;
+    (REFRACTIVITY * (mean - station.density), [REFRACTIVITY * by_station, REFRACTIVITY * by_point])
+}
+
+impl Bending {
+    fn add(&mut self, other: &Self) {
+        self.value += other.value;
+        self.by_across += other.by_across;
+        (0..2).for_each(|k| self.by_heights[k] += other.by_heights[k]);
+    }
+
+    /// dZ = K D.D / dZ0, the square of the horizontal distance being D.D - dZ0^2.
+    fn rise(&self, square: f64, drop: f64) -> Rise {
+        let stretch = square / drop;
+        Rise {
+            value: self.value * stretch,
+            by_square: self.value / drop + self.by_across * stretch,
+            by_drop: -self.value * stretch / drop - 2.0 * square * self.by_across,
+            by_heights: self.by_heights.map(|each| each * stretch),
+        }
+    }
+}
+
+/// The depth of a point, and its partials.
+#[derive(Debug, Clone, Copy)]
+struct Depth {
+    value: f64,
+    /// With respect to the depth as it is.
+    by_depth: f64,
+    /// With respect to the height of the camera above the water.
+    by_height: f64,
+}
+
+/// d - d', what the true depth d exceeds the apparent one by, and its partials.
+#[derive(Debug, Clone, Copy)]
+struct Shallowing {
+    value: f64,
+    /// With respect to the square of the horizontal distance, the height of the camera above the water, the depth.
+    by: Vector3,
+}
+
+impl Water {
+    /// The depth of a point for a camera at `height` above the water; None for a camera below it, and for points above.
+    ///
+    /// max(0, d) has a kink, and where the sum of squares has its least value on a kink no iteration ends: within
+    /// e = `SHORE` x height of the level the depth is (d + e)^2 / (4 e) instead.
+    fn depth(&self, foot: &Vertical, height: f64) -> Option<Depth> {
+        let (depth, shore) = (self.level - foot.height, SHORE * height);
+        if height <= 0.0 || depth <= -shore {
+            None
+        } else if depth >= shore {
+            Some(Depth { value: depth, by_depth: 1.0, by_height: 0.0 })
+        } else {
+            let part = (depth + shore) / (2.0 * shore);
+            Some(Depth { value: part * part * shore, by_depth: part, by_height: SHORE * part * (1.0 - part) })
+        }
+    }
+
+    /// K_w of the GIANT guide, Appendix G, heights of camera and point being those above the ellipsoid:
+    /// (d - d') / (Hc + d') / (1 + L^2 / (Hc + d)^2).
+    fn bending(&self, across: f64, station: &Vertical, foot: &Vertical) -> Bending {
+        let height = station.height - self.level;
+        let Some(depth) = self.depth(foot, height) else { return Bending::default() };
+        let Shallowing { value, by } = self.shallowing(across, height, depth.value);
+        let (drop, apparent) = (height + depth.value, height + depth.value - value);
+        let slant = drop * drop + across;
+        let steep = drop * drop / slant;
+        // K_w = steep (d - d') / apparent, where steep and apparent depend on drop
+        let bending = steep * value / apparent;
+        let by_value = steep * drop / (apparent * apparent);
+        let by_drop = bending * (2.0 * across / (drop * slant) - 1.0 / apparent);
+        let [by_height, by_depth] = [by[1], by[2]].map(|each| by_value * each + by_drop);
+        Bending {
+            value: bending,
+            by_across: by_value * by[0] - bending / slant,
+            // A higher point is less deep.
+            by_heights: [by_height + by_depth * depth.by_height, -by_depth * depth.by_depth],
+        }
+    }
+
+    /// The lift of the rigorous ray, d - d', in the frame of the point; `drop` is that of the point below the camera there.
+    fn rise(&self, square: f64, drop: f64, foot: &Vertical) -> Rise {
+        let height = drop - (self.level - foot.height);
+        let Some(depth) = self.depth(foot, height) else {
+            return Rise { value: 0.0, by_square: 0.0, by_drop: 0.0, by_heights: [0.0; 2] };
+        };
+        let Shallowing { value, by: [by_across, by_height, by_depth] } =
+            self.shallowing(square - drop * drop, height, depth.value);
+        let by_height = by_height + by_depth * depth.by_height;
+        Rise {
+            value,
+            by_square: by_across,
+            by_drop: by_height - 2.0 * drop * by_across,
+            // A higher point is less deep, and at the same drop its camera stands higher above the water.
+            by_heights: [0.0, by_height - by_depth * depth.by_depth],
+        }
+    }
+
+    /// d - d' = d (1 - q) for a camera at `height` above the water and the square `across` of the horizontal distance L.
+    ///
+    /// With T = tan i above the water, tan r = q T below it, q = 1 / sqrt(n^2 + (n^2 - 1) T^2), so that L = T (Hc + d q);
+    /// implicit differentiation gives (Hc + d n^2 q^3) dT = dL - T dHc - q T dd.
+    fn shallowing(&self, across: f64, height: f64, depth: f64) -> Shallowing {
+        let index_square = self.index * self.index;
+        let tangent = self.tangent(across.max(0.0).sqrt(), height, depth);
+        let tangent_square = tangent * tangent;
+        let q = (index_square + (index_square - 1.0) * tangent_square).sqrt().recip();
+        // dq = -(n^2 - 1) q^3 T dT, with T dL = d(L^2) / 2 / (Hc + d q)
+        let scale = depth * (index_square - 1.0) * q.powi(3) / (height + depth * index_square * q.powi(3));
+        Shallowing {
+            value: depth * (1.0 - q),
+            by: [
+                scale * 0.5 / (height + depth * q),
+                -scale * tangent_square,
+                1.0 - q - scale * tangent_square * q,
+            ],
+        }
+    }
+
+    /// T of L = T (Hc + d q(T)) by Newton's method. The right side is concave and q <= 1/n, so that T rises from the start
+    /// to the root without passing it.
+    fn tangent(&self, across: f64, height: f64, depth: f64) -> f64 {
+        const MOST_STEPS: usize = 50;
+        let index_square = self.index * self.index;
+        let mut tangent = across / (height + depth / self.index);
+        for _ in 0..MOST_STEPS {
+            let q = (index_square + (index_square - 1.0) * tangent * tangent).sqrt().recip();
+            let short = across - tangent * (height + depth * q);
+            let step = short / (height + depth * index_square * q.powi(3));
+            tangent += step;
+            if step <= 4.0 * f64::EPSILON * tangent {
+                break;
+            }
+        }
+        tangent
+    }
+}
+
+/// Adds a rise along a vertical to a lift, all but what the turning of the vertical changes: that is returned, for the
+/// end of the ray where it stands.
+fn add(
+    lift: &mut Lift,
+    rise: &Rise,
+    vertical: &Vertical,
+    d: &Vector3,
+    photo: &Photo,
+    point: &Point,
+) -> Matrix3 {
+    let up = &vertical.up;
+    let by_vector: Vector3 = std::array::from_fn(|i| 2.0 * rise.by_square * d[i] - rise.by_drop * up[i]);
+    let mut by_photo = apply_transposed(photo.centre_partials(), &by_vector).map(|value| -value);
+    let mut by_point = apply_transposed(point.partials(), &by_vector);
+    by_photo[2] += rise.by_heights[0];
+    by_point[2] += rise.by_heights[1];
+    let by_turning = apply_transposed(&vertical.turning, d).map(|value| -rise.by_drop * value);
+    let outer = |row: &Vector3| -> Matrix3 { std::array::from_fn(|i| row.map(|value| up[i] * value)) };
+    (0..3).for_each(|i| lift.vector[i] += rise.value * up[i]);
+    add_to(&mut lift.by_photo, &outer(&by_photo));
+    add_to(&mut lift.by_point, &outer(&by_point));
+    let mut turned = outer(&by_turning);
+    add_to(&mut turned, &vertical.turning.map(|row| row.map(|value| rise.value * value)));
+    turned
+}
+
+fn add_to(sum: &mut Matrix3, other: &Matrix3) {
+    for (row, more) in sum.iter_mut().zip(other) {
+        (0..3).for_each(|k| row[k] += more[k]);
+    }
+}

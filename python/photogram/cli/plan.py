@@ -1,0 +1,157 @@
+"""`photogram plan`: predict the accuracy of a network, two patterns of control side by side."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from photogram.cli.console import errors, failures, output
+from photogram.cli.simulated import Control, NetworkOptions, takes_network
+
+if TYPE_CHECKING:
+    from photogram import Block
+    from photogram.planning import Plan
+
+__all__ = ["plan"]
+
+
+@takes_network
+def plan(
+    network: NetworkOptions,
+    projects: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="DIR",
+            help="GIANT projects, with fictitious or measured images, to be put side by side instead of"
+            " simulated networks.",
+            show_default=False,
+        ),
+    ] = None,
+    against: Annotated[
+        Control, typer.Option(help="Where the control points of the second pattern are.")
+    ] = Control.CORNERS,
+    against_spacing: Annotated[
+        int | None,
+        typer.Option(
+            help="As --control-spacing, for the second pattern. Default: the same.", show_default=False
+        ),
+    ] = None,
+    against_position_sd: Annotated[
+        float | None,
+        typer.Option(help="As --position-sd, for the second pattern. Default: the same.", show_default=False),
+    ] = None,
+    json: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the figures as a JSON document.", show_default=False),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Draw the patterns in plan with the expected standard deviations in height (png, pdf, svg).",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Predict the accuracy of a network before it is flown: two patterns of control side by side.
+
+    No measurements are needed or made: expected standard deviations of points by number of rays and by
+    location, of photographs, and the gross errors that can be found.
+    """
+    with failures():
+        from photogram.files import write_whole
+        from photogram.planning import plan as predict
+
+        if projects:
+            _check_alone(network, against, against_spacing, against_position_sd)
+            patterns = _adjusted(projects)
+        else:
+            second = replace(
+                network,
+                control=against,
+                control_spacing=network.control_spacing if against_spacing is None else against_spacing,
+                position_sd=network.position_sd if against_position_sd is None else against_position_sd,
+            )
+            patterns = _simulated(network, second)
+        made = predict(patterns)
+        written = _documents(made, json, plot)
+        write_whole(written)
+        output.print(made.report(), markup=False, end="")
+        if written:
+            errors.print("written: " + escape(", ".join(str(path) for path in written)))
+
+
+def _simulated(*networks: NetworkOptions) -> dict[str, Block]:
+    """Simulate networks: their true positions, nothing measured."""
+    from photogram.simulation import simulate
+
+    patterns = {_name(network): simulate(check_points=0, **network.arguments()).truth for network in networks}
+    if len(patterns) < len(networks):
+        raise typer.BadParameter(
+            f"both patterns are: {next(iter(patterns))}; choose another one", param_hint="--against"
+        )
+    return patterns
+
+
+def _name(network: NetworkOptions) -> str:
+    """Name a pattern by what two of them may differ in."""
+    spacing = network.control_spacing
+    names = {
+        Control.PERIMETER: f"perimeter, {spacing} base{'s' * (spacing != 1)}",
+        Control.CORNERS: "corners",
+        Control.NONE: "no control",
+    }
+    weighted = math.isfinite(network.position_sd)
+    return names[network.control] + (f", positions {network.position_sd:g} m" if weighted else "")
+
+
+def _check_alone(network: NetworkOptions, against: Control, *others: float | None) -> None:
+    """Refuse options of simulated networks beside projects, where they would be without effect."""
+    if network != NetworkOptions() or against != Control.CORNERS or any(each is not None for each in others):
+        raise typer.BadParameter("a project takes no options of simulated networks", param_hint="DIR")
+
+
+def _adjusted(projects: list[Path]) -> dict[str, Block]:
+    """Read projects; what stands in their files is adjusted first, so that all points have positions."""
+    from photogram import adjust
+    from photogram.giant import read_project
+    from photogram.prediction import at_adjusted
+
+    patterns = {}
+    for name, directory in _names(projects).items():
+        project = read_project(directory)
+        block = project.to_block()
+        for message in project.messages:
+            errors.print(f"[yellow]remark:[/] {escape(str(message))}")
+        fixed = project.common.intersection_only
+        patterns[name] = at_adjusted(adjust(block, covariance=False, fix_photos=fixed))
+    return patterns
+
+
+def _names(projects: list[Path]) -> dict[str, Path]:
+    """Name projects by the last part of their paths, or the whole where two have the same."""
+    places = [directory.resolve() for directory in projects]
+    if len(set(places)) < len(places):
+        raise typer.BadParameter("the same project twice", param_hint="DIR")
+    short = len({place.name for place in places}) == len(places)
+    return {place.name if short else str(place): given for place, given in zip(places, projects, strict=True)}
+
+
+def _documents(made: Plan, json: Path | None, plot: Path | None) -> dict[Path, bytes]:
+    documents = {json: made.to_json()} if json else {}
+    if plot:
+        from photogram.errors import InputError
+
+        figure, picture, kind = made.plot(), BytesIO(), plot.suffix.removeprefix(".")
+        known = figure.canvas.get_supported_filetypes()
+        if kind not in known:
+            raise InputError(f"a picture is one of {', '.join(sorted(known))}", file=plot)
+        figure.savefig(picture, format=kind)
+        documents[plot] = picture.getvalue()
+    return documents

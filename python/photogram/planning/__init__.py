@@ -1,0 +1,7 @@
+"""Planning: what a network promises before it is flown, for several patterns of control side by side."""
+
+from photogram.planning.networks import Plan, plan
+from photogram.planning.pattern import Pattern
+from photogram.planning.statistics import ControlQuality, PhotoQuality, PointQuality
+
+__all__ = ["ControlQuality", "Pattern", "PhotoQuality", "Plan", "PointQuality", "plan"]

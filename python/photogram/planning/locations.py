@@ -1,0 +1,66 @@
+"""Where a point lies in a block: in a corner, at an edge, in the interior.
+
+The place in the block, not the distance to control: it is the same for every pattern of control, so that the
+rows of two patterns hold the same points, and it is how the accuracy of blocks is usually tabulated: weak at
+the border, where rays are few and come from one side, uniform inside.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["LOCATIONS", "locations"]
+
+Floats = NDArray[np.float64]
+
+LOCATIONS = ("corner", "edge", "interior")
+
+
+def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
+    """Return the location of each of (n, 2) points in plan, (n,): one of `LOCATIONS`.
+
+    The block is the smallest rectangle around its (P, 2) photo stations, P at least 1. A point in it lies in
+    the interior, one beyond a side of it at an edge, one beyond two sides in a corner. So a single strip has
+    flanks and ends, but hardly an interior.
+    """
+    axes = _axes(stations)
+    turned, extent = points @ axes.T, stations @ axes.T
+    beyond = (turned < extent.min(axis=0)) | (turned > extent.max(axis=0))
+    found: NDArray[np.str_] = np.array(LOCATIONS)[2 - beyond.sum(axis=1)]
+    return found
+
+
+def _axes(points: Floats) -> Floats:
+    """Rows: the unit vectors along the sides of the smallest rectangle around points in plan.
+
+    One of its sides lies along a side of the convex hull (Freeman and Shapira, 1975).
+    """
+    hull = _hull(points)
+    sides = np.roll(hull, -1, axis=0) - hull
+    lengths = np.hypot(*sides.T)
+    if not (lengths > 0).any():
+        return np.eye(2)
+    c, s = (sides[lengths > 0] / lengths[lengths > 0, np.newaxis]).T
+    frames = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
+    extents = np.ptp(np.einsum("kij,nj->kin", frames, hull), axis=2)
+    axes: Floats = frames[np.argmin(extents.prod(axis=1))]
+    return axes
+
+
+def _hull(points: Floats) -> Floats:
+    """Corners of the convex hull, counterclockwise (Andrew's monotone chain)."""
+    order = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
+
+    def chain(ordered: list[list[float]]) -> list[list[float]]:
+        kept: list[list[float]] = []
+        for x, y in ordered:
+            while len(kept) > 1:
+                (x0, y0), (x1, y1) = kept[-2:]
+                if (x1 - x0) * (y - y0) > (y1 - y0) * (x - x0):
+                    break
+                kept.pop()
+            kept.append([x, y])
+        return kept
+
+    return np.array(chain(order)[:-1] + chain(order[::-1])[:-1] or order[:1])

@@ -1,0 +1,142 @@
+"""One pattern of a plan: a predicted block, its standard deviations as lengths, its places and its scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram import geometry
+from photogram.block import Block
+from photogram.planning.locations import locations
+from photogram.planning.statistics import (
+    ControlQuality,
+    PhotoQuality,
+    PointQuality,
+    control_quality,
+    photo_quality,
+    point_quality,
+)
+from photogram.prediction import image_depths
+from photogram.result import Result
+
+__all__ = ["Pattern"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """A planned network with what it promises.
+
+    Attributes
+    ----------
+    name
+        Of the pattern, for tables.
+    result
+        The predicted block (a priori unit weight).
+    """
+
+    name: str
+    result: Result
+
+    @property
+    def block(self) -> Block:
+        """The planned block."""
+        return self.result.block
+
+    @property
+    def axes(self) -> tuple[str, str, str]:
+        """Names of the components of positions: X, Y, Z, or E (east), N (north), h (height)."""
+        return ("E", "N", "h") if self.block.geographic else ("X", "Y", "Z")
+
+    @cached_property
+    def point_sd(self) -> Floats:
+        """(n, 3) expected standard deviations along `axes`, linear unit; NaN for points left out."""
+        lengths: Floats = self.result.point_sd * geometry.lengths_of_units(
+            self.result.point_positions, self.block.spheroid
+        )
+        return lengths
+
+    @cached_property
+    def photo_sd(self) -> Floats:
+        """(P, 6) expected standard deviations: along `axes` in the linear unit, then angles in radians."""
+        sd = self.result.photo_sd.copy()
+        sd[:, :3] *= geometry.lengths_of_units(self.result.photo_positions, self.block.spheroid)
+        return sd
+
+    @cached_property
+    def control_sd(self) -> Floats:
+        """(n, 3) a priori standard deviations of control, linear unit; infinite where not held."""
+        lengths: Floats = self.block.point_sd * geometry.lengths_of_units(
+            self.result.point_positions, self.block.spheroid
+        )
+        return lengths
+
+    @property
+    def new_points(self) -> NDArray[np.bool_]:
+        """(n,) which points are to be determined: those that take part and are not control."""
+        new: NDArray[np.bool_] = self.result.used_points & (self.result.point_kinds != "control")
+        return new
+
+    @cached_property
+    def point_plan(self) -> Floats:
+        """(n, 2) points in plan, linear unit: X, Y, or the tangent plane amid the photos, x pointing east."""
+        return self._plan(self.result.point_positions)
+
+    @cached_property
+    def photo_plan(self) -> Floats:
+        """(P, 2) photo stations in plan, as `point_plan`."""
+        return self._plan(self.result.photo_positions)
+
+    @cached_property
+    def point_locations(self) -> NDArray[np.str_]:
+        """(n,) `corner`, `edge` or `interior`, as :func:`photogram.planning.locations.locations` has them."""
+        return locations(self.point_plan, self.photo_plan)
+
+    @cached_property
+    def scale(self) -> float:
+        """How long a millimetre in the photo is on the ground, linear unit: the mean of all images."""
+        return float(self._scales.mean())
+
+    @cached_property
+    def unit(self) -> float:
+        """The standard deviation of image coordinates on the ground, linear unit: the mean of all images."""
+        rms = np.sqrt((self.result.block.image_sd[self.result.used_images] ** 2).mean(axis=1))
+        return float((self._scales * rms).mean())
+
+    @cached_property
+    def points(self) -> list[PointQuality]:
+        """New points and their images, by number of rays, by location, and all."""
+        return point_quality(self.result, self.point_sd, self.point_locations, self.new_points)
+
+    @cached_property
+    def photos(self) -> list[PhotoQuality]:
+        """Positions (linear unit) and attitudes (radians) of the photos."""
+        return photo_quality(self.result, self.photo_sd, self.axes)
+
+    @cached_property
+    def control(self) -> list[ControlQuality]:
+        """Held components of control, by axis."""
+        return control_quality(self.result, self.control_sd, self.axes)
+
+    @cached_property
+    def _scales(self) -> Floats:
+        photos = self.block.image_photos[self.result.used_images]
+        depths = image_depths(self.block)[self.result.used_images]
+        scales: Floats = depths / np.abs(self.block.principal_distances[photos])
+        return scales
+
+    def _plan(self, positions: Floats) -> Floats:
+        spheroid = self.block.spheroid
+        if spheroid is None:
+            return positions[:, :2]
+        # The mean of geocentric coordinates knows no antimeridian.
+        stations = geometry.geographic_to_geocentric(self.result.photo_positions, spheroid)
+        centre = stations.mean(axis=0)
+        frame = geometry.local_frames(geometry.geocentric_to_geographic(centre[np.newaxis], spheroid))[0]
+        xyz = geometry.geographic_to_geocentric(positions, spheroid)
+        plan: Floats = (xyz - centre) @ frame[:2].T
+        return plan

@@ -1,0 +1,218 @@
+"""A plan as text: patterns in columns, groups of points in rows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import compress
+from typing import TYPE_CHECKING
+
+from photogram import _photocore
+from photogram.planning.statistics import PointQuality
+from photogram.report import composed
+
+if TYPE_CHECKING:
+    from photogram.planning.pattern import Pattern
+
+__all__ = ["report"]
+
+_ARCSEC = 180 * 3600 / math.pi
+_NOTICED = 1.005
+"""Ratio of standard deviations that two decimals show."""
+_HEAD = 3
+"""Lines of a block before its first row: its name, headings, units."""
+_LABEL, _GAP = 11, "    "
+
+# A column: its heading, its unit, and the text of its cell.
+Column = tuple[str, str, Callable[[PointQuality], str]]
+
+
+def report(patterns: Sequence[Pattern]) -> str:
+    """Return the tables of a plan."""
+    unit = patterns[0].block.linear_unit
+    sections = [
+        ("Network", _network(patterns)),
+        (f"New points: expected standard deviations, {unit}", _standard_deviations(patterns, unit)),
+        ("New points: the same, divided by the sd of image coordinates on the ground", _multiples(patterns)),
+        ("Image coordinates of new points: reliability", _reliability(patterns)),
+        ("Photos: expected standard deviations", _photos(patterns)),
+        ("Control: reliability", _control(patterns)),
+        ("Comparison: expected standard deviations of all new points", _comparison(patterns)),
+    ]
+    head = f"photogram {_photocore.__version__}  plan  {patterns[0].block.title}".rstrip()
+    return composed(head, sections)
+
+
+def _network(patterns: Sequence[Pattern]) -> list[str]:
+    linear = patterns[0].block.linear_unit
+    decimals = _decimals(patterns)
+    rows: list[tuple[str, Callable[[Pattern], str]]] = [
+        ("photos", lambda p: f"{len(p.block.photo_ids)}"),
+        ("new points", lambda p: f"{p.new_points.sum()}"),
+        ("control points", lambda p: f"{(p.result.used_points & ~p.new_points).sum()}"),
+        ("points left out", lambda p: f"{len(p.result.dropped)}"),
+        ("image points", lambda p: f"{p.result.used_images.sum()}"),
+        (f"1 mm in the photo on the ground, {linear}", lambda p: _fixed(p.scale, decimals)),
+        (f"sd of image coordinates on the ground, {linear}", lambda p: _fixed(p.unit, decimals)),
+    ]
+    blocks = [[pattern.name, *(cell(pattern) for _, cell in rows)] for pattern in patterns]
+    labels = ["", *(name for name, _ in rows)]
+    return [*_labelled(labels, [_column(block) for block in blocks]), *_remarks(patterns)]
+
+
+def _remarks(patterns: Sequence[Pattern]) -> list[str]:
+    """List each remark once, with the patterns that it is about unless it is about all."""
+    about: dict[str, list[str]] = {}
+    for pattern in patterns:
+        for message in pattern.result.messages:
+            about.setdefault(str(message), []).append(pattern.name)
+    return [
+        text if len(names) == len(patterns) else f"{'; '.join(names)}: {text}"
+        for text, names in about.items()
+    ]
+
+
+def _standard_deviations(patterns: Sequence[Pattern], linear: str) -> list[str]:
+    decimals = _decimals(patterns)
+    return _side_by_side(
+        patterns, lambda pattern: _sd_columns(pattern, linear, lambda sd: _fixed(sd, decimals))
+    )
+
+
+def _multiples(patterns: Sequence[Pattern]) -> list[str]:
+    def columns(pattern: Pattern) -> list[Column]:
+        return _sd_columns(pattern, "", lambda sd: _fixed(sd / pattern.unit, 2))
+
+    return _side_by_side(patterns, columns)
+
+
+def _sd_columns(pattern: Pattern, linear: str, text: Callable[[float], str]) -> list[Column]:
+    def column(kind: str, axis: int) -> Column:
+        def cell(quality: PointQuality) -> str:
+            return text((quality.rms_sd if kind == "rms" else quality.max_sd)[axis])
+
+        return f"{kind} {pattern.axes[axis]}", linear, cell
+
+    points: Column = ("points", "", lambda quality: f"{quality.points}")
+    return [points, *(column(kind, axis) for axis in range(3) for kind in ("rms", "max"))]
+
+
+def _reliability(patterns: Sequence[Pattern]) -> list[str]:
+    columns: list[Column] = [
+        ("redundancy", "mean", lambda quality: _fixed(quality.redundancy, 3)),
+        ("unchecked", "%", lambda quality: _fixed(100 * quality.unchecked, 0)),
+        ("detectable", "um", lambda quality: _fixed(1000 * quality.detectable, 1)),
+        ("effect", "sd", lambda quality: _fixed(quality.effect, 1)),
+    ]
+    return _side_by_side(patterns, lambda _: columns)
+
+
+def _side_by_side(patterns: Sequence[Pattern], columns: Callable[[Pattern], list[Column]]) -> list[str]:
+    """Lay out groups of points in rows, the same columns for each pattern; nothing without new points."""
+    if not any(pattern.new_points.any() for pattern in patterns):
+        return []
+
+    def lines(pattern: Pattern) -> list[str]:
+        own = columns(pattern)
+        rows = [[name for name, _, _ in own], [unit for _, unit, _ in own]]
+        rows += [[cell(each) if each.points else "-" for _, _, cell in own] for each in pattern.points]
+        return _aligned(pattern.name, rows)
+
+    groups = zip(*(pattern.points for pattern in patterns), strict=True)
+    shown = [True] * _HEAD + [any(each.points for each in group) for group in groups]
+    labels = [*[""] * _HEAD, *(each.group for each in patterns[0].points)]
+    blocks = [list(compress(lines(pattern), shown)) for pattern in patterns]
+    return _labelled(list(compress(labels, shown)), blocks)
+
+
+def _photos(patterns: Sequence[Pattern]) -> list[str]:
+    decimals = _decimals(patterns)
+    linear = patterns[0].block.linear_unit
+    weighted = any(math.isfinite(quality.redundancy) for p in patterns for quality in p.photos)
+    blocks = []
+    for pattern in patterns:
+        rows = [["rms", "max", *(["redundancy"] if weighted else [])]]
+        for k, quality in enumerate(pattern.photos):
+            factor, digits = (1.0, decimals) if k < 3 else (_ARCSEC, 2)
+            rows.append([_fixed(factor * sd, digits) for sd in (quality.rms_sd, quality.max_sd)])
+            rows[-1] += [_fixed(quality.redundancy, 3)] if weighted else []
+        blocks.append(_aligned(pattern.name, rows))
+    names = [f"{q.unknown}, {linear if k < 3 else 'arcsec'}" for k, q in enumerate(patterns[0].photos)]
+    return _labelled(["", "", *names], blocks)
+
+
+def _control(patterns: Sequence[Pattern]) -> list[str]:
+    decimals = _decimals(patterns)
+    linear = patterns[0].block.linear_unit
+    if not any(quality.held for pattern in patterns for quality in pattern.control):
+        return []
+    blocks = []
+    for pattern in patterns:
+        rows = [["held", "sd", "redundancy", "detectable", "effect"], ["", linear, "mean", linear, "sd"]]
+        rows += [
+            [
+                f"{quality.held}",
+                _fixed(quality.sd, decimals),
+                _fixed(quality.redundancy, 3),
+                _fixed(quality.detectable, decimals),
+                _fixed(quality.effect, 1),
+            ]
+            for quality in pattern.control
+        ]
+        blocks.append(_aligned(pattern.name, rows))
+    names = [quality.component for quality in patterns[0].control]
+    return _labelled(["", "", "", *names], blocks)
+
+
+def _comparison(patterns: Sequence[Pattern]) -> list[str]:
+    """Say how many times the best pattern is better than the worst."""
+    if len(patterns) < 2 or not all(pattern.new_points.any() for pattern in patterns):
+        return []
+    decimals = _decimals(patterns)
+    every = [pattern.points[-1] for pattern in patterns]
+    blocks = [[pattern.name] for pattern in patterns]
+    labels, verdicts = [""], [""]
+    for k, axis in enumerate(patterns[0].axes):
+        for kind in ("rms", "max"):
+            values = [(quality.rms_sd if kind == "rms" else quality.max_sd)[k] for quality in every]
+            best, worst = min(values), max(values)
+            better, than = (patterns[values.index(value)].name for value in (best, worst))
+            labels.append(f"{kind} {axis}, {patterns[0].block.linear_unit}")
+            verdicts.append(
+                f"{better} is {worst / best:.2f} times better than {than}"
+                if worst > _NOTICED * best
+                else "no difference"
+            )
+            for block, value in zip(blocks, values, strict=True):
+                block.append(_fixed(value, decimals))
+    return _labelled(labels, [*(_column(block) for block in blocks), verdicts])
+
+
+def _labelled(labels: list[str], blocks: list[list[str]]) -> list[str]:
+    """Put labels before the lines of blocks side by side; lines that stay empty are left out."""
+    width = max(_LABEL, *(len(label) for label in labels)) + 2
+    rows = zip(labels, *blocks, strict=True)
+    lines = [f"{label:<{width}}{_GAP.join(cells)}".rstrip() for label, *cells in rows]
+    return [line for line in lines if line]
+
+
+def _column(cells: list[str]) -> list[str]:
+    width = max(10, *(len(cell) for cell in cells))
+    return [f"{cell:>{width}}" for cell in cells]
+
+
+def _aligned(name: str, rows: list[list[str]]) -> list[str]:
+    """Right-align the columns of a pattern, two blanks between them, its name in the middle above them."""
+    widths = [max(5, *(len(row[column]) for row in rows)) for column in range(len(rows[0]))]
+    lines = ["  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]
+    width = max(len(name), len(lines[0]))
+    return [f"{name:^{width}}", *(f"{line:>{width}}" for line in lines)]
+
+
+def _decimals(patterns: Sequence[Pattern]) -> int:
+    """Decimals that give lengths at least three digits, where they are as large as an image error."""
+    return max(0, 2 - math.floor(math.log10(min(pattern.unit for pattern in patterns))))
+
+
+def _fixed(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if math.isfinite(value) else "-"
