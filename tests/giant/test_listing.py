@@ -610,17 +610,21 @@ def test_section_10_the_listing_of_the_command_is_written_without_convergence(ru
     assert "THE CHANGE OF THE LAST ITERATION" in text
 
 
-def test_section_10_the_listing_goes_over_no_other_file(run, rectangular, tmp_path):
+def test_section_10_documents_go_over_no_other_file(run, rectangular, tmp_path):
     from photogram.giant import write_project
 
     write_project(rectangular[0], tmp_path / "block")
     before = (tmp_path / "block" / "FRAMES").read_bytes()
-    for target, reason in (
-        ("block/FRAMES", "over the input"),
-        ("block-adjusted/report.txt", "another result"),
+    for arguments, reason in (
+        (("block", "--listing", "block/FRAMES"), "over the input"),
+        (("block", "--json", "block/FRAMES"), "over the input"),
+        (("check", "block", "--json", "block/FRAMES"), "over the input"),
+        (("block", "--listing", "block-adjusted/report.txt"), "another result"),
+        (("block", "--listing", "same", "--json", "same"), "another result"),
     ):
-        result = run("giant", "block", "--listing", target)
+        result = run("giant", *arguments)
         assert result.exit_code == 1
         assert reason in " ".join(result.stderr.split())
     assert (tmp_path / "block" / "FRAMES").read_bytes() == before
     assert not (tmp_path / "block-adjusted").exists()
+    assert not (tmp_path / "same").exists()

@@ -39,7 +39,10 @@ def check(
         from photogram.files import write_whole
         from photogram.giant import Limits, read_project
         from photogram.giant.checks import check as check_project
+        from photogram.giant.files import spare_input
 
+        if json is not None:
+            spare_input(json, directory)
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         with errors.status("checking", spinner="line") if not quiet else nullcontext():

@@ -146,7 +146,7 @@ def giant(
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
-        _check_listing(listing, directory, out)
+        _check_documents([path for path in (json, listing) if path is not None], directory, out)
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         block = _refracted(
@@ -196,18 +196,17 @@ def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Pat
     return out
 
 
-def _check_listing(listing: Path | None, directory: Path, out: Path) -> None:
-    """Refuse to write the listing over a file of the project, or over another result."""
+def _check_documents(documents: list[Path], directory: Path, out: Path) -> None:
+    """Refuse to write a document over a file of the project, or over another result."""
     from photogram.errors import InputError
-    from photogram.giant.files import present_files
+    from photogram.giant.files import spare_input
 
-    if listing is None:
-        return
-    inputs = [path for paths in present_files(directory).values() for path in paths]
-    if listing.exists() and any(listing.samefile(path) for path in inputs):
-        raise InputError("the listing would be written over the input", file=listing)
-    if listing.resolve() in {(out / name).resolve() for name in RESULTS}:
-        raise InputError("another result has this name", file=listing)
+    taken = {(out / name).resolve() for name in RESULTS}
+    for path in documents:
+        spare_input(path, directory)
+        if path.resolve() in taken:
+            raise InputError("another result has this name", file=path)
+        taken.add(path.resolve())
 
 
 def _refracted(

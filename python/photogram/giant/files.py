@@ -7,7 +7,7 @@ from pathlib import Path
 
 from photogram.errors import InputError
 
-__all__ = ["NAMES", "find_files", "present_files", "to_bytes", "written"]
+__all__ = ["NAMES", "find_files", "present_files", "spare_input", "to_bytes", "written"]
 
 NAMES = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")
 """The input files; they are found in any letter case and with any one extension."""
@@ -25,6 +25,19 @@ def present_files(directory: Path) -> dict[str, list[Path]]:
         if name in found and entry.is_file():
             found[name].append(entry)
     return found
+
+
+def spare_input(path: Path, directory: Path) -> None:
+    """Refuse to write a document over a file of the project in a directory.
+
+    Raises
+    ------
+    InputError
+        The path is one of its files.
+    """
+    inputs = [found for candidates in present_files(directory).values() for found in candidates]
+    if path.exists() and any(path.samefile(found) for found in inputs):
+        raise InputError("would be written over the input", file=path)
 
 
 def find_files(directory: Path) -> dict[str, Path]:
