@@ -45,8 +45,9 @@ def assemble(project: Contents) -> tuple[Block, list[Message]]:
     frames = [frame for frame, _ in photos]
     images = [image_frame for _, image_frame in photos]
 
-    index: dict[str, int] = {}
-    image_points = np.array([index.setdefault(name, len(index)) for each in images for name in each.points])
+    names = [name for each in images for name in each.points]
+    index = {name: number for number, name in enumerate(dict.fromkeys(names))}
+    image_points = np.array([index[name] for name in names])
     image_photos = np.repeat(np.arange(len(images)), [len(each.points) for each in images])
     kept = _first_images(images, image_photos, image_points, messages)
     position, sd = _control(project, index, messages)
@@ -145,14 +146,15 @@ def _first_images(
 ) -> NDArray[np.int64]:
     """Return the rows of the first image of every point on every photo, in their order."""
     pairs = image_photos * (image_points.max() + 1) + image_points
-    kept = np.sort(np.unique(pairs, return_index=True)[1])
+    order = np.argsort(pairs, kind="stable")
+    again = np.sort(order[1:][pairs[order[1:]] == pairs[order[:-1]]])
     starts = np.searchsorted(image_photos, np.arange(len(images)))
-    for row in np.setdiff1d(np.arange(len(pairs)), kept).tolist():
+    for row in again.tolist():
         frame = images[image_photos[row]]
         at = row - starts[image_photos[row]]
         text = f"the point {frame.points[at]} stands in the frame {frame.name} twice: the first image is kept"
         messages.append(_message(frame.point_record(at), text))
-    return kept
+    return np.delete(np.arange(len(pairs)), again)
 
 
 def _control(project: Contents, index: dict[str, int], messages: list[Message]) -> tuple[Floats, Floats]:

@@ -16,7 +16,6 @@ __all__ = [
     "format_angle",
     "format_deviations",
     "format_name",
-    "format_position",
     "format_real",
     "pack_dms",
     "parse_angle",
@@ -129,6 +128,8 @@ def format_real(value: float, width: int, decimals: int) -> str:
     if room < 0:
         raise ValueError(f"{value} does not fit {width} columns")
     text = f"{whole}.{fraction.rstrip('0').ljust(min(decimals, room), '0')}"
+    if text[0] == "-" and not text.strip("-.0"):
+        text = text[1:]
     return (text.replace(".", "0.") if whole in ("", "-") and len(text) < width else text).rjust(width)
 
 
@@ -170,7 +171,7 @@ def format_angle(value: float, width: int) -> str:
     if parse_angle(text, 0)[0] != value:
         text = _packed(value, width, least=4, most=5)
         if value < 0 and len(text) - 1 - text.index(".") < 4:
-            text = _packed(value + 2 * math.pi, width, least=4)
+            return format_angle(value + 2 * math.pi, width)
     return text.rjust(width)
 
 
@@ -203,14 +204,6 @@ def format_name(name: str) -> str:
     if name != name.strip(" ") or not name.isprintable() or name.startswith("****"):
         raise ValueError(f"the name {name!r} cannot be written: it would not be read again as it is")
     return name.ljust(8)
-
-
-def format_position(position: Iterable[float], geographic: bool) -> str:
-    """Write three coordinates (F12.3): X, Y, Z, or longitude and latitude (rad) and height."""
-    first, second, third = position
-    if not geographic:
-        return "".join(format_real(value, 12, 3) for value in (first, second, third))
-    return format_angle(first, 12) + format_angle(second, 12) + format_real(third, 12, 3)
 
 
 def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:

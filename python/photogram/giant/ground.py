@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from photogram.giant.fields import format_deviations, format_name, format_position
+from photogram.giant.columns import Columns, deviation_fields, position_fields, texts
+from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
 
 __all__ = ["CHECK_POINT", "GroundPoint", "ground_records", "parse_ground"]
@@ -54,17 +55,18 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
     """
     points: list[GroundPoint] = []
     spellings: dict[str, Record] = {}
-    for record in source.filled():
+    records = source.filled()
+    columns = Columns([record.text for record in records])
+    plain = columns.rows(columns.position(geographic), columns.deviations(geographic, geographic, False))
+    for record, values in zip(records, plain, strict=True):
         name = record.identification(spellings)
         if not name:
             raise record.error("columns 1-8: the point has no name")
-        point = GroundPoint(
-            name,
+        position, sd = values or (
             record.position(geographic),
             record.deviations(geographic, geographic, False),
-            record.integer(80, 80),
-            record,
         )
+        point = GroundPoint(name, position, sd, record.integer(80, 80), record)
         if not 0 <= point.type_code <= CHECK_POINT:
             raise record.error(f"column 80: the type code {point.type_code} is not one of 0 to 7")
         if spellings[name] is not record:
@@ -85,9 +87,15 @@ def ground_records(points: Iterable[GroundPoint], geographic: bool) -> list[str]
     ValueError
         A name or a number does not fit its field.
     """
+    points = list(points)
+    rows = zip(
+        points,
+        texts(position_fields([point.position for point in points], geographic)),
+        deviation_fields([point.sd for point in points], (geographic, geographic, False)),
+        strict=True,
+    )
     records = []
-    for point in points:
-        record = format_name(point.name) + format_position(point.position, geographic)
-        record += format_deviations(point.sd, (geographic, geographic, False))
+    for point, position, sd in rows:
+        record = format_name(point.name) + position + sd
         records.append(f"{record:79}{point.type_code}" if point.type_code else record.rstrip())
     return records

@@ -167,6 +167,10 @@ class Record:
             raise self.error("columns 21-32: the latitude is beyond 90 degrees")
         return longitude, latitude, height
 
+    def attitude(self) -> tuple[float, float, float]:
+        """Read columns 9-44 as omega, phi and kappa in radians."""
+        return self.angle(9, 20), self.angle(21, 32), self.angle(33, 44)
+
     def deviations(self, *angles: bool) -> tuple[float, float, float]:
         """Read the three standard deviations of columns 45-74; `angles` says which are DMS."""
         first, second, third = angles
