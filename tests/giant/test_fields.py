@@ -201,7 +201,7 @@ def test_seconds_round_up_into_minutes_and_degrees():
     assert format_angle(math.radians(29 + 59 / 60 + 59.9999999 / 3600), 12) == " 300000.0000"
 
 
-@pytest.mark.parametrize("angle", [6.3, -6.3, math.inf])
+@pytest.mark.parametrize("angle", [6.301, -6.301, math.inf])
 def test_angles_beyond_the_circle_are_refused(angle):
     with pytest.raises(ValueError, match="360 degrees"):
         format_angle(angle, 12)

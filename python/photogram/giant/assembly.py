@@ -19,6 +19,7 @@ from photogram.messages import Message
 if TYPE_CHECKING:
     from photogram.giant.common import Common
     from photogram.giant.contents import Contents
+    from photogram.giant.ground import GroundPoint
 
 __all__ = ["assemble"]
 
@@ -161,6 +162,7 @@ def _control(project: Contents, index: dict[str, int], messages: list[Message]) 
     """Return positions and standard deviations of all points: those of GROUND where it has any."""
     position = np.full((len(index), 3), np.nan)
     sd = np.full((len(index), 3), np.inf)
+    control: dict[int, GroundPoint] = {}
     for point in project.ground:
         row = index.get(point.name)
         if row is None:
@@ -168,10 +170,15 @@ def _control(project: Contents, index: dict[str, int], messages: list[Message]) 
                 _message(point.record, f"control point {point.name} is not photographed: ignored")
             )
             continue
-        held = np.array(point.held)
+        control[row] = point
+    if control:
+        rows = list(control)
+        values = np.array([point.position for point in control.values()])
+        held = np.array([point.held for point in control.values()])
         # The field of an unheld component may hold nothing: blanks or zero are no value to compare with.
-        position[row] = np.where(held | (np.array(point.position) != 0), point.position, np.nan)
-        sd[row] = np.where(held, _or_default(point.sd, project.common.default_control_sd), np.inf)
+        position[rows] = np.where(held | (values != 0), values, np.nan)
+        weights = _or_default([point.sd for point in control.values()], project.common.default_control_sd)
+        sd[rows] = np.where(held, weights, np.inf)
     if not np.isfinite(sd).any():
         record = next((point.record for point in project.ground if point.record), None)
         path = record.source.path if record else project.directory

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.giant.fields import ARCSEC, format_angle, format_deviations, format_real
+from photogram.giant.fields import ARCSEC, MOST_ANGLE, format_angle, format_deviations, format_real
 
 __all__ = ["Columns", "angle_fields", "deviation_fields", "position_fields", "real_fields", "texts"]
 
@@ -187,7 +187,7 @@ def angle_fields(values: ArrayLike, width: int) -> Table:
 
 def _angles(values: Floats, width: int) -> Table:
     negative, size = values < 0, np.abs(values)
-    plain = size <= 2 * math.pi
+    plain = size <= MOST_ANGLE
     seconds = np.where(plain, size, 0.0) / ARCSEC
     room = width - 1 - negative
     whole = np.searchsorted(

@@ -13,6 +13,7 @@ from decimal import Decimal
 
 __all__ = [
     "ARCSEC",
+    "MOST_ANGLE",
     "format_angle",
     "format_deviations",
     "format_name",
@@ -27,6 +28,9 @@ __all__ = [
 
 ARCSEC = math.pi / 648000.0
 """One second of arc in radians."""
+
+MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC
+"""The largest angle that is written: 360 59 59, for a field may have 360 degrees and minutes besides."""
 
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d{1,2}))?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
@@ -177,7 +181,7 @@ def format_angle(value: float, width: int) -> str:
 
 def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
     """Write radians as packed DMS with `least` to `most` decimals of the second, as far as they fit."""
-    if not abs(value) <= 2 * math.pi:
+    if not abs(value) <= MOST_ANGLE:
         raise ValueError(f"{value} rad is beyond 360 degrees")
     arcseconds = Decimal(repr(float(value) / ARCSEC))
     places, excess = min(most, width - 2) + 1, 1

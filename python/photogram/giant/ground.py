@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from photogram.giant.columns import Columns, deviation_fields, position_fields, texts
 from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
@@ -15,7 +17,7 @@ CHECK_POINT = 7
 """The type code of a point of which nothing is held."""
 
 
-@dataclass
+@dataclass(slots=True)
 class GroundPoint:
     """One point of GROUND.
 
@@ -53,30 +55,34 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
     InputError
         A field that is no number or no angle, a type code above 7, or a point without a name.
     """
-    points: list[GroundPoint] = []
-    spellings: dict[str, Record] = {}
     records = source.filled()
+    names = source.point_names([record.number for record in records])
     columns = Columns([record.text for record in records])
-    plain = columns.rows(columns.position(geographic), columns.deviations(geographic, geographic, False))
-    for record, values in zip(records, plain, strict=True):
-        name = record.identification(spellings)
-        if not name:
-            raise record.error("columns 1-8: the point has no name")
-        position, sd = values or (
+    plain = columns.rows(
+        columns.position(geographic),
+        columns.deviations(geographic, geographic, False),
+        columns.real(80, 80, 0)[:, np.newaxis],
+    )
+    points: dict[str, GroundPoint] = {}
+    for record, name, values in zip(records, names, plain, strict=True):
+        position, sd, (type_code,) = values or (
             record.position(geographic),
             record.deviations(geographic, geographic, False),
+            (record.integer(80, 80),),
         )
-        point = GroundPoint(name, position, sd, record.integer(80, 80), record)
-        if not 0 <= point.type_code <= CHECK_POINT:
+        point = GroundPoint(name, position, sd, int(type_code), record)
+        if point.type_code > CHECK_POINT:
             raise record.error(f"column 80: the type code {point.type_code} is not one of 0 to 7")
-        if spellings[name] is not record:
-            record.remark(f"duplicate control point {name}: record {spellings[name].number} is kept")
+        first = points.setdefault(name, point)
+        if first is not point and first.record is not None:
+            record.remark(f"duplicate control point {name}: record {first.record.number} is kept")
             continue
-        for held, first in zip(point.held, (9, 21, 33), strict=True):
-            if held and record.blank(first, first + 11):
-                record.remark(f"columns {first}-{first + 11}: the blank component of {name} is held at zero")
-        points.append(point)
-    return points
+        for held, value, column in zip(point.held, position, (9, 21, 33), strict=True):
+            if held and value == 0 and record.blank(column, column + 11):
+                record.remark(
+                    f"columns {column}-{column + 11}: the blank component of {name} is held at zero"
+                )
+    return list(points.values())
 
 
 def ground_records(points: Iterable[GroundPoint], geographic: bool) -> list[str]:

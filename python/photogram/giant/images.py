@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.giant.columns import Columns, deviation_fields, real_fields, texts
-from photogram.giant.fields import format_name, parse_name
+from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
 
 __all__ = ["IMAGE_SD", "ImageFrame", "image_records", "parse_images"]
@@ -82,7 +82,7 @@ def parse_images(source: Source) -> list[ImageFrame]:
     points[starts[:-1]] = False
     point_rows = np.flatnonzero(points)
     point_numbers = [numbers[row] for row in point_rows.tolist()]
-    names = _point_names(source, point_numbers)
+    names = source.point_names(point_numbers)
     xy = _coordinates(source, point_numbers)
 
     frames = []
@@ -108,17 +108,6 @@ def parse_images(source: Source) -> list[ImageFrame]:
         frame.record, frame.numbers = header, point_numbers[first:last]
         frames.append(frame)
     return frames
-
-
-def _point_names(source: Source, numbers: list[int]) -> list[str]:
-    fields = [source.lines[number - 1][:8].rstrip(" ") for number in numbers]
-    names = {text: parse_name(text, source.strip) for text in set(fields)}
-    if len(set(names.values())) < len(names) or "" in names:
-        spellings: dict[str, Record] = {}
-        for number in numbers:
-            if not source.record(number).identification(spellings):
-                raise source.record(number).error("columns 1-8: the point has no name")
-    return [names[text] for text in fields]
 
 
 def _coordinates(source: Source, numbers: list[int]) -> NDArray[np.float64]:

@@ -77,12 +77,29 @@ class Source:
         """Return the records that are not blank."""
         return [Record(self, number) for number, line in enumerate(self.lines, 1) if line.strip(" ")]
 
+    def point_names(self, numbers: list[int]) -> list[str]:
+        """Read the names of points in columns 1-8 of many records.
+
+        Raises
+        ------
+        InputError
+            A point without a name, or a second spelling of one name.
+        """
+        fields = [self.lines[number - 1][:8].rstrip(" ") for number in numbers]
+        names = {text: parse_name(text, self.strip) for text in set(fields)}
+        if len(set(names.values())) < len(names) or "" in names:
+            spellings: dict[str, Record] = {}
+            for number in numbers:
+                if not self.record(number).identification(spellings):
+                    raise self.record(number).error("columns 1-8: the point has no name")
+        return [names[text] for text in fields]
+
     def error(self, text: str) -> InputError:
         """Return an error about the file as a whole."""
         return InputError(text, file=self.path)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Record:
     """One record; columns are counted from 1, first and last included."""
 
