@@ -38,7 +38,7 @@ def sources(fields):
     return Source(Path("FILE"), [f"{field:12}" for field in fields])
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(FIELDS)
 def test_plain_numbers_are_read_as_one_by_one(fields):
     source, columns = sources(fields), Columns([f"{field:12}" for field in fields])
@@ -55,7 +55,7 @@ def test_plain_numbers_are_read_as_one_by_one(fields):
         assert source.messages or set("EeDd") & set(fields[row])
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(FIELDS)
 def test_plain_angles_are_read_as_one_by_one(fields):
     source, columns = sources(fields), Columns([f"{field:12}" for field in fields])
@@ -87,7 +87,7 @@ def test_what_is_not_plain():
     assert beyond.plain.tolist() == [False, True, True]
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(numbers, min_size=1, max_size=20), st.sampled_from([(10, 3), (12, 3), (10, 2)]))
 def test_numbers_are_written_as_one_by_one(values, size):
     width, decimals = size
@@ -96,7 +96,7 @@ def test_numbers_are_written_as_one_by_one(values, size):
     assert together == [format_real(value, width, decimals) for value in values]
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(angles, min_size=1, max_size=20))
 def test_angles_are_written_as_one_by_one(values):
     assert texts(angle_fields(np.array(values)[:, np.newaxis], 12)) == [

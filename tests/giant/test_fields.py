@@ -13,6 +13,7 @@ from photogram.giant.fields import (
     format_angle,
     format_deviations,
     format_name,
+    format_principal_distance,
     format_real,
     parse_angle,
     parse_integer,
@@ -215,6 +216,14 @@ def test_deviations():
     for value in (-0.1, 1e-12, 1e12, math.nan):
         with pytest.raises(ValueError, match=r"cannot be written|does not fit"):
             format_deviations((value,), (False,))
+
+
+def test_principal_distances():
+    assert format_principal_distance(0.0) == " " * 10
+    assert format_principal_distance(-152.74) == "  -152.740"
+    for value in (1e-12, -1e-12, math.nan, 1e12):
+        with pytest.raises(ValueError, match=r"cannot be written|does not fit"):
+            format_principal_distance(value)
 
 
 def test_names_are_written_as_they_are_read():

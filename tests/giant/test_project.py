@@ -18,6 +18,7 @@ from small_project import (
     frame_record,
     ground_record,
     replaced,
+    same,
     write_files,
 )
 
@@ -244,17 +245,6 @@ def test_the_remarks_of_all_files_are_collected(tmp_path):
 
 
 # Round trips
-
-
-def same(one, other):
-    assert one.common == other.common
-    assert one.cameras == other.cameras
-    assert one.frames == other.frames
-    assert one.ground == other.ground
-    for a, b in zip(one.images, other.images, strict=True):
-        assert (a.name, a.points, a.sd, a.camera) == (b.name, b.points, b.sd, b.camera)
-        assert a.principal_distance == b.principal_distance
-        assert a.xy.tolist() == b.xy.tolist()
 
 
 def test_read_write_read_gives_the_same_numbers(tmp_path):

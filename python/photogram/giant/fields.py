@@ -17,6 +17,7 @@ __all__ = [
     "format_angle",
     "format_deviations",
     "format_name",
+    "format_principal_distance",
     "format_real",
     "pack_dms",
     "parse_angle",
@@ -210,6 +211,26 @@ def format_name(name: str) -> str:
     return name.ljust(8)
 
 
+def format_principal_distance(value: float) -> str:
+    """Write a principal distance (F10.3); zero, which stands for that of the camera, as blanks.
+
+    Raises
+    ------
+    ValueError
+        The value does not fit, or is so small that it would turn into zero.
+    """
+    if value == 0:
+        return " " * 10
+    field = format_real(value, 10, 3)
+    if not _significant(field):
+        raise ValueError(f"the principal distance {value} cannot be written in ten columns")
+    return field
+
+
+def _significant(field: str) -> bool:
+    return any(digit in field for digit in "123456789")
+
+
 def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
     """Write standard deviations, F10.3 or DMS; zero, which stands for the default, as blanks.
 
@@ -224,7 +245,7 @@ def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
             fields.append(" " * 10)
             continue
         field = _packed(value, 10, least=3).rjust(10) if angle else format_real(value, 10, 3)
-        if not value > 0 or not any(digit in field for digit in "123456789"):
+        if not value > 0 or not _significant(field):
             raise ValueError(f"the standard deviation {value} cannot be written in ten columns")
         fields.append(field)
     return "".join(fields)

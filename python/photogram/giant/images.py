@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.giant.columns import Columns, deviation_fields, real_fields, texts
-from photogram.giant.fields import format_name
+from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 
 __all__ = ["IMAGE_SD", "ImageFrame", "image_records", "parse_images"]
@@ -141,15 +141,13 @@ def image_records(frames: Iterable[ImageFrame]) -> list[str]:
     """
     frames = list(frames)
     xy = texts(real_fields(np.concatenate([np.empty((0, 2)), *(frame.xy for frame in frames)]), 10, 3))
-    distances = texts(
-        real_fields(np.array([frame.principal_distance for frame in frames]).reshape(-1, 1), 10, 3)
-    )
+    distances = {value: format_principal_distance(value) for value in {f.principal_distance for f in frames}}
     deviations = deviation_fields([frame.sd for frame in frames], (False, False))
     names = {name: format_name(name) for name in {name for frame in frames for name in frame.points}}
     records = []
     first = 0
-    for frame, distance, sd in zip(frames, distances, deviations, strict=True):
-        distance = distance if frame.principal_distance else " " * 10
+    for frame, sd in zip(frames, deviations, strict=True):
+        distance = distances[frame.principal_distance]
         records.append(f"{format_name(frame.name)}  {distance}{sd}{format_name(frame.camera)}".rstrip())
         last = first + len(frame.points)
         records += [f"{names[name]}  {both}" for name, both in zip(frame.points, xy[first:last], strict=True)]
