@@ -94,7 +94,9 @@ def test_integers():
             parse_integer(field)
 
 
-@pytest.mark.parametrize("field", ["3610000.000", "-3610000.", "16100.", "61.000", "-60.001", "3610000000"])
+@pytest.mark.parametrize(
+    "field", ["3610000.000", "-3610000.", "16100.", "61.000", "-60.001", "3610000000", "1E99", "-1.E9"]
+)
 def test_illegal_angles(field):
     with pytest.raises(ValueError, match="ILLEGAL DMS FIELD"):
         parse_angle(field, 3)

@@ -77,7 +77,8 @@ class Columns:
     def deviation(self, first: int, last: int, *, angle: bool = False) -> Floats:
         """Read standard deviations; zero stands for the default."""
         values = self.angle(first, last) if angle else self.real(first, last)
-        self.plain &= values >= 0
+        # Smaller angles could not be written again.
+        self.plain &= (values == 0) | (values > (1e-8 * ARCSEC if angle else 0))
         return values
 
     def position(self, geographic: bool) -> Floats:

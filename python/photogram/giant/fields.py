@@ -33,6 +33,9 @@ ARCSEC = math.pi / 648000.0
 MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC
 """The largest angle that is written: 360 59 59, for a field may have 360 degrees and minutes besides."""
 
+LARGEST_PACKED = 10**8
+"""Far beyond every angle, and well within what decimal arithmetic divides."""
+
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d{1,2}))?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 
@@ -96,7 +99,12 @@ def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
         The field is no number, or has more than 360 degrees, 60 minutes or 60 seconds: the guide's fatal
         ILLEGAL DMS FIELD.
     """
-    sign, degrees, minutes, seconds = unpack_dms(parse_real(field, decimals))
+    packed = parse_real(field, decimals)
+    if abs(packed) > LARGEST_PACKED:
+        raise ValueError(
+            f"ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is beyond 360 degrees"
+        )
+    sign, degrees, minutes, seconds = unpack_dms(packed)
     if degrees > 360 or minutes > 60 or seconds > 60:
         raise ValueError(
             f"ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is"

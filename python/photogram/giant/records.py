@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from photogram.errors import InputError
-from photogram.giant.fields import parse_angle, parse_integer, parse_name, parse_real
+from photogram.giant.fields import format_deviations, parse_angle, parse_integer, parse_name, parse_real
 from photogram.messages import Message
 
 __all__ = ["Record", "Source"]
@@ -173,6 +173,11 @@ class Record:
         value = self.angle(first, last) if angle else self.real(first, last)
         if value < 0:
             raise self.error(f"columns {first}-{last}: the standard deviation is negative")
+        try:
+            format_deviations((value,), (angle,))
+        except ValueError:
+            # An exponent can say what the output files, which repeat it, could not.
+            raise self.error(f"columns {first}-{last}: the standard deviation is out of range") from None
         return value
 
     def position(self, geographic: bool) -> tuple[float, float, float]:
