@@ -148,15 +148,16 @@ def directory(tmp_path_factory):
     return tmp_path_factory.mktemp("project")
 
 
-@settings(max_examples=100, deadline=None)
+@pytest.mark.giant("2", "a project that is read, written and read again has the same numbers")
+@settings(max_examples=50, deadline=None)
 @given(projects(exact=True))
-def test_numbers_that_fit_come_back_to_the_last_bit(directory, project):
+def test_section_2_numbers_that_fit_come_back_to_the_last_bit(directory, project):
     again, first = written_and_read(project, directory)
     same(again, project)
     assert written_and_read(again, directory)[1] == first
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(projects(exact=False))
 def test_any_numbers_come_back_rounded_and_then_stay(directory, project):
     once, first = written_and_read(project, directory)

@@ -28,6 +28,14 @@ Floats = NDArray[np.float64]
 LONGEST_METRES = 1e7
 """No semi-major axis in metres is longer than this; in feet all are."""
 
+EARTH_RADIUS = 6.37e6
+FALSE_ORIGIN = 1e5
+"""Coordinates in a map projection are longer than this, in metres; those of local systems rarely are."""
+HIGHEST = 2e4
+"""No aeroplane is higher, in metres; two geocentric coordinates of three are larger nearly everywhere."""
+LEAST_FALL = 0.01
+"""A fall of the curved earth worth a remark, in metres."""
+
 
 def assemble(project: Contents) -> tuple[Block, list[Message]]:
     """Return the block of a project, and the remarks on what was left out or deserves a look.
@@ -52,10 +60,13 @@ def assemble(project: Contents) -> tuple[Block, list[Message]]:
     image_photos = np.repeat(np.arange(len(images)), [len(each.points) for each in images])
     kept = _first_images(images, image_photos, image_points, messages)
     position, sd = _control(project, index, messages)
+    stations = np.array([frame.position for frame in frames])
+    if not common.geographic:
+        messages += _flat_earth(stations)
     return (
         Block(
             photo_ids=[frame.name for frame in frames],
-            photo_positions=_longitudes(np.array([frame.position for frame in frames]), common.geographic),
+            photo_positions=_longitudes(stations, common.geographic),
             photo_attitudes=np.array([frame.attitude for frame in frames]),
             principal_distances=_principal_distances(project, images),
             point_ids=list(index),
@@ -184,6 +195,21 @@ def _control(project: Contents, index: dict[str, int], messages: list[Message]) 
         path = record.source.path if record else project.directory
         messages.append(Message("GROUND holds no component of a photographed point", path))
     return position, sd
+
+
+def _flat_earth(stations: Floats) -> list[Message]:
+    """Remark on rectangular coordinates that look like those of a map projection (State Plane, UTM).
+
+    Their false eastings and northings are long, and their third axis is a height. Geocentric and local
+    systems are legitimate (GIANT guide, section II.A).
+    """
+    longest = np.abs(stations).max(axis=0)
+    reach = np.hypot(*(stations - stations.mean(axis=0))[:, :2].T).max()
+    fall = reach**2 / (2 * EARTH_RADIUS)
+    if longest[:2].max() < FALSE_ORIGIN or longest[2] > HIGHEST or fall < LEAST_FALL:
+        return []
+    text = "the coordinates look like those of a map projection: the curvature of the earth is not modelled,"
+    return [Message(f"{text} which falls {fall:.2g} m from the middle of the stations to the outermost")]
 
 
 def _or_default(values: ArrayLike, default: ArrayLike) -> Floats:
