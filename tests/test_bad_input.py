@@ -319,6 +319,10 @@ def one_more(block: Block, held: list[bool]) -> Block:
     )
 
 
+@pytest.mark.giant("6", "pass points on one photograph are dropped")
+@pytest.mark.giant(
+    "6", "control on one photograph with more than one missing component loses its control data"
+)
 @pytest.mark.parametrize(
     ("held", "reason"),
     [
@@ -327,7 +331,7 @@ def one_more(block: Block, held: list[bool]) -> Block:
         ([True, False, False], "control point on one photo"),
     ],
 )
-def test_points_on_one_photo_are_left_out(small_block, held, reason):
+def test_section_6_points_on_one_photo_are_left_out(small_block, held, reason):
     result = adjust(one_more(small_block, held))
     assert result.converged
     assert result.dropped == {"ONE": reason}
@@ -340,8 +344,10 @@ def test_points_on_one_photo_are_left_out(small_block, held, reason):
     assert result.degrees_of_freedom == alone.degrees_of_freedom
 
 
+@pytest.mark.giant("6", "control on one photograph with at most one missing component stays")
+@pytest.mark.giant("14", "21 control on one photograph with at most one missing component keeps its data")
 @pytest.mark.parametrize("held", [[True, True, False], [False, True, True], [True, True, True]])
-def test_control_on_one_photo_with_one_component_missing_stays(small_block, held):
+def test_section_6_control_on_one_photo_with_one_component_missing_stays(small_block, held):
     result = adjust(one_more(small_block, held))
     assert result.converged
     assert not result.dropped

@@ -76,7 +76,11 @@ def test_version_and_usage(run):
 # giant
 
 
-def test_a_project_is_adjusted(run, project, tmp_path):
+@pytest.mark.giant("2", "unit 6: printout")
+@pytest.mark.giant("2", "unit 8: updated FRAMES, only when the solution converges")
+@pytest.mark.giant("2", "units 11-19: no scratch files are left")
+@pytest.mark.giant("2", "units 8 and 20 are readable as unit 3")
+def test_section_2_a_project_is_adjusted(run, project, tmp_path):
     before = {path.name: path.read_bytes() for path in project.iterdir()}
     result = run("giant", project, "--json", tmp_path / "result.json")
     assert result.exit_code == 0, result.output
@@ -113,7 +117,9 @@ def test_a_restart_needs_fewer_iterations(run, project, tmp_path):
     )
 
 
-def test_save_flags_of_common(run, project, tmp_path):
+@pytest.mark.giant("2", "units 8 and 9: save flags, COMMON columns 9 and 7")
+@pytest.mark.giant("14", "2 column 9: 1 does not save")
+def test_section_2_save_flags_of_common(run, project, tmp_path):
     damage(project / "COMMON", "0100000000100", "0100001010100")
     assert run("giant", project, "--quiet").exit_code == 0
     assert names(tmp_path / "block-adjusted") == {"RESTART", "report.txt"}
@@ -124,7 +130,10 @@ def test_quiet_prints_nothing(run, project):
     assert (result.exit_code, result.output) == (0, "")
 
 
-def test_as_published_stops_at_the_limit_of_common(run, project, tmp_path):
+@pytest.mark.giant("2", "unit 20: updated FRAMES, always written")
+@pytest.mark.giant("6", "iteration limit: column 14, default 4")
+@pytest.mark.giant("14", "5 not converged at the limit: unit 20 only")
+def test_section_2_as_published_stops_at_the_limit_of_common(run, project, tmp_path):
     common = project / "COMMON"
     title, job = common.read_text().splitlines()
     common.write_text(f"{title}\n{job[:13]}1{job[14:]}\n")
@@ -136,7 +145,8 @@ def test_as_published_stops_at_the_limit_of_common(run, project, tmp_path):
     assert run("giant", project).exit_code == 0
 
 
-def test_intersection_only_leaves_the_stations(run, project, tmp_path):
+@pytest.mark.giant("6", "stations are never held exactly; fixed only in intersection mode")
+def test_section_6_intersection_only_leaves_the_stations(run, project, tmp_path):
     title, job = (project / "COMMON").read_text().splitlines()
     (project / "COMMON").write_text(f"{title}\n{job[:9]}1{job[10:]}\n")
     assert run("giant", project, "--quiet").exit_code == 0

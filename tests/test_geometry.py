@@ -34,8 +34,9 @@ def station(frame: str) -> tuple[np.ndarray, np.ndarray]:
     return position, np.radians([values["omega"], values["phi"], values["kappa"]])
 
 
+@pytest.mark.giant("15", "projections")
 @pytest.mark.parametrize("case", GOLDEN["projection"], ids=lambda case: f"{case['frame']}-{case['point']}")
-def test_projections_of_the_giant_sample(case):
+def test_section_15_projections_of_the_giant_sample(case):
     position, attitude = station(case["frame"])
     lon, lat, height = listed("ground_adjusted.csv", "point", case["point"], ["lon_deg", "lat_deg", "elev_m"])
     xy = geometry.project(
@@ -57,8 +58,9 @@ def test_the_senses_of_the_angles_are_transposes():
     np.testing.assert_allclose(angles[0], case["ground_to_photo_deg"], rtol=0, atol=case["tol_deg"])
 
 
+@pytest.mark.giant("5", "inverse: omega, phi, kappa from M")
 @given(st.tuples(st.floats(-3.14, 3.14), st.floats(-1.5, 1.5), st.floats(-3.14, 3.14)))
-def test_angles_come_back(angles):
+def test_section_5_angles_come_back(angles):
     matrices = geometry.rotation_matrix([angles])
     np.testing.assert_allclose(matrices[0] @ matrices[0].T, np.eye(3), atol=1e-15)
     np.testing.assert_allclose(geometry.rotation_angles(matrices)[0], angles, rtol=0, atol=1e-13)
@@ -72,7 +74,10 @@ def test_geographic_positions_come_back(lon, lat, height):
     np.testing.assert_allclose(again, xyz, rtol=1e-15, atol=4e-9)
 
 
-def test_rectangular_projection_written_out():
+@pytest.mark.giant("4", "rectangular: axes of the object space")
+@pytest.mark.giant("5", "collinearity with signed principal distance")
+@pytest.mark.giant("2.3", "principal distance negative in the positive plane, positive in the negative plane")
+def test_section_4_rectangular_projection_written_out():
     # Straight down from 1000 m with 100 mm: 1 mm on the photo is 10 m on the ground; y follows north, x east.
     for c, sign in ((-100.0, 1), (100.0, -1)):
         xy = geometry.project([[510.0, 220.0, 0.0]], [[500.0, 200.0, 1000.0]], [[0.0, 0.0, 0.0]], [c])

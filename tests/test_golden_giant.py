@@ -50,7 +50,8 @@ def one_point(case: dict[str, Any], position: Any, sd: Any) -> Result:
     return result
 
 
-def test_pass_point_on_two_photos():
+@pytest.mark.giant("15", "126!: two-ray intersection")
+def test_section_15_pass_point_on_two_photos():
     case = GOLDEN["two_ray_pass_point"]
     result = one_point(case, [np.nan] * 3, [np.inf] * 3)
     longitude, latitude, height = result.point_positions[0]
@@ -66,7 +67,8 @@ def test_pass_point_on_two_photos():
     assert (result.degrees_of_freedom, result.point_rays.tolist()) == (1, [2])
 
 
-def test_planimetric_control_on_two_photos():
+@pytest.mark.giant("15", "SH960801: held planimetry")
+def test_section_15_planimetric_control_on_two_photos():
     case = GOLDEN["two_ray_planimetric_control"]
     control = case["control"]
     sd = control["sd_arcsec"] / ARCSEC
@@ -84,7 +86,9 @@ def test_planimetric_control_on_two_photos():
     assert result.degrees_of_freedom == 4 + 2 - 3
 
 
-def test_vertical_control_on_three_photos():
+@pytest.mark.giant("15", "SH960202: held height")
+@pytest.mark.giant("15", "covariances scaled by the unit variance 0.921")
+def test_section_15_vertical_control_on_three_photos():
     case = GOLDEN["three_ray_vertical_control"]
     held = [np.nan, np.nan, case["height_held_at_m"]]
     result = one_point(case, held, [np.inf, np.inf, case["sd_height_m"]])
@@ -130,7 +134,13 @@ def table_e1_block() -> Block:
     )
 
 
-def test_degrees_of_freedom_of_table_e1():
+@pytest.mark.giant("7", "0 free: n = m + c, u = s + p, plates and ground")
+@pytest.mark.giant("7", "1 constrained: n = m + c + s, u = s + p, plates, ground and camera")
+@pytest.mark.giant("7", "2: unit variance 1")
+@pytest.mark.giant("7", "table E.1")
+@pytest.mark.giant("14", "32 mode 2 prints the degrees of freedom of mode 0")
+@pytest.mark.giant("15", "table E.1")
+def test_section_7_degrees_of_freedom_of_table_e1():
     table = GOLDEN["unit_variance_table_E1"]
     block = table_e1_block()
     assert np.bincount(block.image_photos).tolist() == table["images_per_photo"]
@@ -156,8 +166,10 @@ def test_degrees_of_freedom_of_table_e1():
         np.testing.assert_array_equal(free.point_cofactors, other.point_cofactors)
 
 
+@pytest.mark.giant("6", "weighted sum of squares of plates, held ground components and camera components")
+@pytest.mark.giant("14", "6 the sum is the total, listed in three parts")
 @pytest.mark.parametrize("mode", ["free", "constrained"])
-def test_sums_of_squares_are_those_of_the_residuals(mode):
+def test_section_6_sums_of_squares_are_those_of_the_residuals(mode):
     block = table_e1_block()
     result = adjust(block, unit_variance=mode)
     sums = result.sums_of_squares
@@ -170,8 +182,9 @@ def test_sums_of_squares_are_those_of_the_residuals(mode):
     assert sums.total == sums.camera + sums.ground + sums.plates
 
 
+@pytest.mark.giant("9", "blocks of the inverse normals times the unit variance")
 @pytest.mark.parametrize("mode", ["free", "constrained", "unity"])
-def test_covariances_are_cofactors_times_the_variance_of_unit_weight(mode):
+def test_section_9_covariances_are_cofactors_times_the_variance_of_unit_weight(mode):
     result = adjust(table_e1_block(), unit_variance=mode)
     assert result.variance_of_unit_weight == result.covariance_scale
     np.testing.assert_array_equal(
@@ -184,7 +197,8 @@ def test_covariances_are_cofactors_times_the_variance_of_unit_weight(mode):
     np.testing.assert_array_equal(result.photo_sd, np.sqrt(diagonal))
 
 
-def test_without_degrees_of_freedom_covariances_are_cofactors():
+@pytest.mark.giant("7", "degrees of freedom not positive: reported, undefined, scale 1")
+def test_section_7_without_degrees_of_freedom_covariances_are_cofactors():
     # Two photos without control: the weights of the photos determine them, but do not count.
     block = simulate(
         strips=1, photos_per_strip=2, points_per_photo=6, control="none", position_sd=30.0, attitude_sd=0.01
@@ -203,7 +217,9 @@ def listed_covariances() -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def test_standard_deviations_of_the_listing_follow_from_its_covariances():
+@pytest.mark.giant("15", "standard deviations from covariances")
+@pytest.mark.giant("9", "ground point: 3x3 covariance with standard deviations")
+def test_section_15_standard_deviations_of_the_listing_follow_from_its_covariances():
     rows = listed_covariances()
     assert len(rows) == 14
     covariances = np.zeros((14, 3, 3))

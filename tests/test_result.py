@@ -90,7 +90,9 @@ def test_shapes(result):
     assert np.isnan(result.point_positions[-1]).all()
 
 
-def test_residuals_are_observed_minus_computed(result):
+@pytest.mark.giant("4", "the local frame moves with the station during iteration")
+@pytest.mark.giant("14", "19 residuals are observed minus computed")
+def test_section_4_residuals_are_observed_minus_computed(result):
     block, used = result.block, result.used_images
     photos, points = block.image_photos[used], block.image_points[used]
     computed = project(
@@ -114,7 +116,8 @@ def test_kinds_and_rays(result):
     assert dict(result.dropped) == {"SINGLE": "pass point on one photo"}
 
 
-def test_without_covariance(result):
+@pytest.mark.giant("14", "22 column 12 acts without propagation")
+def test_section_14_without_covariance(result):
     bare = adjust(result.block, covariance=False)
     np.testing.assert_array_equal(bare.photo_positions, result.photo_positions)
     np.testing.assert_array_equal(bare.residuals, result.residuals)
@@ -174,7 +177,8 @@ def test_image_table(result):
     assert row["point"] == result.block.point_ids[result.block.image_points[17]]
 
 
-def test_check_table(result):
+@pytest.mark.giant("14", "9 code 7: check point")
+def test_section_14_check_table(result):
     table = result.check_table()
     assert len(table) == 4
     check = result.point_kinds == "check"
@@ -229,7 +233,8 @@ def test_the_report_says_when_the_adjustment_failed(result):
     assert sections(adjust(clean).report())["Problems"] == ["none"]
 
 
-def test_the_report_counts_and_weighs(result):
+@pytest.mark.giant("7", "degrees of freedom n - u; variance and its square root are printed")
+def test_section_7_the_report_counts_and_weighs(result):
     lines = "\n".join(sections(result.report())["Adjustment"])
     for name, value in {
         "status": "converged",

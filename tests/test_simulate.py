@@ -147,7 +147,8 @@ def test_the_origin_moves_the_block_only():
     np.testing.assert_allclose(there.truth.image_xy, here.truth.image_xy, atol=1e-9)
 
 
-def test_geographic_space_is_rectangular_space_but_for_the_curvature():
+@pytest.mark.giant("4", "geographic: the curvature of the earth is inherent")
+def test_section_4_geographic_space_is_rectangular_space_but_for_the_curvature():
     plane, globe = (
         simulate(strips=2, photos_per_strip=3, seed=2, **SPACES[name]).truth
         for name in ("rectangular", "geographic, photo-to-ground")

@@ -12,12 +12,18 @@ MOST_NAMES = 12
 
 
 def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
-    """Put the place (file, record number, record text) before and after a message."""
+    """Put the place (file, record number, record text) before and after a message.
+
+    Characters that do not print, which could do anything to a terminal, stand there as U+FFFD, one for one.
+    """
     place = ", ".join(
         part for part in (str(file) if file else "", f"record {record}" if record else "") if part
     )
     head = f"{place}: {message}" if place else message
-    return head if text is None else f"{head}\n    |{text}|"
+    if text is None:
+        return head
+    shown = "".join(character if character.isprintable() else "\ufffd" for character in text)
+    return f"{head}\n    |{shown}|"
 
 
 def listed(names: list[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,8 +35,12 @@ def report(result: AdjustedBlock) -> str:
     sections = [
         *summary(result),
         ("Iterations", _iterations(result)),
-        ("Check points: adjusted minus supplied", _check_points(result)),
-        ("Control points: adjusted minus supplied", _control(result)),
+        ("Check points: adjusted minus supplied", _difference_table(result, _check_differences(result))),
+        ("Control points: adjusted minus supplied", _difference_table(result, _held_differences(result))),
+        (
+            "Components of control that are not held: adjusted minus supplied",
+            _difference_table(result, _unheld_differences(result)),
+        ),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
         ("Work", _work(result)),
@@ -117,18 +121,14 @@ def _residuals(result: AdjustedBlock) -> list[str]:
         )
         largest = np.nan_to_num(np.abs(result.standardized[used])).max()
         lines.append(f"largest |standardized residual|     {largest:.2f}")
-    for kind in ("control", "check"):
-        of_kind = result.used_points & (result.point_kinds == kind)
-        supplied = (
-            np.isfinite(result.block.point_sd)
-            if kind == "control"
-            else np.isfinite(result.block.point_positions)
-        )
-        differences = np.where(supplied, result.point_differences, np.nan)[of_kind]
+    for what, differences in (
+        ("control points", _held_differences(result)),
+        ("unheld components", _unheld_differences(result)),
+        ("check points", _check_differences(result)),
+    ):
         values = [_rms(column[np.isfinite(column)]) for column in differences.T]
         if np.isfinite(differences).any():
-            shown = ", ".join(_differences(result, values))
-            lines.append(f"{f'rms of {kind} points':<36}{shown}")
+            lines.append(f"{f'rms of {what}':<36}{', '.join(_differences(result, values))}")
     return lines
 
 
@@ -161,20 +161,29 @@ def _suspects(result: AdjustedBlock) -> list[str]:
     return lines if images.size == len(order) else [*lines, f"and {images.size - len(order)} more"]
 
 
-def _check_points(result: AdjustedBlock) -> list[str]:
-    check = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
-    return _difference_table(result, check, result.point_differences)
+def _held_differences(result: AdjustedBlock) -> Floats:
+    return _differences_where(result, np.isfinite(result.block.point_sd))
 
 
-def _control(result: AdjustedBlock) -> list[str]:
-    control = np.flatnonzero(result.used_points & (result.point_kinds == "control"))
-    held = np.where(np.isfinite(result.block.point_sd), result.point_differences, np.nan)
-    return _difference_table(result, control, held)
+def _unheld_differences(result: AdjustedBlock) -> Floats:
+    """Return those of components of control that are not held, but have a value to compare with."""
+    held = np.isfinite(result.block.point_sd)
+    return _differences_where(result, held.any(axis=1, keepdims=True) & ~held)
 
 
-def _difference_table(
-    result: AdjustedBlock, points: Sequence[int] | np.ndarray, differences: Floats
-) -> list[str]:
+def _check_differences(result: AdjustedBlock) -> Floats:
+    return _differences_where(result, (result.point_kinds == "check")[:, np.newaxis])
+
+
+def _differences_where(result: AdjustedBlock, which: np.ndarray) -> Floats:
+    """Return (n, 3) adjusted minus supplied coordinates, NaN where not asked for or not supplied."""
+    used = result.used_points[:, np.newaxis]
+    differences: Floats = np.where(used & which, result.point_differences, np.nan)
+    return differences
+
+
+def _difference_table(result: AdjustedBlock, differences: Floats) -> list[str]:
+    points = np.flatnonzero(np.isfinite(differences).any(axis=1))
     if len(points) == 0:
         return []
     axes = ("dlon", "dlat", "dh") if result.block.geographic else ("dX", "dY", "dZ")

@@ -56,3 +56,15 @@ def write_files(directory, **changes):
 def replaced(records, number, record):
     """Replace one of the records, numbered from 1."""
     return [record if n == number else old for n, old in enumerate(records, 1)]
+
+
+def same(one, other):
+    """Assert that two projects hold the same names and the same numbers, to the last bit."""
+    assert one.common == other.common
+    assert one.cameras == other.cameras
+    assert one.frames == other.frames
+    assert one.ground == other.ground
+    for a, b in zip(one.images, other.images, strict=True):
+        assert (a.name, a.points, a.sd, a.camera) == (b.name, b.points, b.sd, b.camera)
+        assert a.principal_distance == b.principal_distance
+        assert a.xy.tolist() == b.xy.tolist()

@@ -13,6 +13,7 @@ from photogram.giant.fields import (
     format_angle,
     format_deviations,
     format_name,
+    format_principal_distance,
     format_real,
     parse_angle,
     parse_integer,
@@ -23,14 +24,19 @@ from photogram.giant.fields import (
 GOLDEN = json.loads((Path(__file__).parents[1] / "data" / "giant" / "golden_cases.json").read_text())
 
 
+@pytest.mark.giant("2.1", "Fw.d without a decimal point: implied")
+@pytest.mark.giant("15", "packed DMS and implied decimals")
 @pytest.mark.parametrize("case", GOLDEN["implied_decimal"], ids=lambda case: case["field"])
-def test_numbers_of_the_report(case):
+def test_section_2_1_numbers_of_the_report(case):
     decimals = int(case["format"].split(".")[1])
     assert float(parse_real(case["field"], decimals)) == pytest.approx(case["value"], abs=1e-12)
 
 
+@pytest.mark.giant("2.1", "DMS: sign, then DDDMMSS.sss from the left")
+@pytest.mark.giant("2.1", "DMS: leading zeros may be omitted")
+@pytest.mark.giant("15", "packed DMS and implied decimals")
 @pytest.mark.parametrize("case", GOLDEN["dms_packed"], ids=lambda case: case["field"])
-def test_angles_of_the_report(case):
+def test_section_2_1_angles_of_the_report(case):
     angle, doubtful = parse_angle(case["field"], 3)
     degrees, minutes, seconds = case["dms"].removeprefix("-").split()
     size = int(degrees) + int(minutes) / 60 + float(seconds) / 3600
@@ -42,6 +48,8 @@ def test_angles_of_the_report(case):
     assert parse_angle(text, 3) == (angle, False)
 
 
+@pytest.mark.giant("2.1", "Fw.d with a decimal point")
+@pytest.mark.giant("2.1", "a blank field is zero")
 @pytest.mark.parametrize(
     ("field", "value"),
     [
@@ -57,7 +65,7 @@ def test_angles_of_the_report(case):
         ("-0.000", 0),
     ],
 )
-def test_real(field, value):
+def test_section_2_1_real(field, value):
     assert parse_real(field, 3) == Decimal(value)
 
 
@@ -86,19 +94,24 @@ def test_illegal_numbers(field):
         parse_real(field, 3)
 
 
-def test_integers():
+@pytest.mark.giant("2.1", "I1, I2: blank is zero")
+def test_section_2_1_integers():
     assert [parse_integer(field) for field in ("", " ", "7", " 5", "5 ", "-1")] == [0, 0, 7, 5, 5, -1]
     for field in ("x", "1.", "²"):
         with pytest.raises(ValueError, match="whole number"):
             parse_integer(field)
 
 
-@pytest.mark.parametrize("field", ["3610000.000", "-3610000.", "16100.", "61.000", "-60.001", "3610000000"])
-def test_illegal_angles(field):
+@pytest.mark.giant("2.1", "DMS: more than 360 degrees, 60 minutes or 60 seconds is fatal")
+@pytest.mark.parametrize(
+    "field", ["3610000.000", "-3610000.", "16100.", "61.000", "-60.001", "3610000000", "1E99", "-1.E9"]
+)
+def test_section_2_1_illegal_angles(field):
     with pytest.raises(ValueError, match="ILLEGAL DMS FIELD"):
         parse_angle(field, 3)
 
 
+@pytest.mark.giant("14", "11 60 minutes or seconds pass with a warning")
 @pytest.mark.parametrize(
     ("field", "arcseconds", "doubtful"),
     [
@@ -111,12 +124,13 @@ def test_illegal_angles(field):
         ("100.0E1", 600, False),
     ],
 )
-def test_angles_at_the_limits(field, arcseconds, doubtful):
+def test_section_14_angles_at_the_limits(field, arcseconds, doubtful):
     angle, remark = parse_angle(field, 3)
     assert math.degrees(angle) == pytest.approx(arcseconds / 3600, abs=1e-12)
     assert remark is doubtful
 
 
+@pytest.mark.giant("14", "13 stripping: left-justified, one character is kept, collisions are errors")
 @pytest.mark.parametrize(
     ("field", "strip", "name"),
     [
@@ -130,7 +144,7 @@ def test_angles_at_the_limits(field, arcseconds, doubtful):
         ("A B", "", "A B"),
     ],
 )
-def test_names(field, strip, name):
+def test_section_14_names(field, strip, name):
     assert parse_name(field, strip) == name
 
 
@@ -201,7 +215,7 @@ def test_seconds_round_up_into_minutes_and_degrees():
     assert format_angle(math.radians(29 + 59 / 60 + 59.9999999 / 3600), 12) == " 300000.0000"
 
 
-@pytest.mark.parametrize("angle", [6.3, -6.3, math.inf])
+@pytest.mark.parametrize("angle", [6.301, -6.301, math.inf])
 def test_angles_beyond_the_circle_are_refused(angle):
     with pytest.raises(ValueError, match="360 degrees"):
         format_angle(angle, 12)
@@ -215,6 +229,14 @@ def test_deviations():
     for value in (-0.1, 1e-12, 1e12, math.nan):
         with pytest.raises(ValueError, match=r"cannot be written|does not fit"):
             format_deviations((value,), (False,))
+
+
+def test_principal_distances():
+    assert format_principal_distance(0.0) == " " * 10
+    assert format_principal_distance(-152.74) == "  -152.740"
+    for value in (1e-12, -1e-12, math.nan, 1e12):
+        with pytest.raises(ValueError, match=r"cannot be written|does not fit"):
+            format_principal_distance(value)
 
 
 def test_names_are_written_as_they_are_read():

@@ -27,7 +27,8 @@ def source(*lines, strip=""):
 # The sample of the report
 
 
-def test_common_of_the_report():
+@pytest.mark.giant("2.2", "record 1: title")
+def test_section_2_2_common_of_the_report():
     common = parse_common(source(*SAMPLE["COMMON"]))
     assert common.title.startswith("SAMPLE RUN FOR NOAA/NOS GIANT PROGRAM")
     assert common.geographic
@@ -40,7 +41,8 @@ def test_common_of_the_report():
     assert parse_common(source(*common_records(common))) == common
 
 
-def test_cameras_of_the_report():
+@pytest.mark.giant("2.3", "columns 11-20: principal distance, signed")
+def test_section_2_3_cameras_of_the_report():
     (camera,) = parse_cameras(source(*SAMPLE["CAMERAS"]))
     assert (camera.name, camera.principal_distance) == ("F1982", -152.74)
 
@@ -57,7 +59,9 @@ def test_frames_of_the_report():
     assert frame.position_sd == frame.attitude_sd == (0, 0, 0)
 
 
-def test_images_of_the_report():
+@pytest.mark.giant("2.4", "terminator: **** in columns 1-4")
+@pytest.mark.giant("2.4", "point, columns 1-8: name")
+def test_section_2_4_images_of_the_report():
     (frame,) = parse_images(source(*SAMPLE["IMAGES"]))
     assert (frame.name, frame.camera, frame.principal_distance, frame.sd) == ("SH9961", "F1982", 0, (0, 0))
     assert frame.points == ["60!", "69!", "SH960801", "126!", "59!"]
@@ -145,7 +149,8 @@ def test_bad_job_records(job, why):
     assert (caught.value.file, caught.value.record, caught.value.text) == (Path("FILE"), 2, job)
 
 
-def test_common_is_too_short_or_too_long():
+@pytest.mark.giant("2.2", "record 3 is optional")
+def test_section_2_2_common_is_too_short_or_too_long():
     with pytest.raises(InputError, match="two records are needed"):
         parse_common(source("T"))
     long = source("T", "", "", "MORE")
@@ -156,7 +161,8 @@ def test_common_is_too_short_or_too_long():
 # Names
 
 
-def test_leading_characters_are_stripped_in_every_file():
+@pytest.mark.giant("2.1", "names: the leading character of COMMON column 15 is removed in all files")
+def test_section_2_1_leading_characters_are_stripped_in_every_file():
     (camera,) = parse_cameras(source("00CAM     -152740", strip="0"))
     images = parse_images(
         source(f"{'00A':40}00CAM", f"{'000126!':10}{'1.':>10}{'2.':>10}", "****", strip="0")
@@ -168,8 +174,9 @@ def test_leading_characters_are_stripped_in_every_file():
     assert images[0].points == [points[0].name] == ["126!"]
 
 
+@pytest.mark.giant("14", "13 stripping: left-justified, one character is kept, collisions are errors")
 @pytest.mark.parametrize("strip", ["0", ""])
-def test_two_spellings_of_one_name_are_refused(strip):
+def test_section_14_two_spellings_of_one_name_are_refused(strip):
     first, second = ("012", "12") if strip else (" 12", "12")
     header, end = ["A"], ["****"]
     image = "{:10}" + f"{'1.':>10}{'2.':>10}"
@@ -204,7 +211,8 @@ def test_bad_cameras(records, why):
     assert (caught.value.record, caught.value.text) == (2, records[1])
 
 
-def test_a_blank_camera_name_is_a_name():
+@pytest.mark.giant("2.3", "columns 1-8: a single camera may be without a name")
+def test_section_2_3_a_blank_camera_name_is_a_name():
     cameras = parse_cameras(source("", "           -123.9392"))
     assert [(camera.name, camera.principal_distance) for camera in cameras] == [("", -123.9392)]
     assert parse_cameras(source(*camera_records(cameras))) == cameras
@@ -213,7 +221,8 @@ def test_a_blank_camera_name_is_a_name():
 # FRAMES
 
 
-def test_frames_keep_their_order_and_round_trip():
+@pytest.mark.giant("2.5", "the order of the frames is kept")
+def test_section_2_5_frames_keep_their_order_and_round_trip():
     frames = parse_frames(source(*FRAMES[2:], *FRAMES[:2]), geographic=False)
     assert [frame.name for frame in frames] == ["B", "A"]
     assert frames[0].position_sd == (5, 6, 0)
@@ -254,7 +263,8 @@ def test_latitudes_end_at_the_poles():
     assert frame.position[1] == pytest.approx(-math.pi / 2)
 
 
-def test_sixty_minutes_are_remarked_on():
+@pytest.mark.giant("14", "11 60 minutes or seconds pass with a warning")
+def test_section_14_sixty_minutes_are_remarked_on():
     file = source("A", f"{'A':8}{'6000.':>12}")
     parse_frames(file, geographic=False)
     assert [(message.record, message.record_text) for message in file.messages] == [(2, file.lines[1])]
@@ -296,15 +306,17 @@ def test_odd_but_legal_coordinates(field, value):
     assert frame.xy.tolist() == [[value, 1.0]]
 
 
-def test_blanks_inside_numbers_are_remarked_on():
+@pytest.mark.giant("2.1", "blanks inside a number are ignored, with a remark")
+def test_section_2_1_blanks_inside_numbers_are_remarked_on():
     file = source("A", f"{'P':10}{'- 1.5':>10}{'1.0':>10}", "****")
     (frame,) = parse_images(file)
     assert frame.xy.tolist() == [[-1.5, 1.0]]
     assert [(message.record, message.record_text) for message in file.messages] == [(2, file.lines[1])]
 
 
+@pytest.mark.giant("2.1", "read errors name record number and record")
 @pytest.mark.parametrize("field", ["nan", "-inf", "1.2.3", "1-2", "--1", "1_0", "0x10", "1,5", "½", "-", "."])
-def test_unreadable_coordinates_name_file_record_and_text(field):
+def test_section_2_1_unreadable_coordinates_name_file_record_and_text(field):
     records = replaced(IMAGES, 7, f"{'3':10}{'1.0':>10}{field:>10}")
     with pytest.raises(InputError, match="is not a number") as caught:
         parse_images(source(*records))
@@ -342,7 +354,8 @@ def test_ground_round_trips():
     assert parse_ground(source(*ground_records(points, False)), geographic=False) == points
 
 
-def test_of_duplicate_control_the_first_is_kept():
+@pytest.mark.giant("6", "duplicate control records keep the first")
+def test_section_6_of_duplicate_control_the_first_is_kept():
     file = source(*GROUND, ground_record("1", "0.", "0.", "0."))
     points = parse_ground(file, geographic=False)
     assert [point.name for point in points] == ["1", "2", "3"]
@@ -378,7 +391,8 @@ def test_bad_ground(record, why):
 # Text files
 
 
-def test_any_line_ends_and_the_columns_after_80(tmp_path):
+@pytest.mark.giant("2.1", "fixed records of 80 columns, counted from 1")
+def test_section_2_1_any_line_ends_and_the_columns_after_80(tmp_path):
     path = tmp_path / "GROUND"
     path.write_bytes(b"\xef\xbb\xbfA\r\nB\rC" + b" " * 79 + b"comment\n\x1a")
     assert Source.read(path).lines == ["A", "B", "C" + " " * 79]

@@ -18,6 +18,7 @@ from small_project import (
     frame_record,
     ground_record,
     replaced,
+    same,
     write_files,
 )
 
@@ -57,8 +58,13 @@ def test_files_are_found_in_any_case_with_any_extension(tmp_path):
     assert [frame.name for frame in read_project(str(tmp_path)).frames] == ["A", "B"]
 
 
+@pytest.mark.giant("2", "unit 1: CAMERAS")
+@pytest.mark.giant("2", "unit 2: IMAGES")
+@pytest.mark.giant("2", "unit 3: FRAMES")
+@pytest.mark.giant("2", "unit 4: GROUND")
+@pytest.mark.giant("2", "unit 7: COMMON")
 @pytest.mark.parametrize("name", FILES)
-def test_a_missing_file_is_named(tmp_path, name):
+def test_section_2_a_missing_file_is_named(tmp_path, name):
     write_files(tmp_path)
     (tmp_path / name).unlink()
     with pytest.raises(InputError, match=f"{name} is missing .looked for {name}, {name.lower()}") as caught:
@@ -109,7 +115,10 @@ def test_files_are_written_whole_or_not_at_all(tmp_path):
 # From files to a block
 
 
-def test_the_block_of_the_small_project(tmp_path):
+@pytest.mark.giant("2.4", "header, columns 21-30: standard deviation of x, default 0.010 mm")
+@pytest.mark.giant("2.4", "header, columns 31-40: standard deviation of y, default 0.010 mm")
+@pytest.mark.giant("2.6", "values in ignored fields may be 0.000")
+def test_section_2_4_the_block_of_the_small_project(tmp_path):
     project = project_of(tmp_path)
     block = project.to_block()
     assert project.messages == []
@@ -135,14 +144,16 @@ def test_record_3_of_common_is_the_default_of_ground(tmp_path):
     assert block.point_sd.tolist() == [[0.02, 1, 0.7], [math.inf, math.inf, 0.04], [math.inf] * 3]
 
 
-def test_photos_follow_frames_and_points_follow_photos(tmp_path):
+@pytest.mark.giant("2.4", "frames in any order")
+def test_section_2_4_photos_follow_frames_and_points_follow_photos(tmp_path):
     project = project_of(tmp_path, FRAMES=[*FRAMES[2:], *FRAMES[:2]])
     block = project.to_block()
     assert block.photo_ids == ["B", "A"]
     assert block.point_ids == ["3", "2", "1"]
 
 
-def test_frames_missing_in_frames_are_ignored_silently(tmp_path):
+@pytest.mark.giant("2.4", "frames missing from FRAMES are ignored silently")
+def test_section_2_4_frames_missing_in_frames_are_ignored_silently(tmp_path):
     project = project_of(tmp_path, FRAMES=FRAMES[:2])
     block = project.to_block()
     assert block.photo_ids == ["A"]
@@ -153,7 +164,8 @@ def test_frames_missing_in_frames_are_ignored_silently(tmp_path):
     ]
 
 
-def test_a_frame_without_images_is_fatal_in_triangulation(tmp_path):
+@pytest.mark.giant("14", "26 a frame without images: fatal in triangulation, a warning in intersection")
+def test_section_14_a_frame_without_images_is_fatal_in_triangulation(tmp_path):
     new = [frame_record("C", "1.", "2.", "3."), frame_record("C", "", "", "")]
     error = caught_by(tmp_path, FRAMES=[*FRAMES, *new])
     assert (error.file, error.record, error.text) == (tmp_path / "FRAMES", 5, new[0])
@@ -176,7 +188,9 @@ def test_a_header_that_was_read_as_a_point_is_pointed_at(tmp_path):
     assert "a point of 'A' has its name (record 5 of IMAGES)" in str(error)
 
 
-def test_an_unknown_camera_is_fatal_without_a_principal_distance(tmp_path):
+@pytest.mark.giant("14", "16 camera not in CAMERAS and no principal distance: fatal")
+@pytest.mark.giant("2.4", "header, columns 11-20: principal distance, blank: from CAMERAS")
+def test_section_14_an_unknown_camera_is_fatal_without_a_principal_distance(tmp_path):
     error = caught_by(tmp_path, IMAGES=replaced(IMAGES, 6, IMAGES[5].replace("F1982", "F1983")))
     assert (error.file, error.record, error.text) == (
         tmp_path / "IMAGES",
@@ -196,7 +210,8 @@ def test_a_frame_with_images_twice_is_fatal_where_it_is_used(tmp_path):
     assert project_of(tmp_path, IMAGES=twice, FRAMES=FRAMES[2:]).to_block().photo_ids == ["B"]
 
 
-def test_of_a_duplicate_image_the_first_is_kept(tmp_path):
+@pytest.mark.giant("14", "25 the same point twice in one frame: the first is kept, with a warning")
+def test_section_14_of_a_duplicate_image_the_first_is_kept(tmp_path):
     second = f"{'1':10}{'77000':>10}{'77000':>10}"
     project = project_of(tmp_path, IMAGES=[*IMAGES[:4], second, *IMAGES[4:]])
     block = project.to_block()
@@ -208,7 +223,9 @@ def test_of_a_duplicate_image_the_first_is_kept(tmp_path):
     assert project.messages == [message]
 
 
-def test_control_that_is_not_photographed_is_ignored(tmp_path):
+@pytest.mark.giant("6", "control without images is ignored")
+@pytest.mark.giant("14", "29 control that is not photographed")
+def test_section_6_control_that_is_not_photographed_is_ignored(tmp_path):
     record = ground_record("9", "1.", "2.", "3.")
     project = project_of(tmp_path, GROUND=[*GROUND, record])
     assert project.to_block().point_ids == ["1", "2", "3"]
@@ -245,17 +262,6 @@ def test_the_remarks_of_all_files_are_collected(tmp_path):
 
 
 # Round trips
-
-
-def same(one, other):
-    assert one.common == other.common
-    assert one.cameras == other.cameras
-    assert one.frames == other.frames
-    assert one.ground == other.ground
-    for a, b in zip(one.images, other.images, strict=True):
-        assert (a.name, a.points, a.sd, a.camera) == (b.name, b.points, b.sd, b.camera)
-        assert a.principal_distance == b.principal_distance
-        assert a.xy.tolist() == b.xy.tolist()
 
 
 def test_read_write_read_gives_the_same_numbers(tmp_path):
@@ -348,7 +354,8 @@ def test_a_block_survives_the_files(tmp_path_factory, seed, geographic):
     np.testing.assert_equal(again.principal_distances, block.principal_distances)
 
 
-def test_longitudes_may_be_written_from_0_to_360(tmp_path):
+@pytest.mark.giant("2.5", "angles from 0 to 360 or -180 to 180 degrees")
+def test_section_2_5_longitudes_may_be_written_from_0_to_360(tmp_path):
     frames = [
         frame_record(name, lon, "293917.764", "4556.590")
         for name, lon in (("A", "2650055."), ("B", "-950005."))
@@ -358,6 +365,7 @@ def test_longitudes_may_be_written_from_0_to_360(tmp_path):
     assert np.degrees(block.photo_positions[:, 0]) == pytest.approx([-(95 - 55 / 3600), -(95 + 5 / 3600)])
 
 
+@pytest.mark.giant("14", "14 zero standard deviation is the default")
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
@@ -366,7 +374,7 @@ def test_longitudes_may_be_written_from_0_to_360(tmp_path):
         ({"image_sd": np.arange(1.0, 37).reshape(18, 2)}, "images of photo F0 differ in standard deviation"),
     ],
 )
-def test_what_giant_files_cannot_say(changes, why):
+def test_section_14_what_giant_files_cannot_say(changes, why):
     block = small_block(np.random.default_rng(1), geographic=False).replace(**changes)
     with pytest.raises(InputError, match=why):
         Project.from_block(block)
@@ -375,7 +383,15 @@ def test_what_giant_files_cannot_say(changes, why):
 # The adjusted files
 
 
-def test_adjusted_stations_and_points_keep_weights_and_codes(tmp_path):
+@pytest.mark.giant("2", "standard deviations of the original input are kept, never tightened")
+@pytest.mark.giant(
+    "2", "unit 9: adjusted GROUND of points on two or more photographs, only when the solution converges"
+)
+@pytest.mark.giant(
+    "14", "24 units 8, 9, 20: layout, standard deviations, type codes, 4 decimals of the second"
+)
+@pytest.mark.giant("14", "27 kappa 0 to 360, omega and phi -180 to 180 degrees")
+def test_section_2_adjusted_stations_and_points_keep_weights_and_codes(tmp_path):
     images = [*IMAGES[:4], f"{'4':10}{'1.':>10}{'1.':>10}", f"{'5':10}{'1.':>10}{'1.':>10}", *IMAGES[4:9]]
     images += [f"{'4':10}{'1.':>10}{'1.':>10}", IMAGES[9]]
     project = project_of(tmp_path, IMAGES=images)

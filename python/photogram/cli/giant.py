@@ -264,6 +264,7 @@ def _result_files(project: Project, block: Block, result: Result, out: Path) -> 
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.giant.export import adjusted_records
     from photogram.giant.files import to_bytes
+    from photogram.messages import Message
 
     records = adjusted_records(
         project,
@@ -273,6 +274,10 @@ def _result_files(project: Project, block: Block, result: Result, out: Path) -> 
         point_positions=result.point_positions,
         converged=result.converged,
     )
+    if "RESTART" not in records:
+        result.messages.append(
+            Message("RESTART is not written: the stations are beyond what its columns hold")
+        )
     made = {out / name: to_bytes(lines) for name, lines in records.items()}
     return {**made, out / "report.txt": result.report().encode()}
 

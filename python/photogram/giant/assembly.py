@@ -23,6 +23,7 @@ from photogram.structuring import structure
 if TYPE_CHECKING:
     from photogram.giant.common import Common
     from photogram.giant.contents import Contents
+    from photogram.giant.ground import GroundPoint
 
 __all__ = ["assemble", "job_refraction"]
 
@@ -51,8 +52,9 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
     frames = [frame for frame, _ in photos]
     images = [image_frame for _, image_frame in photos]
 
-    index: dict[str, int] = {}
-    image_points = np.array([index.setdefault(name, len(index)) for each in images for name in each.points])
+    names = [name for each in images for name in each.points]
+    index = {name: number for number, name in enumerate(dict.fromkeys(names))}
+    image_points = np.array([index[name] for name in names])
     image_photos = np.repeat(np.arange(len(images)), [len(each.points) for each in images])
     check_points(index, limits)
     kept = _first_images(images, image_photos, image_points, messages)
@@ -163,20 +165,22 @@ def _first_images(
 ) -> NDArray[np.int64]:
     """Return the rows of the first image of every point on every photo, in their order."""
     pairs = image_photos * (image_points.max() + 1) + image_points
-    kept = np.sort(np.unique(pairs, return_index=True)[1])
+    order = np.argsort(pairs, kind="stable")
+    again = np.sort(order[1:][pairs[order[1:]] == pairs[order[:-1]]])
     starts = np.searchsorted(image_photos, np.arange(len(images)))
-    for row in np.setdiff1d(np.arange(len(pairs)), kept).tolist():
+    for row in again.tolist():
         frame = images[image_photos[row]]
         at = row - starts[image_photos[row]]
         text = f"the point {frame.points[at]} stands in the frame {frame.name} twice: the first image is kept"
         messages.append(message_at(frame.point_record(at), text))
-    return kept
+    return np.delete(np.arange(len(pairs)), again)
 
 
 def _control(project: Contents, index: dict[str, int], messages: list[Message]) -> tuple[Floats, Floats]:
     """Return positions and standard deviations of all points: those of GROUND where it has any."""
     position = np.full((len(index), 3), np.nan)
     sd = np.full((len(index), 3), np.inf)
+    control: dict[int, GroundPoint] = {}
     placed: set[str] = set()
     for point in project.ground:
         if point.name in placed:
@@ -191,10 +195,15 @@ def _control(project: Contents, index: dict[str, int], messages: list[Message]) 
                 message_at(point.record, f"control point {point.name} is not photographed: ignored")
             )
             continue
-        held = np.array(point.held)
+        control[row] = point
+    if control:
+        rows = list(control)
+        values = np.array([point.position for point in control.values()])
+        held = np.array([point.held for point in control.values()])
         # The field of an unheld component may hold nothing: blanks or zero are no value to compare with.
-        position[row] = np.where(held | (np.array(point.position) != 0), point.position, np.nan)
-        sd[row] = np.where(held, _or_default(point.sd, project.common.default_control_sd), np.inf)
+        position[rows] = np.where(held | (values != 0), values, np.nan)
+        weights = _or_default([point.sd for point in control.values()], project.common.default_control_sd)
+        sd[rows] = np.where(held, weights, np.inf)
     if not np.isfinite(sd).any():
         record = next((point.record for point in project.ground if point.record), None)
         path = record.source.path if record else project.directory

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from photogram.giant.fields import format_name, format_real
+from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 
 __all__ = ["Camera", "camera_records", "parse_cameras"]
@@ -61,5 +61,6 @@ def camera_records(cameras: Iterable[Camera]) -> list[str]:
         A name or a principal distance does not fit its field.
     """
     return [
-        f"{format_name(camera.name)}  {format_real(camera.principal_distance, 10, 3)}" for camera in cameras
+        f"{format_name(camera.name)}  {format_principal_distance(camera.principal_distance)}"
+        for camera in cameras
     ]

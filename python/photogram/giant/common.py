@@ -175,6 +175,8 @@ def common_records(common: Common) -> list[str]:
     """
     if len(common.title) > 80 or not common.title.isprintable():
         raise ValueError("the title must be one line of at most 80 characters")
+    if len(common.strip) > 1 or not common.strip.isprintable():
+        raise ValueError(f"the character stripped from names cannot be {common.strip!r}")
     if not 1 <= common.max_iterations <= 9 or not 1 <= common.convergence_percent <= 99:
         raise ValueError(
             "the limit of iterations must be 1 to 9 and the convergence criterion 1 to 99 percent"

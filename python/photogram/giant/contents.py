@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from photogram.errors import InputError
 from photogram.giant.cameras import Camera, camera_records
 from photogram.giant.common import Common, common_records
+from photogram.giant.fields import parse_name
 from photogram.giant.files import written
 from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import GroundPoint, ground_records
@@ -50,8 +52,9 @@ class Contents:
         Raises
         ------
         InputError
-            A value that does not fit its field.
+            A value that does not fit its field, or a name that would lose its first character.
         """
+        self._check_names()
         geographic = self.common.geographic
         writers: dict[str, Callable[[], list[str]]] = {
             "COMMON": lambda: common_records(self.common),
@@ -61,3 +64,18 @@ class Contents:
             "GROUND": lambda: ground_records(self.ground, geographic),
         }
         return {name: written(name, writer) for name, writer in writers.items()}
+
+    def _check_names(self) -> None:
+        """Refuse names that would be read as others, because COMMON column 15 strips their beginning."""
+        strip = self.common.strip
+        if not strip:
+            return
+        names = {camera.name for camera in self.cameras} | {frame.name for frame in self.frames}
+        names |= {frame.name for frame in self.images} | {frame.camera for frame in self.images}
+        names |= {name for frame in self.images for name in frame.points}
+        names |= {point.name for point in self.ground}
+        for name in sorted(names):
+            if parse_name(name, strip) != name:
+                raise InputError(
+                    f"the name {name!r} cannot be written: COMMON strips {strip!r} from the beginning"
+                )

@@ -210,8 +210,8 @@ def adjusted_records(
 ) -> dict[str, list[str]]:
     """Return the records of the output files by name (GIANT guide, section II.A).
 
-    RESTART (unit 20) always; FRAMES (unit 8) and GROUND (unit 9) of an adjustment that converged, unless
-    COMMON says not to save them.
+    RESTART (unit 20) always, but for stations that diverged beyond its columns; FRAMES (unit 8) and GROUND
+    (unit 9) of an adjustment that converged, unless COMMON says not to save them.
 
     Parameters
     ----------
@@ -226,11 +226,16 @@ def adjusted_records(
     Raises
     ------
     InputError
-        A value that does not fit its field.
+        A value of an adjustment that converged does not fit its field.
     """
     geographic = project.common.geographic
     frames = adjusted_frames(project, block, photo_positions, photo_attitudes)
-    records = {"RESTART": written("RESTART", lambda: frame_records(frames, geographic))}
+    records = {}
+    try:
+        records["RESTART"] = written("RESTART", lambda: frame_records(frames, geographic))
+    except InputError:
+        if converged:
+            raise
     if converged and project.common.save_stations:
         records["FRAMES"] = records["RESTART"]
     if converged and project.common.save_points:

@@ -13,10 +13,11 @@ from decimal import Decimal
 
 __all__ = [
     "ARCSEC",
+    "MOST_ANGLE",
     "format_angle",
     "format_deviations",
     "format_name",
-    "format_position",
+    "format_principal_distance",
     "format_real",
     "pack_dms",
     "parse_angle",
@@ -29,6 +30,12 @@ __all__ = [
 
 ARCSEC = math.pi / 648000.0
 """One second of arc in radians."""
+
+MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC
+"""The largest angle that is written: 360 59 59, for a field may have 360 degrees and minutes besides."""
+
+LARGEST_PACKED = 10**8
+"""Far beyond every angle, and well within what decimal arithmetic divides."""
 
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d{1,2}))?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
@@ -93,7 +100,12 @@ def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
         The field is no number, or has more than 360 degrees, 60 minutes or 60 seconds: the guide's fatal
         ILLEGAL DMS FIELD.
     """
-    sign, degrees, minutes, seconds = unpack_dms(parse_real(field, decimals))
+    packed = parse_real(field, decimals)
+    if abs(packed) > LARGEST_PACKED:
+        raise ValueError(
+            f"ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is beyond 360 degrees"
+        )
+    sign, degrees, minutes, seconds = unpack_dms(packed)
     if degrees > 360 or minutes > 60 or seconds > 60:
         raise ValueError(
             f"**ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is"
@@ -130,6 +142,8 @@ def format_real(value: float, width: int, decimals: int) -> str:
     if room < 0:
         raise ValueError(f"{value} does not fit {width} columns")
     text = f"{whole}.{fraction.rstrip('0').ljust(min(decimals, room), '0')}"
+    if text[0] == "-" and not text.strip("-.0"):
+        text = text[1:]
     return (text.replace(".", "0.") if whole in ("", "-") and len(text) < width else text).rjust(width)
 
 
@@ -171,13 +185,13 @@ def format_angle(value: float, width: int) -> str:
     if parse_angle(text, 0)[0] != value:
         text = _packed(value, width, least=4, most=5)
         if value < 0 and len(text) - 1 - text.index(".") < 4:
-            text = _packed(value + 2 * math.pi, width, least=4)
+            return format_angle(value + 2 * math.pi, width)
     return text.rjust(width)
 
 
 def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
     """Write radians as packed DMS with `least` to `most` decimals of the second, as far as they fit."""
-    if not abs(value) <= 2 * math.pi:
+    if not abs(value) <= MOST_ANGLE:
         raise ValueError(f"{value} rad is beyond 360 degrees")
     arcseconds = Decimal(repr(float(value) / ARCSEC))
     places, excess = min(most, width - 2) + 1, 1
@@ -214,12 +228,24 @@ def printed_order(name: str) -> tuple[int, str]:
     return len(name), name
 
 
-def format_position(position: Iterable[float], geographic: bool) -> str:
-    """Write three coordinates (F12.3): X, Y, Z, or longitude and latitude (rad) and height."""
-    first, second, third = position
-    if not geographic:
-        return "".join(format_real(value, 12, 3) for value in (first, second, third))
-    return format_angle(first, 12) + format_angle(second, 12) + format_real(third, 12, 3)
+def format_principal_distance(value: float) -> str:
+    """Write a principal distance (F10.3); zero, which stands for that of the camera, as blanks.
+
+    Raises
+    ------
+    ValueError
+        The value does not fit, or is so small that it would turn into zero.
+    """
+    if value == 0:
+        return " " * 10
+    field = format_real(value, 10, 3)
+    if not _significant(field):
+        raise ValueError(f"the principal distance {value} cannot be written in ten columns")
+    return field
+
+
+def _significant(field: str) -> bool:
+    return any(digit in field for digit in "123456789")
 
 
 def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
@@ -236,7 +262,7 @@ def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
             fields.append(" " * 10)
             continue
         field = _packed(value, 10, least=3).rjust(10) if angle else format_real(value, 10, 3)
-        if not value > 0 or not any(digit in field for digit in "123456789"):
+        if not value > 0 or not _significant(field):
             raise ValueError(f"the standard deviation {value} cannot be written in ten columns")
         fields.append(field)
     return "".join(fields)

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from photogram.giant.fields import ARCSEC, format_angle, format_deviations, format_name, format_position
+import numpy as np
+
+from photogram.giant.columns import Columns, angle_fields, deviation_fields, position_fields, texts
+from photogram.giant.fields import ARCSEC, format_name
 from photogram.giant.records import Record, Source
 
 __all__ = ["ATTITUDE_SD", "Frame", "frame_records", "parse_frames"]
@@ -50,9 +53,17 @@ def parse_frames(source: Source, geographic: bool) -> list[Frame]:
         twice.
     """
     records = source.filled()
+    positions = Columns([record.text for record in records[::2]])
+    attitudes = Columns([record.text for record in records[1::2]])
+    plain = zip(
+        positions.rows(positions.position(geographic), positions.deviations(geographic, geographic, False)),
+        [*attitudes.rows(attitudes.attitude(), attitudes.deviations(True, True, True)), None],
+        strict=False,
+    )
     frames: list[Frame] = []
     spellings: dict[str, Record] = {}
-    for position, attitude in zip(records[::2], [*records[1::2], None], strict=False):
+    pairs = zip(records[::2], [*records[1::2], None], plain, strict=False)
+    for position, attitude, (plain_position, plain_attitude) in pairs:
         name = position.identification(spellings)
         if not name:
             raise position.error("columns 1-8: the frame has no name")
@@ -62,16 +73,15 @@ def parse_frames(source: Source, geographic: bool) -> list[Frame]:
         if attitude is None or attitude.identification(spellings) != name:
             where = position if attitude is None else attitude
             raise where.error(f"the second record (attitude) of the frame {name!r} was expected")
-        frames.append(
-            Frame(
-                name,
-                position.position(geographic),
-                (attitude.angle(9, 20), attitude.angle(21, 32), attitude.angle(33, 44)),
-                position.deviations(geographic, geographic, False),
-                attitude.deviations(True, True, True),
-                position,
-            )
+        station, station_sd = plain_position or (
+            position.position(geographic),
+            position.deviations(geographic, geographic, False),
         )
+        angles, angles_sd = plain_attitude or (
+            attitude.attitude(),
+            attitude.deviations(True, True, True),
+        )
+        frames.append(Frame(name, station, angles, station_sd, angles_sd, position))
     return frames
 
 
@@ -83,12 +93,17 @@ def frame_records(frames: Iterable[Frame], geographic: bool) -> list[str]:
     ValueError
         A name or a number does not fit its field.
     """
+    frames = list(frames)
+    rows = zip(
+        frames,
+        texts(position_fields([frame.position for frame in frames], geographic)),
+        texts(angle_fields(np.array([frame.attitude for frame in frames]).reshape(-1, 3), 12)),
+        deviation_fields([frame.position_sd for frame in frames], (geographic, geographic, False)),
+        deviation_fields([frame.attitude_sd for frame in frames], (True, True, True)),
+        strict=True,
+    )
     records = []
-    for frame in frames:
+    for frame, position, attitude, position_sd, attitude_sd in rows:
         name = format_name(frame.name)
-        position = format_position(frame.position, geographic)
-        attitude = "".join(format_angle(angle, 12) for angle in frame.attitude)
-        position += format_deviations(frame.position_sd, (geographic, geographic, False))
-        attitude += format_deviations(frame.attitude_sd, (True, True, True))
-        records += [(name + position).rstrip(), (name + attitude).rstrip()]
+        records += [(name + position + position_sd).rstrip(), (name + attitude + attitude_sd).rstrip()]
     return records

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from photogram.giant.fields import format_deviations, format_name, format_position
+import numpy as np
+
+from photogram.giant.columns import Columns, deviation_fields, position_fields, texts
+from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
 
 __all__ = ["CHECK_POINT", "GroundPoint", "ground_records", "parse_ground"]
@@ -14,7 +17,7 @@ CHECK_POINT = 7
 """The type code of a point of which nothing is held."""
 
 
-@dataclass
+@dataclass(slots=True)
 class GroundPoint:
     """One point of GROUND.
 
@@ -55,29 +58,34 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
     InputError
         A field that is no number or no angle, a type code above 7, or a point without a name.
     """
+    records = source.filled()
+    names = source.point_names([record.number for record in records])
+    columns = Columns([record.text for record in records])
+    plain = columns.rows(
+        columns.position(geographic),
+        columns.deviations(geographic, geographic, False),
+        columns.real(80, 80, 0)[:, np.newaxis],
+    )
     points: dict[str, GroundPoint] = {}
-    spellings: dict[str, Record] = {}
-    for record in source.filled():
-        name = record.identification(spellings)
-        if not name:
-            raise record.error("columns 1-8: the point has no name")
-        point = GroundPoint(
-            name,
+    for record, name, values in zip(records, names, plain, strict=True):
+        position, sd, (type_code,) = values or (
             record.position(geographic),
             record.deviations(geographic, geographic, False),
-            record.integer(80, 80),
-            record,
+            (record.integer(80, 80),),
         )
-        if not 0 <= point.type_code <= CHECK_POINT:
+        point = GroundPoint(name, position, sd, int(type_code), record)
+        if point.type_code > CHECK_POINT:
             raise record.error(f"column 80: the type code {point.type_code} is not one of 0 to 7")
-        if name in points:
-            points[name].repeats += 1
-            record.remark(f"duplicate control point {name}: record {spellings[name].number} is kept")
+        first = points.setdefault(name, point)
+        if first is not point and first.record is not None:
+            first.repeats += 1
+            record.remark(f"duplicate control point {name}: record {first.record.number} is kept")
             continue
-        for held, first in zip(point.held, (9, 21, 33), strict=True):
-            if held and record.blank(first, first + 11):
-                record.remark(f"columns {first}-{first + 11}: the blank component of {name} is held at zero")
-        points[name] = point
+        for held, value, column in zip(point.held, position, (9, 21, 33), strict=True):
+            if held and value == 0 and record.blank(column, column + 11):
+                record.remark(
+                    f"columns {column}-{column + 11}: the blank component of {name} is held at zero"
+                )
     return list(points.values())
 
 
@@ -89,9 +97,15 @@ def ground_records(points: Iterable[GroundPoint], geographic: bool) -> list[str]
     ValueError
         A name or a number does not fit its field.
     """
+    points = list(points)
+    rows = zip(
+        points,
+        texts(position_fields([point.position for point in points], geographic)),
+        deviation_fields([point.sd for point in points], (geographic, geographic, False)),
+        strict=True,
+    )
     records = []
-    for point in points:
-        record = format_name(point.name) + format_position(point.position, geographic)
-        record += format_deviations(point.sd, (geographic, geographic, False))
+    for point, position, sd in rows:
+        record = format_name(point.name) + position + sd
         records.append(f"{record:79}{point.type_code}" if point.type_code else record.rstrip())
     return records

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.giant.fields import format_deviations, format_name, format_real, parse_name
+from photogram.giant.columns import Columns, deviation_fields, real_fields, texts
+from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 
 __all__ = ["IMAGE_SD", "ImageFrame", "image_records", "parse_images"]
@@ -80,62 +81,41 @@ def parse_images(source: Source) -> list[ImageFrame]:
     points[ends] = False
     points[starts[:-1]] = False
     point_rows = np.flatnonzero(points)
-    point_numbers = [numbers[row] for row in point_rows]
-    names = _point_names(source, point_numbers)
+    point_numbers = [numbers[row] for row in point_rows.tolist()]
+    names = source.point_names(point_numbers)
     xy = _coordinates(source, point_numbers)
 
     frames = []
     spellings: dict[str, Record] = {}
-    firsts = np.searchsorted(point_rows, starts[:-1]).tolist()
-    for start, first, last in zip(starts, firsts, [*firsts[1:], len(point_numbers)], strict=False):
-        header = source.record(numbers[start])
+    headers = [source.record(numbers[start]) for start in starts[:-1]]
+    columns = Columns([header.text for header in headers], 11, 40)
+    plain = columns.rows(
+        np.column_stack([columns.deviation(21, 30), columns.deviation(31, 40)]),
+        columns.real(11, 20)[:, np.newaxis],
+    )
+    bounds = np.searchsorted(point_rows, starts).tolist()
+    for header, values, first, last in zip(headers, plain, bounds, bounds[1:], strict=False):
         if header.text.startswith(TERMINATOR):
             raise header.error("a terminator without the header of a frame before it")
         name = header.identification(spellings)
         if not name:
             raise header.error("columns 1-8: the frame has no name")
-        sd = header.deviation(21, 30), header.deviation(31, 40)
-        frame = ImageFrame(name, names[first:last], xy[first:last], header.real(11, 20), sd, header.name(41))
+        sd, (distance,) = values or (
+            (header.deviation(21, 30), header.deviation(31, 40)),
+            (header.real(11, 20),),
+        )
+        frame = ImageFrame(name, names[first:last], xy[first:last], distance, sd, header.name(41))
         frame.record, frame.numbers = header, point_numbers[first:last]
         frames.append(frame)
     return frames
 
 
-def _point_names(source: Source, numbers: list[int]) -> list[str]:
-    fields = [source.lines[number - 1][:8].rstrip(" ") for number in numbers]
-    names = {text: parse_name(text, source.strip) for text in set(fields)}
-    if len(set(names.values())) < len(names) or "" in names:
-        spellings: dict[str, Record] = {}
-        for number in numbers:
-            if not source.record(number).identification(spellings):
-                raise source.record(number).error("columns 1-8: the point has no name")
-    return [names[text] for text in fields]
-
-
 def _coordinates(source: Source, numbers: list[int]) -> NDArray[np.float64]:
     """Read columns 11-30 of all point records."""
-    lines = [source.lines[number - 1] for number in numbers]
-    table = np.frombuffer(
-        "".join([f"{line[10:30]:20}" for line in lines]).encode("ascii", "replace"), dtype=np.uint8
-    )
-    fields = table.reshape(-1, 10)
-    filled = fields != ord(" ")
-    point = fields == ord(".")
-    # Plain: digits with at most one decimal point and a sign in front only, together, not blank.
-    digit = (fields >= ord("0")) & (fields <= ord("9"))
-    sign = (fields == ord("-")) | (fields == ord("+"))
-    first = filled.argmax(axis=1)
-    count = filled.sum(axis=1)
-    front = np.take_along_axis(sign, first[:, None], axis=1)[:, 0]
-    digits = digit.sum(axis=1)
-    together = count == fields.shape[1] - filled[:, ::-1].argmax(axis=1) - first
-    plain = together & (digits > 0) & (point.sum(axis=1) <= 1) & (count == digits + point.sum(axis=1) + front)
-
-    text = np.where(plain[:, None], fields, ord("0"))
-    values = np.ascontiguousarray(text).view("S10")[:, 0].astype(np.float64)
-    values[plain & ~point.any(axis=1)] /= 1000.0
-    xy = values.reshape(-1, 2)
-    for row in np.flatnonzero(~plain.reshape(-1, 2).all(axis=1)):
+    columns = Columns([source.lines[number - 1] for number in numbers], 11, 30)
+    xy = np.column_stack([columns.real(11, 20), columns.real(21, 30)])
+    plain = columns.plain & ~columns.blank(11, 20) & ~columns.blank(21, 30)
+    for row in np.flatnonzero(~plain).tolist():
         xy[row] = _careful_coordinates(source.record(numbers[row]))
     return xy
 
@@ -159,12 +139,18 @@ def image_records(frames: Iterable[ImageFrame]) -> list[str]:
     ValueError
         A name or a number does not fit its field.
     """
+    frames = list(frames)
+    xy = texts(real_fields(np.concatenate([np.empty((0, 2)), *(frame.xy for frame in frames)]), 10, 3))
+    distances = {value: format_principal_distance(value) for value in {f.principal_distance for f in frames}}
+    deviations = deviation_fields([frame.sd for frame in frames], (False, False))
+    names = {name: format_name(name) for name in {name for frame in frames for name in frame.points}}
     records = []
-    for frame in frames:
-        distance = format_real(frame.principal_distance, 10, 3) if frame.principal_distance else " " * 10
-        sd = format_deviations(frame.sd, (False, False))
+    first = 0
+    for frame, sd in zip(frames, deviations, strict=True):
+        distance = distances[frame.principal_distance]
         records.append(f"{format_name(frame.name)}  {distance}{sd}{format_name(frame.camera)}".rstrip())
-        for name, (x, y) in zip(frame.points, frame.xy.tolist(), strict=True):
-            records.append(f"{format_name(name)}  {format_real(x, 10, 3)}{format_real(y, 10, 3)}")
+        last = first + len(frame.points)
+        records += [f"{names[name]}  {both}" for name, both in zip(frame.points, xy[first:last], strict=True)]
         records.append(TERMINATOR * 2)
+        first = last
     return records

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from photogram.errors import InputError
-from photogram.giant.fields import parse_angle, parse_integer, parse_name, parse_real
+from photogram.giant.fields import format_deviations, parse_angle, parse_integer, parse_name, parse_real
 from photogram.messages import Message
 
 __all__ = ["Record", "Source", "error_at", "message_at"]
@@ -77,12 +77,29 @@ class Source:
         """Return the records that are not blank."""
         return [Record(self, number) for number, line in enumerate(self.lines, 1) if line.strip(" ")]
 
+    def point_names(self, numbers: list[int]) -> list[str]:
+        """Read the names of points in columns 1-8 of many records.
+
+        Raises
+        ------
+        InputError
+            A point without a name, or a second spelling of one name.
+        """
+        fields = [self.lines[number - 1][:8].rstrip(" ") for number in numbers]
+        names = {text: parse_name(text, self.strip) for text in set(fields)}
+        if len(set(names.values())) < len(names) or "" in names:
+            spellings: dict[str, Record] = {}
+            for number in numbers:
+                if not self.record(number).identification(spellings):
+                    raise self.record(number).error("columns 1-8: the point has no name")
+        return [names[text] for text in fields]
+
     def error(self, text: str) -> InputError:
         """Return an error about the file as a whole."""
         return InputError(text, file=self.path)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Record:
     """One record; columns are counted from 1, first and last included."""
 
@@ -156,6 +173,11 @@ class Record:
         value = self.angle(first, last) if angle else self.real(first, last)
         if value < 0:
             raise self.error(f"columns {first}-{last}: the standard deviation is negative")
+        try:
+            format_deviations((value,), (angle,))
+        except ValueError:
+            # An exponent can say what the output files, which repeat it, could not.
+            raise self.error(f"columns {first}-{last}: the standard deviation is out of range") from None
         return value
 
     def position(self, geographic: bool) -> tuple[float, float, float]:
@@ -166,6 +188,10 @@ class Record:
         if abs(latitude) > QUARTER_CIRCLE:
             raise self.error("columns 21-32: the latitude is beyond 90 degrees")
         return longitude, latitude, height
+
+    def attitude(self) -> tuple[float, float, float]:
+        """Read columns 9-44 as omega, phi and kappa in radians."""
+        return self.angle(9, 20), self.angle(21, 32), self.angle(33, 44)
 
     def deviations(self, *angles: bool) -> tuple[float, float, float]:
         """Read the three standard deviations of columns 45-74; `angles` says which are DMS."""

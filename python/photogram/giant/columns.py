@@ -1,0 +1,309 @@
+"""Columns of many records at once, read and written as arrays.
+
+:mod:`photogram.giant.fields` says what a field means; here the plain ones, which are nearly all, go the same
+way a million at a time. Fields that are not plain to read (blanks inside, exponents, letters, 60 minutes) are
+left to :class:`photogram.giant.records.Record`; numbers that are not plain to write to `format_real` and
+`format_angle`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram.giant.fields import ARCSEC, MOST_ANGLE, format_angle, format_deviations, format_real
+
+__all__ = ["Columns", "angle_fields", "deviation_fields", "position_fields", "real_fields", "texts"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+Table = NDArray[np.uint8]
+
+POWERS = 10 ** np.arange(19, dtype=np.int64)
+BLANK, POINT, MINUS, ZERO = b" .-0"
+RUN = 1 << 16
+"""Values that are written at a time."""
+TIE = 1e-4
+"""A number this close (in units of the last decimal) to the middle between two texts is rounded in decimal.
+
+Below 1e12 units, which twelve columns hold, a product with a power of ten is wrong by less."""
+
+
+class Columns:
+    """The columns `first` to `last` of many records.
+
+    Attributes
+    ----------
+    plain
+        (n,) which records held nothing but plain fields in what was read of them so far; values of the others
+        mean nothing.
+    """
+
+    def __init__(self, records: Sequence[str], first: int = 1, last: int = 80) -> None:
+        width = last - first + 1
+        text = "".join([record[first - 1 : last].ljust(width) for record in records])
+        characters = np.frombuffer(text.encode("ascii", "replace"), dtype=np.uint8)
+        self._table = characters.reshape(len(records), width)
+        self._first = first
+        self.plain = np.ones(len(records), dtype=bool)
+
+    def blank(self, first: int, last: int) -> Flags:
+        """Return which fields are blank."""
+        blank: Flags = (self._field(first, last) == BLANK).all(axis=1)
+        return blank
+
+    def real(self, first: int, last: int, decimals: int = 3) -> Floats:
+        """Read Fw.d fields; blank is zero."""
+        negative, digits, places = self._number(first, last, decimals)
+        # Twelve digits and a power of ten are exact, so that the quotient is the number nearest to the text.
+        size: Floats = digits / POWERS[places]
+        return np.where(negative, -size, size)
+
+    def angle(self, first: int, last: int, decimals: int = 3) -> Floats:
+        """Read packed DMS fields as radians."""
+        negative, digits, places = self._number(first, last, decimals)
+        unit = POWERS[places]
+        minutes, seconds = np.divmod(digits, 100 * unit)
+        degrees, minutes = np.divmod(minutes, 100)
+        self.plain &= (degrees <= 360) & (minutes < 60) & (seconds < 60 * unit)
+        size: Floats = ((3600 * degrees + 60 * minutes) * unit + seconds) / unit * ARCSEC
+        return np.where(negative & (digits > 0), -size, size)
+
+    def deviation(self, first: int, last: int, *, angle: bool = False) -> Floats:
+        """Read standard deviations; zero stands for the default."""
+        values = self.angle(first, last) if angle else self.real(first, last)
+        # Smaller angles could not be written again.
+        self.plain &= (values == 0) | (values > (1e-8 * ARCSEC if angle else 0))
+        return values
+
+    def position(self, geographic: bool) -> Floats:
+        """Read columns 9-44 (F12.3) as (n, 3): X, Y, Z, or longitude and latitude (rad) and height."""
+        if not geographic:
+            return np.column_stack([self.real(9, 20), self.real(21, 32), self.real(33, 44)])
+        longitude, latitude, height = self.angle(9, 20), self.angle(21, 32), self.real(33, 44)
+        self.plain &= np.abs(latitude) <= math.pi / 2
+        return np.column_stack([longitude, latitude, height])
+
+    def deviations(self, *angles: bool) -> Floats:
+        """Read columns 45-74 as (n, 3) standard deviations; `angles` says which are DMS."""
+        fields = zip((45, 55, 65), angles, strict=True)
+        return np.column_stack([self.deviation(first, first + 9, angle=angle) for first, angle in fields])
+
+    def attitude(self) -> Floats:
+        """Read columns 9-44 as (n, 3) omega, phi and kappa in radians."""
+        return np.column_stack([self.angle(first, first + 11) for first in (9, 21, 33)])
+
+    def rows(self, *values: Floats) -> list[tuple[Any, ...] | None]:
+        """Return what was read as (n, k) arrays record by record, and None for records that are not plain."""
+        rows = zip(*(zip(*array.T.tolist(), strict=True) for array in values), strict=True)
+        return [row if plain else None for row, plain in zip(rows, self.plain.tolist(), strict=True)]
+
+    def _field(self, first: int, last: int) -> Table:
+        return self._table[:, first - self._first : last - self._first + 1]
+
+    def _number(self, first: int, last: int, decimals: int) -> tuple[Flags, Integers, Integers]:
+        """Read a sign, the digits as a whole number, and how many of them are decimals."""
+        field = self._field(first, last)
+        negative = np.zeros(len(field), dtype=bool)
+        begun, ended, after_point = negative.copy(), negative.copy(), negative.copy()
+        digits = np.zeros(len(field), dtype=np.int64)
+        count, places = digits.copy(), digits.copy()
+        for character in field.T:
+            digit = character - np.uint8(ZERO)  # wraps around below "0"
+            is_digit = digit < 10
+            is_point, is_blank = character == POINT, character == BLANK
+            is_sign = (character == MINUS) | (character == ord("+"))
+            legal = is_blank | ((is_digit | (is_point & ~after_point) | (is_sign & ~begun)) & ~ended)
+            self.plain &= legal
+            negative |= character == MINUS
+            ended |= is_blank & begun
+            begun |= ~is_blank
+            after_point |= is_point
+            digits = np.where(is_digit, 10 * digits + digit, digits)
+            count += is_digit
+            places += is_digit & after_point
+        self.plain &= (count > 0) | ~begun
+        return negative, digits, np.where(after_point, places, decimals)
+
+
+def real_fields(values: ArrayLike, width: int, decimals: int) -> Table:
+    """Write numbers for Fw.d fields, each as :func:`photogram.giant.fields.format_real` does.
+
+    Parameters
+    ----------
+    values
+        (n, k) numbers.
+    width, decimals
+        Of the field, at most 12 columns.
+
+    Returns
+    -------
+    (n, k width) characters.
+
+    Raises
+    ------
+    ValueError
+        A number that is infinite or too large for the field.
+    """
+    return _in_runs(values, width, lambda run: _reals(run, width, decimals))
+
+
+def _reals(values: Floats, width: int, decimals: int) -> Table:
+    negative, size = values < 0, np.abs(values)
+    whole = np.searchsorted(POWERS[:width], size, side="right")
+    places = width - 1 - negative - whole
+    plain = np.isfinite(values) & (places >= decimals)
+    units, tied = _rounded(np.where(plain, size, 0.0), np.where(plain, places, decimals))
+    units, places = _fitting(units, places, whole + places)
+    table = _characters(negative, units, places, decimals, width)
+    return _with_others(table, values, plain & ~tied, lambda value: format_real(value, width, decimals))
+
+
+def angle_fields(values: ArrayLike, width: int) -> Table:
+    """Write radians as packed DMS fields, each as :func:`photogram.giant.fields.format_angle` does.
+
+    Parameters
+    ----------
+    values
+        (n, k) angles in radians.
+    width
+        Of the field, at most 12 columns.
+
+    Returns
+    -------
+    (n, k width) characters.
+
+    Raises
+    ------
+    ValueError
+        An angle that is beyond 360 degrees.
+    """
+    return _in_runs(values, width, lambda run: _angles(run, width))
+
+
+def _angles(values: Floats, width: int) -> Table:
+    negative, size = values < 0, np.abs(values)
+    plain = size <= MOST_ANGLE
+    seconds = np.where(plain, size, 0.0) / ARCSEC
+    room = width - 1 - negative
+    whole = np.searchsorted(
+        POWERS[:width], _packed(seconds.astype(np.int64), np.zeros_like(room)), side="right"
+    )
+    places = room - np.maximum(whole, 1)
+    units, _ = _rounded(seconds, places)
+    exact = units / POWERS[places] * ARCSEC == size
+    five = np.minimum(places, 5)
+    rounded, tied = _rounded(seconds, five)
+    places = np.where(exact, places, five)
+    units, places = _fitting(_packed(np.where(exact, units, rounded), places), places, room)
+    table = _characters(negative, units, places, 4, width)
+    unsigned = plain & negative & (places < 4) & ~exact
+    if unsigned.any():
+        table[unsigned] = _angles(values[unsigned] + 2 * math.pi, width)
+    plain &= exact | ~tied
+    return _with_others(table, values, plain | unsigned, lambda value: format_angle(value, width))
+
+
+def position_fields(positions: ArrayLike, geographic: bool) -> Table:
+    """Write (n, 3) coordinates (F12.3): X, Y, Z, or longitude and latitude (rad) and height.
+
+    Returns
+    -------
+    (n, 36) characters.
+
+    Raises
+    ------
+    ValueError
+        A number that does not fit its field.
+    """
+    positions = np.asarray(positions, dtype=np.float64).reshape(-1, 3)
+    if not geographic:
+        return real_fields(positions, 12, 3)
+    return np.hstack([angle_fields(positions[:, :2], 12), real_fields(positions[:, 2:], 12, 3)])
+
+
+def deviation_fields(deviations: Sequence[tuple[float, ...]], angles: Sequence[bool]) -> list[str]:
+    """Write the standard deviations of records, each as `photogram.giant.fields.format_deviations` does."""
+    # A file has few different ones.
+    different = {values: format_deviations(values, angles) for values in set(deviations)}
+    return [different[values] for values in deviations]
+
+
+def texts(table: Table) -> list[str]:
+    """Return the rows of a table of characters."""
+    width = table.shape[1]
+    text = table.tobytes().decode("ascii")
+    return [text[start : start + width] for start in range(0, len(text), width)]
+
+
+def _in_runs(values: ArrayLike, width: int, write: Callable[[Floats], Table]) -> Table:
+    """Write (n, k) values as (n, k width) characters, in runs that stay in the processor's cache."""
+    values = np.asarray(values, dtype=np.float64)
+    flat = values.ravel()
+    table = np.empty((len(flat), width), dtype=np.uint8)
+    for start in range(0, len(flat), RUN):
+        table[start : start + RUN] = write(flat[start : start + RUN])
+    return table.reshape(len(values), values.shape[1] * width)
+
+
+def _rounded(values: Floats, places: Integers) -> tuple[Integers, Flags]:
+    """Round to decimals: whole units of the last one, and which are too near to the middle of two to tell."""
+    scaled = values * POWERS[places]
+    units = np.rint(scaled)
+    return units.astype(np.int64), np.abs(scaled - units) > 0.5 - TIE
+
+
+def _fitting(units: Integers, places: Integers, room: Integers) -> tuple[Integers, Integers]:
+    """Give up the last decimal, a zero, where rounding up made one more digit than there is room for."""
+    carried = (units >= POWERS[np.clip(room, 0, 18)]) & (places > 0)
+    return np.where(carried, units // 10, units), places - carried
+
+
+def _packed(units: Integers, places: Integers) -> Integers:
+    """Turn seconds of arc into degrees, minutes and seconds, DDDMMSS; both in units of the last decimal."""
+    unit = POWERS[places]
+    minutes, seconds = np.divmod(units, 60 * unit)
+    degrees, minutes = np.divmod(minutes, 60)
+    packed: Integers = (10000 * degrees + 100 * minutes) * unit + seconds
+    return packed
+
+
+def _characters(negative: Flags, units: Integers, places: Integers, least: int, width: int) -> Table:
+    """Write units of the last decimal with an explicit point, right-justified.
+
+    Zeros at the end go, down to `least` decimals; the zero before the point only where there is no room.
+    """
+    units, places = units.copy(), places.copy()
+    rows = np.flatnonzero(places > least)
+    while rows.size:
+        rows = rows[units[rows] % 10 == 0]
+        units[rows] //= 10
+        places[rows] -= 1
+        rows = rows[places[rows] > least]
+    negative = negative & (units > 0)
+    table = np.full((width, len(units)), BLANK, dtype=np.uint8)
+    signed = ~negative
+    for place, column in enumerate(table[::-1]):
+        # The place counts from the right and includes the point.
+        units_left = np.where(place == places, units, units // 10)
+        first_whole = (place == places + 1) & (place + negative < width)
+        is_digit = (place != places) & ((units > 0) | (place < places) | first_whole)
+        column[is_digit] = (units - 10 * units_left + ZERO)[is_digit]
+        column[place == places] = POINT
+        sign = ~signed & ~is_digit & (place > places)
+        column[sign] = MINUS
+        signed |= sign
+        units = units_left
+    return np.ascontiguousarray(table.T)
+
+
+def _with_others(table: Table, values: Floats, plain: Flags, write: Callable[[float], str]) -> Table:
+    """Write the values that are not plain one by one."""
+    for row in np.flatnonzero(~plain).tolist():
+        table[row] = np.frombuffer(write(float(values[row])).encode("ascii"), dtype=np.uint8)
+    return table
