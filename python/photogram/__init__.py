@@ -7,6 +7,7 @@ from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
+from photogram.resection import Pose, Resection, resect
 from photogram.result import Result
 from photogram.simulation import Simulation, simulate
 
@@ -18,12 +19,15 @@ __all__ = [
     "Iteration",
     "Message",
     "PhotogramError",
+    "Pose",
     "Progress",
     "RankError",
+    "Resection",
     "Result",
     "Simulation",
     "Spheroid",
     "__version__",
     "adjust",
+    "resect",
     "simulate",
 ]

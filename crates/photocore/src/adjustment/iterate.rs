@@ -1,6 +1,6 @@
 //! Iteration to the least-squares solution.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::time::Instant;
 
 use rayon::ThreadPool;
@@ -19,6 +19,16 @@ pub enum Criterion {
     /// When the weighted sum of squares changes by less than this percentage from one iteration to the next, as in the
     /// 1987 program (GIANT guide, section 6); no damping.
     Percent(f64),
+    /// When the corrections of some unknowns, taken as one vector, are shorter than `limit`, as in program W5344 (USGS Computer
+    /// Contribution 2, 1969); no damping. The cofactors are those of the normal equations that gave the last corrections.
+    Length {
+        /// The first of these unknowns, in the order of the layout.
+        first: usize,
+        /// How many there are.
+        count: usize,
+        /// In their units.
+        limit: f64,
+    },
 }
 
 /// How to adjust.
@@ -111,6 +121,8 @@ pub struct Adjustment {
     pub initial_sum_of_squares: f64,
     /// Every iteration.
     pub iterations: Vec<Iteration>,
+    /// The kept unknowns and the border after each iteration.
+    pub history: Vec<Vec<f64>>,
     /// Adjusted unknowns, in the order of the layout.
     pub unknowns: Vec<f64>,
     /// Observed minus computed, in the order of groups and rows, in the units of the observations.
@@ -163,8 +175,16 @@ pub fn adjust<M: Model>(
     pool: &ThreadPool,
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
 ) -> Result<Adjustment, AdjustError> {
-    let mut run =
-        Run { problem, options, pool, watch, seconds: Seconds::default(), formations: 0, iterations: vec![] };
+    let mut run = Run {
+        problem,
+        options,
+        pool,
+        watch,
+        seconds: Seconds::default(),
+        formations: 0,
+        iterations: vec![],
+        history: vec![],
+    };
     let start = run.form(problem.initial.clone(), 0.0)?;
     if !start.sum_of_squares.is_finite() {
         return Err(AdjustError::NotFinite);
@@ -173,6 +193,7 @@ pub fn adjust<M: Model>(
     let end = match options.criterion {
         Criterion::Fraction(fraction) => run.strictly(start, fraction)?,
         Criterion::Percent(percent) => run.as_published(start, percent)?,
+        Criterion::Length { first, count, limit } => run.until_short(start, first..first + count, limit)?,
     };
     run.finish(end, initial_sum_of_squares)
 }
@@ -218,6 +239,7 @@ struct Run<'a, 'w, M: Model> {
     seconds: Seconds,
     formations: usize,
     iterations: Vec<Iteration>,
+    history: Vec<Vec<f64>>,
 }
 
 /// A step is accepted when the sum of squares does not rise by more than its own rounding error.
@@ -266,7 +288,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
             if next.sum_of_squares <= highest && next.normals.deficient_locals.is_empty() {
                 best = next.sum_of_squares;
-                self.tell(Iteration { sum_of_squares: best, ..iteration })?;
+                self.tell(Iteration { sum_of_squares: best, ..iteration }, &next.unknowns)?;
                 state = next;
             } else {
                 state = self.form(unknowns, harder)?;
@@ -302,7 +324,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
             if !sum_of_squares.is_finite() {
                 return Ok(End { status: Status::Diverged, unknowns, basis: Some(solved.basis), last: None });
             }
-            self.tell(Iteration { number, sum_of_squares, largest_change: solved.change, damping: 0.0 })?;
+            let iteration = Iteration { number, sum_of_squares, largest_change: solved.change, damping: 0.0 };
+            self.tell(iteration, &state.unknowns)?;
             match previous.map(|before| (sum_of_squares - before) / before * 100.0) {
                 Some(change) if change.abs() < percent => return self.stay(state, Status::Converged),
                 Some(change) if change >= percent => return self.stay(state, Status::Diverged),
@@ -310,6 +333,37 @@ impl<'a, M: Model> Run<'a, '_, M> {
             }
         }
         self.stay(state, Status::NotConverged)
+    }
+
+    /// The iteration of program W5344: full steps until the corrections of the unknowns in `tested` are short.
+    fn until_short(
+        &mut self,
+        start: State<'a, M>,
+        tested: Range<usize>,
+        limit: f64,
+    ) -> Result<End<'a, M>, AdjustError> {
+        let mut state = start;
+        loop {
+            let unknowns = state.unknowns.clone();
+            let Some(Solved { basis, step, change }) = self.solve_unless_lost(state)? else {
+                return Ok(End { status: Status::Diverged, unknowns, basis: None, last: None });
+            };
+            let number = self.iterations.len() + 1;
+            let length = step[tested.clone()].iter().map(|dx| dx * dx).sum::<f64>().sqrt();
+            let values: Vec<f64> = unknowns.iter().zip(&step).map(|(x, dx)| x + dx).collect();
+            let mut iteration =
+                Iteration { number, sum_of_squares: f64::NAN, largest_change: change, damping: 0.0 };
+            if length < limit || number >= self.options.max_iterations {
+                let status = if length < limit { Status::Converged } else { Status::NotConverged };
+                return Ok(End { status, unknowns, basis: Some(basis), last: Some((iteration, step)) });
+            }
+            state = self.form(values, 0.0)?;
+            iteration.sum_of_squares = state.sum_of_squares;
+            if !iteration.sum_of_squares.is_finite() {
+                return Ok(End { status: Status::Diverged, unknowns, basis: Some(basis), last: None });
+            }
+            self.tell(iteration, &state.unknowns)?;
+        }
     }
 
     /// Ends at the values reached, without a further step.
@@ -389,7 +443,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let residuals = problem.residuals(self.pool, &unknowns);
         if let Some((last, _)) = end.last {
             let sum_of_squares = problem.sum_of_squares(&residuals) + problem.prior_sum_of_squares(&unknowns);
-            self.tell(Iteration { sum_of_squares, ..last })?;
+            self.tell(Iteration { sum_of_squares, ..last }, &unknowns)?;
         }
         let cofactors = match end.basis {
             Some(basis) if self.options.covariance => Some(self.cofactors(basis)?),
@@ -402,6 +456,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             status: end.status,
             initial_sum_of_squares,
             iterations: self.iterations,
+            history: self.history,
             unknowns,
             residuals,
             redundancy: cofactors.as_ref().map(redundancy),
@@ -436,8 +491,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
         stopped((self.watch)(Event::Progress { phase, done: 0, total }))
     }
 
-    fn tell(&mut self, iteration: Iteration) -> Result<(), AdjustError> {
+    fn tell(&mut self, iteration: Iteration, unknowns: &[f64]) -> Result<(), AdjustError> {
         self.iterations.push(iteration);
+        self.history.push(unknowns[self.problem.layout().all_locals().end..].to_vec());
         stopped((self.watch)(Event::Iteration(iteration)))
     }
 }
