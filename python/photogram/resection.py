@@ -261,8 +261,7 @@ def resect(
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """What a photo shows: (n, 3) control, (n, 2) images, standard deviations, principal distance, n
-    names."""
+    """What a photo shows: control (n, 3), images (n, 2), their standard deviations, n names."""
 
     points: Floats
     point_sd: Floats

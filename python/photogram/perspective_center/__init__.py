@@ -1,4 +1,4 @@
-"""Perspective centre of a projector from grid measurements (J. D. McLaurin, USGS Computer Contribution 2, 1969)."""
+"""Perspective centre of a projector from grid measurements (USGS Computer Contribution 2, 1969)."""
 
 from photogram.perspective_center.batch import Run, Stop, run_deck
 from photogram.perspective_center.deck import read_deck

@@ -1,7 +1,8 @@
 """Decks of cards of program W5344 (USGS Computer Contribution 2, 1969, "Input").
 
-A deck is one or more jobs. A job is a title, two FORMATs, specifications, coordinatograph factors if asked for, the plate
-grid, and one or more sets of readings, each with initial approximations before it and a flag card behind it.
+A deck is one or more jobs. A job is a title, two FORMATs, specifications, coordinatograph factors if asked
+for, the plate grid, and one or more sets of readings, each with initial approximations before it and a flag
+card behind it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.errors import InputError
 from photogram.giant.records import Record, Source
 from photogram.messages import Message
 from photogram.perspective_center.formats import CardFormat
@@ -44,7 +44,8 @@ class Job:
     coordinatograph
         Factors of card 5, None without.
     principal_distance, tolerance
-        Millimetres, positive (FOCAL); the limit of the iteration as published (GDIF), in the unit of the model.
+        Millimetres, positive (FOCAL); the limit of the iteration as published (GDIF), in the unit of the
+        model.
     numbers, plate_xy
         Point numbers, and (n, 2) coordinates in millimetres, of the plate grid.
     """
@@ -135,7 +136,9 @@ class Deck:
             card = self._card("a card of the plate grid")
             row = plate_format.read(card)
             if row[0] == 0:
-                raise card.error("a point of the plate grid cannot have the number 0, which is that of the flag card")
+                raise card.error(
+                    "a point of the plate grid cannot have the number 0, which is that of the flag card"
+                )
             if row[0] in rows:
                 raise card.error(f"point {row[0]} stands in the plate grid twice")
             rows[row[0]] = row
@@ -158,8 +161,8 @@ class Deck:
         )
 
     def _readings(self, job: Job) -> list[Floats]:
-        """Read all readings of all points, (k, 3) each, and the flag card (report, "Input"; specification, 5.1)."""
-        readings = []
+        """Read all readings of all points, (k, 3) each, and the flag card (specification, 5.1)."""
+        readings: list[Floats] = []
         card, point, xyz = self._reading(job)
         for expected in job.numbers:
             if point != expected:
@@ -190,7 +193,7 @@ def read_deck(path: Path) -> list[Grid]:
     Raises
     ------
     InputError
-        A card that cannot be used; its file, number and text are named. Points in another order than on the plate say `ERROR -
-        CARDS ARE OUT OF ORDER AT POINT NO.` and the number expected, as the report has it.
+        A card that cannot be used; its file, number and text are named. Points in another order than on the
+        plate say `ERROR - CARDS ARE OUT OF ORDER AT POINT NO.` and the number expected, as the report has it.
     """
     return list(Deck(path).grids())

@@ -1,7 +1,8 @@
 """Cards read by a FORMAT that stands on a card itself, by the rules of FORTRAN IV.
 
-The package fortranformat reads the FORMAT and the numbers. What FORTRAN IV (1969) does otherwise than later FORTRAN, and what
-a card must be refused for, is here: blanks inside a field count as zeros, a card has eighty columns, and NaN has no spelling.
+The package fortranformat reads the FORMAT and the numbers. What FORTRAN IV (1969) does otherwise than later
+FORTRAN, and what a card must be refused for, is here: blanks inside a field count as zeros, a card has eighty
+columns, and NaN has no spelling.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ class CardFormat:
     Parameters
     ----------
     text
-        For example `(I4,2F10.0)`: the descriptors I, F, E, D, X and T, repeats and groups. What follows the closing
-        parenthesis is not looked at.
+        For example `(I4,2F10.0)`: the descriptors I, F, E, D, X and T, repeats and groups. What follows the
+        closing parenthesis is not looked at.
     reals, integers
         How many numbers are wanted of it; the FORMAT may have more.
 
@@ -60,14 +61,16 @@ class CardFormat:
         try:
             self._reader = fortranformat.FortranRecordReader(self.text)
             ruler = "".join(chr(_FIRST + column) for column in range(4 * COLUMNS))
-            # Read as text, the ruler says which columns each field has; a card of zeros says what the fields hold.
+            # Read as text, the ruler says which columns a field has; a card of zeros, what it holds.
             fields = fortranformat.FortranRecordReader(_NUMERIC.sub(r"A\2", self.text)).read(ruler)
             kinds = [type(value) for value in self._reader.read("0" * 4 * COLUMNS)]
         except Exception as error:  # fortranformat raises many kinds of exceptions, some of them its own
             raise ValueError(f"{self.text} is no FORMAT: {error}") from None
         wanted = [int] * integers + [float] * reals
         if kinds[: len(wanted)] != wanted:
-            raise ValueError(f"{self.text} does not give {integers} whole and {reals} real numbers in this order")
+            raise ValueError(
+                f"{self.text} does not give {integers} whole and {reals} real numbers in this order"
+            )
         columns = [(ord(field[0]) - _FIRST, ord(field[-1]) - _FIRST + 1) for field in fields[: len(wanted)]]
         if max(last for _, last in columns) > COLUMNS:
             raise ValueError(f"{self.text} reaches beyond column {COLUMNS}")

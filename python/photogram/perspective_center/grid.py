@@ -38,8 +38,8 @@ class Coordinatograph:
     def correct(self, xy: Floats) -> Floats:
         """Correct the (n, 2) means of a set (specification, 5.3).
 
-        They are counted from the smallest absolute values of X and Y in the set, as the program does: for positive coordinates
-        the corner of the grid. X uses the uncorrected Y.
+        They are counted from the smallest absolute values of X and Y in the set, as the program does: for
+        positive coordinates the corner of the grid. X uses the uncorrected Y.
         """
         anchor = np.abs(xy).min(axis=0)
         x, y = (xy - anchor).T
@@ -63,7 +63,8 @@ class Grid:
     principal_distance
         Millimetres, positive.
     initial
-        (6,) approximations: position in the unit of the model, then omega, phi, kappa in radians; None without.
+        (6,) approximations: position in the unit of the model, then omega, phi, kappa in radians; None
+        without.
     tolerance
         Limit of the iteration as published (GDIF), in the unit of the model.
     readings
@@ -95,7 +96,11 @@ class Grid:
 
     def __post_init__(self) -> None:
         count = len(self.ids)
-        shapes = {"plate_xy": (count, 2), "model": (count, 3), "reading_sd": (count, 2)}
+        shapes: dict[str, tuple[int, ...]] = {
+            "plate_xy": (count, 2),
+            "model": (count, 3),
+            "reading_sd": (count, 2),
+        }
         if self.initial is not None:
             shapes["initial"] = (6,)
         for name, shape in shapes.items():
@@ -123,7 +128,7 @@ def reduce(
     title: str = "",
     number: int = 1,
 ) -> Grid:
-    """Reduce readings to a grid: means, standard deviations (divisor k - 1), correction for the coordinatograph.
+    """Reduce readings to a grid: means, standard deviations (divisor k - 1), corrections.
 
     Parameters
     ----------

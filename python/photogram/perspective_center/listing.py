@@ -1,7 +1,8 @@
 """The listing of program W5344, item by item (report, Attachment D; specification, section 6).
 
-Columns follow the FORMAT statements of the program's listing; those of the input table, which are lost, the sample printout.
-The first character of a FORTRAN record was its carriage control and was not printed: a record begins here with its second.
+Columns follow the FORMAT statements of the program's listing; those of the input table, which are lost, the
+sample printout. The first character of a FORTRAN record was its carriage control and was not printed: a
+record begins here with its second.
 """
 
 from __future__ import annotations
@@ -50,7 +51,8 @@ def _input(grid: Grid) -> list[str]:
     lines += [
         "",
         f"{'':5}THE NUMBER OF POINTS USED ON THIS PLATE IS{len(grid.ids):4d}",
-        f"{'':4}THE ASSUMED PRINCIPAL DISTANCE USED IN THESE COMPUTATIONS IS{_f(grid.principal_distance, 15)}",
+        f"{'':4}THE ASSUMED PRINCIPAL DISTANCE USED IN THESE COMPUTATIONS IS"
+        f"{_f(grid.principal_distance, 15)}",
         "",
         f"{'':5}COORDINATES OF INPUT DATA",
         f"{'':8}NO. OF{'CALIBRATED GRID COORD':>27}{'PROJECTED GRID COORDINATES':>38}",
@@ -75,7 +77,8 @@ def _input(grid: Grid) -> list[str]:
 def _iteration(result: PerspectiveCenter) -> list[str]:
     """Items 5 and 6."""
     lines = [
-        f"{number:3d}{_f(cycle.position, 11, 2)}{_f(cycle.correction, 10, 4)}{_f(cycle.attitude_minutes, 10, 4)}"
+        f"{number:3d}{_f(cycle.position, 11, 2)}{_f(cycle.correction, 10, 4)}"
+        f"{_f(cycle.attitude_minutes, 10, 4)}"
         for number, cycle in enumerate(result.cycles, 1)
     ]
     if not result.converged:
@@ -83,7 +86,8 @@ def _iteration(result: PerspectiveCenter) -> list[str]:
     if result.as_published:
         lines += [
             "",
-            f"{'':5}WITH THIS ITERATION THE SQUARE ROOT OF DX2+DY2+DZ2 IS LESS THAN{_f(result.grid.tolerance, 10)}",
+            f"{'':5}WITH THIS ITERATION THE SQUARE ROOT OF DX2+DY2+DZ2 IS LESS THAN"
+            f"{_f(result.grid.tolerance, 10)}",
         ]
     else:
         lines += ["", f"{'':5}THE CORRECTIONS ARE A NEGLIGIBLE PART OF THE STANDARD ERRORS"]
@@ -145,7 +149,7 @@ def _errors(result: PerspectiveCenter) -> list[str]:
 
 
 def _stop(stop: Stop) -> list[str]:
-    """What was printed before the program stopped, and its message."""
+    """Return what was printed before the program stopped, and its message."""
     error = stop.error
     text = SINGULAR if isinstance(error, RankError) else getattr(error, "message", str(error))
     lines = _head(stop.title, stop.number) if stop.title is not None else []

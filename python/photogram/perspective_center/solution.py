@@ -1,7 +1,8 @@
 """Perspective centre and attitude of a projector from a projected grid (USGS Computer Contribution 2, 1969).
 
-Plate coordinates are the observations, mean model coordinates are taken as free of error, as in the report; the covariance
-and the test values follow from the residuals of the adjustment itself. `docs/perspective-center.md` has the formulae.
+Plate coordinates are the observations, mean model coordinates are taken as free of error, as in the report;
+the covariance and the test values follow from the residuals of the adjustment itself.
+`docs/perspective-center.md` has the formulae.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ MOST_CYCLES = 6
 """Cycles of the program before it gives up."""
 STRICT_CYCLES = 50
 STRICT_FRACTION = 1e-9
-"""Of the standard deviations of the unknowns for a unit weight of a millimetre: far below those of a real plate."""
+"""Of the standard deviations of the unknowns for a unit weight of a millimetre: far below those of a real
+plate."""
 SINGULAR = "NORMAL EQUATIONS MATRIX IS SINGULAR"
 REPORT_ORDER = [3, 4, 5, 0, 1, 2]
 """Omega, phi, kappa before X, Y, Z."""
@@ -67,8 +69,8 @@ class PerspectiveCenter:
     cofactors
         (6, 6) of omega, phi, kappa, Xc, Yc, Zc for a unit weight of one millimetre on the plate.
     sigma0_plate, sigma0_model
-        Standard error of unit weight of plate coordinates (mm) and of projected coordinates in the model (its unit); None
-        without redundancy.
+        Standard error of unit weight of plate coordinates (mm) and of projected coordinates in the model (its
+        unit); None without redundancy.
     degrees_of_freedom
         2 n - 6.
     weights
@@ -76,11 +78,11 @@ class PerspectiveCenter:
     residual, projected
         (n, 2) measured minus projected, and projected coordinates, in the model.
     observed_radius, fixed_radius, radial_distortion
-        (n,) radii on the plate of the measured point transformed there and of the grid point, and their difference, positive
-        outward.
+        (n,) radii on the plate of the measured point transformed there and of the grid point, and their
+        difference, positive outward.
     redundancy, standardized
-        (n, 2) redundancy numbers of the residuals in X and Y, and residual / its own standard deviation, the latter from
-        `sigma0_plate`; NaN without redundancy.
+        (n, 2) redundancy numbers of the residuals in X and Y, and residual / its own standard deviation, the
+        latter from `sigma0_plate`; NaN without redundancy.
     messages
         Remarks on the solution.
     """
@@ -112,7 +114,7 @@ class PerspectiveCenter:
 
     @property
     def covariance(self) -> Floats | None:
-        """(6, 6) variance-covariance matrix of omega, phi, kappa (rad), Xc, Yc, Zc; None without redundancy."""
+        """(6, 6) variance-covariance matrix of omega, phi, kappa (rad), Xc, Yc, Zc, if any."""
         return None if self.sigma0_plate is None else self.cofactors * self.sigma0_plate**2
 
     @property
@@ -139,15 +141,18 @@ def determine(
     grid
         The projected grid.
     as_published
-        Iterate, and form residuals, as the program does: six cycles at the most, until the correction of the position is
-        shorter than the tolerance; coefficients with plate coordinates in place of computed ones; the last correction in the
-        residuals; one scale, that of the last point. Otherwise: least squares to strict convergence, from a direct solution
-        where the approximations do not lead there, residuals by projection onto the height of each point.
+        Iterate, and form residuals, as the program does: six cycles at the most, until the correction of the
+        position is shorter than the tolerance; coefficients with plate coordinates in place of computed ones;
+        the last correction in the residuals; one scale, that of the last point. Otherwise: least squares to
+        strict convergence, from a direct solution where the approximations do not lead there, residuals by
+        projection onto the height of each point.
     weights
-        `equal` as in the report; `readings`: every mean has the weight of its number of readings; `deviations`: its weight is
-        the reciprocal square of the standard deviation of the mean, from its own readings in X and Y together.
+        `equal` as in the report; `readings`: every mean has the weight of its number of readings;
+        `deviations`: its weight is the reciprocal square of the standard deviation of the mean, from its own
+        readings in X and Y together.
     model_sd
-        (n,) standard deviations of the mean model coordinates; their reciprocal squares are the weights instead.
+        (n,) standard deviations of the mean model coordinates; their reciprocal squares are the weights
+        instead.
 
     Raises
     ------
@@ -183,9 +188,12 @@ def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats
     bad = np.flatnonzero(~((variance > 0) & np.isfinite(variance)))
     if bad.size:
         names = ", ".join(str(grid.ids[index]) for index in bad[:12])
-        raise InputError(f"no standard deviation to weight by at the points {names}: one reading, or equal ones")
+        raise InputError(
+            f"no standard deviation to weight by at the points {names}: one reading, or equal ones"
+        )
     weight: Floats = 1.0 / variance
-    return weight / weight.mean()
+    weight /= weight.mean()
+    return weight
 
 
 Solved = tuple[_photocore.ResectionSolution, list[Message]]
@@ -281,7 +289,8 @@ def _result(
 def _projection(grid: Grid, position: Floats, attitude: Floats) -> tuple[Floats, Floats]:
     """Project the plate points onto the heights of the model points.
 
-    The ray of (x, y, -c) has the direction e = M^T (x, y, -c) and meets the height Z where X = Xc + t e, t = (Z - Zc) / e_Z.
+    The ray of (x, y, -c) has the direction e = M^T (x, y, -c) and meets the height Z where X = Xc + t e, t =
+    (Z - Zc) / e_Z.
 
     Returns
     -------
@@ -306,8 +315,8 @@ def _tests(
 ) -> tuple[Floats, Floats]:
     """Redundancy numbers and standardized residuals in the model.
 
-    The residuals on the plate have the cofactors P^-1 - A Q A^T; both sides turned into the model, the quotient of their
-    diagonals is the part of an error of X or Y that shows in its residual.
+    The residuals on the plate have the cofactors P^-1 - A Q A^T; both sides turned into the model, the
+    quotient of their diagonals is the part of an error of X or Y that shows in its residual.
     """
     partials = solution.partials
     observed = np.eye(2) / weight[:, np.newaxis, np.newaxis]
