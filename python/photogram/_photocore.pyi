@@ -454,5 +454,9 @@ class ResectionSolution:
         """Other poses (6 values) that fit about as well, with their sums of squares."""
 
     @property
+    def undetermined(self) -> str | None:
+        """Why a further pose that fits is not determined, a kind as in `ResectionError`; None without one."""
+
+    @property
     def outside_danger_cylinder(self) -> float | None:
         """Distance of the projection centre from the danger cylinder, negative inside, or None."""

@@ -29,8 +29,8 @@ REASONS = {
     "too few points": "fewer than three points do not determine a pose",
     "collinear": "the points are on one line, about which the photo can turn",
     "danger cylinder": (
-        "the points are on a circle and the projection centre is on the right cylinder over it"
-        " (the danger cylinder), where they do not determine the pose"
+        "the projection centre is on the danger cylinder, the right cylinder over the circle through three"
+        " points, where these do not determine the pose"
     ),
     "undetermined": "the observations do not determine the pose",
 }
@@ -100,8 +100,8 @@ class Resection:
         Other poses that fit about as well: minima whose weighted sum of squares is larger by at most nine
         variances of unit weight. With three points there are often one to three of them.
     outside_danger_cylinder
-        Distance of the projection centre from the danger cylinder, negative inside; None unless the points
-        are on a circle.
+        Distance of the projection centre from the danger cylinder, negative inside; None unless there are
+        exactly three points.
     """
 
     status: str
@@ -399,6 +399,10 @@ def _messages(solution: _photocore.ResectionSolution, spheroid: Spheroid | None)
                 f"{count} other pose{'s fit' if count > 1 else ' fits'} about as well;"
                 " more points, or a known position or attitude, would tell which is right"
             )
+        )
+    if solution.undetermined is not None:
+        messages.append(
+            Message(f"another pose that fits is not determined: {REASONS[solution.undetermined]}")
         )
     outside = solution.outside_danger_cylinder
     if outside is not None and abs(outside) < DOUBTFUL * _largest_position_sd(solution, spheroid):

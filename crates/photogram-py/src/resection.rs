@@ -128,13 +128,21 @@ fn pose(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<[[f64; 3]; 
 
 fn kind(error: Failure) -> &'static str {
     match error {
-        Failure::TooFewPoints(_) | Failure::Undetermined(Degeneracy::TooFewPoints) => "too few points",
-        Failure::Collinear | Failure::Undetermined(Degeneracy::Collinear) => "collinear",
-        Failure::Undetermined(Degeneracy::DangerCylinder) => "danger cylinder",
-        Failure::Undetermined(Degeneracy::Unnamed) => "undetermined",
+        Failure::TooFewPoints(_) => degeneracy(Degeneracy::TooFewPoints),
+        Failure::Collinear => degeneracy(Degeneracy::Collinear),
+        Failure::Undetermined(why) => degeneracy(why),
         Failure::NoPlacement => "no placement",
         Failure::NotFinite => "not finite",
         Failure::Interrupted | Failure::TooManyPoints => "input",
+    }
+}
+
+fn degeneracy(why: Degeneracy) -> &'static str {
+    match why {
+        Degeneracy::TooFewPoints => "too few points",
+        Degeneracy::Collinear => "collinear",
+        Degeneracy::DangerCylinder => "danger cylinder",
+        Degeneracy::Unnamed => "undetermined",
     }
 }
 
@@ -247,6 +255,11 @@ impl ResectionSolution {
     fn alternatives(&self) -> Vec<([f64; 6], f64)> {
         let alternatives = &self.solution.alternatives;
         alternatives.iter().map(|other| (joined(&other.pose), other.sum_of_squares)).collect()
+    }
+
+    #[getter]
+    fn undetermined(&self) -> Option<&'static str> {
+        self.solution.undetermined.map(degeneracy)
     }
 
     #[getter]

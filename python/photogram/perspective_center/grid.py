@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.errors import InputError
 from photogram.arrays import shaped
+from photogram.errors import InputError
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "reduce"]
 

@@ -16,7 +16,7 @@ pub enum Degeneracy {
     TooFewPoints,
     /// All points are on one line.
     Collinear,
-    /// All points are on a circle, and the projection centre is on the right cylinder over it.
+    /// There are three points, and the projection centre is on the right cylinder over the circle through them.
     DangerCylinder,
     /// None of these.
     Unnamed,
@@ -25,13 +25,12 @@ pub enum Degeneracy {
 impl Degeneracy {
     /// Names what is wrong with points seen from a projection centre (cartesian).
     pub(super) fn of(points: &[Vector3], centre: &Vector3) -> Self {
-        let on_cylinder =
-            |circle: Circle| circle.outside_cylinder(centre).abs() <= ON_CYLINDER * circle.radius;
+        let on_cylinder = |(outside, radius): (f64, f64)| outside.abs() <= ON_CYLINDER * radius;
         if points.len() < 3 {
             Degeneracy::TooFewPoints
         } else if collinear(points) {
             Degeneracy::Collinear
-        } else if Circle::through(points).is_some_and(on_cylinder) {
+        } else if outside_cylinder(points, centre).is_some_and(on_cylinder) {
             Degeneracy::DangerCylinder
         } else {
             Degeneracy::Unnamed
@@ -48,48 +47,22 @@ pub(super) fn collinear(points: &[Vector3]) -> bool {
     offsets.iter().all(|offset| square(&cross(offset, &farthest)) <= limit)
 }
 
-/// The circle through points of a plane, if they are on one: centre, radius, normal of the plane.
-pub(super) struct Circle {
-    centre: Vector3,
-    radius: f64,
-    normal: Vector3,
-}
-
-impl Circle {
-    /// Largest distance from plane and circle, relative to the radius.
-    const TOLERANCE: f64 = 1e-6;
-
-    /// The circle through three or more points; None where they are not on one.
-    pub fn through(points: &[Vector3]) -> Option<Self> {
-        let (&first, rest) = points.split_first()?;
-        let second = *rest
-            .iter()
-            .max_by(|a, b| square(&difference(a, &first)).total_cmp(&square(&difference(b, &first))))?;
-        let along = difference(&second, &first);
-        let across = |point: &Vector3| square(&cross(&along, &difference(point, &first)));
-        let third = *rest.iter().max_by(|a, b| across(a).total_cmp(&across(b)))?;
-        let side = difference(&third, &first);
-        let normal = cross(&along, &side);
-        let size = square(&normal);
-        // The circumcentre of a triangle from one corner: (|a|^2 (b x n) + |b|^2 (n x a)) / 2 |n|^2.
-        let (p, q) = (cross(&side, &normal), cross(&normal, &along));
-        let offset: Vector3 =
-            std::array::from_fn(|k| (square(&along) * p[k] + square(&side) * q[k]) / (2.0 * size));
-        let radius = square(&offset).sqrt();
-        let centre = std::array::from_fn(|k| first[k] + offset[k]);
-        let circle = Self { centre, radius, normal: unit(&normal)? };
-        let on_circle = |point: &Vector3| {
-            let from = difference(point, &circle.centre);
-            let height = dot(&from, &circle.normal).abs();
-            height.max((square(&from).sqrt() - radius).abs()) <= Self::TOLERANCE * radius
-        };
-        points.iter().all(on_circle).then_some(circle)
-    }
-
-    /// Distance of a position from the danger cylinder, the right cylinder over the circle: negative inside.
-    pub fn outside_cylinder(&self, position: &Vector3) -> f64 {
-        let from = difference(position, &self.centre);
-        let height = dot(&from, &self.normal);
-        (square(&from) - height * height).max(0.0).sqrt() - self.radius
-    }
+/// Distance of a position from the danger cylinder of three points, the right cylinder over the circle through them, negative
+/// inside, and its radius. None unless there are exactly three points, and not on one line.
+///
+/// There the three points do not determine the pose: a small movement along the cylinder changes no angle between their rays
+/// to first order (Finsterwalder 1903). With a fourth point the cylinder is harmless.
+pub(super) fn outside_cylinder(points: &[Vector3], position: &Vector3) -> Option<(f64, f64)> {
+    let &[first, second, third] = points else { return None };
+    let (along, side) = (difference(&second, &first), difference(&third, &first));
+    let normal = cross(&along, &side);
+    let axis = unit(&normal)?;
+    // The circumcentre of a triangle from one corner: (|a|^2 (b x n) + |b|^2 (n x a)) / 2 |n|^2.
+    let (p, q) = (cross(&side, &normal), cross(&normal, &along));
+    let offset: Vector3 =
+        std::array::from_fn(|k| (square(&along) * p[k] + square(&side) * q[k]) / (2.0 * square(&normal)));
+    let radius = square(&offset).sqrt();
+    let from: Vector3 = std::array::from_fn(|k| position[k] - first[k] - offset[k]);
+    let height = dot(&from, &axis);
+    Some(((square(&from) - height * height).max(0.0).sqrt() - radius, radius))
 }

@@ -182,6 +182,7 @@ impl Resection {
         let starts = self.start.map_or_else(|| self.starts(), |start| Ok(vec![start]))?;
         let mut solved: Vec<Solved> = Vec::new();
         let mut failure = ResectionError::NoPlacement;
+        let mut undetermined = None;
         for start in starts {
             let mut adjusted = self.adjust_from(start, options, pool, watch);
             if let (None, Some(turned)) = (self.start, adjusted.as_ref().ok().and_then(|a| self.upright(a))) {
@@ -190,13 +191,18 @@ impl Resection {
             match adjusted {
                 Ok(adjusted) => solved.push(adjusted),
                 Err(ResectionError::Interrupted) => return Err(ResectionError::Interrupted),
-                Err(other) => failure = other,
+                Err(other) => {
+                    if let ResectionError::Undetermined(why) = other {
+                        undetermined = Some(why);
+                    }
+                    failure = other;
+                }
             }
         }
         solved.sort_by(|a, b| {
             b.converged().cmp(&a.converged()).then(a.sum_of_squares().total_cmp(&b.sum_of_squares()))
         });
-        Solution::new(self, solved).ok_or(failure)
+        Solution::new(self, solved, undetermined).ok_or(failure)
     }
 
     fn adjust_from(

@@ -1,6 +1,6 @@
 //! The adjusted photo.
 
-use super::degenerate::Circle;
+use super::degenerate::{Degeneracy, outside_cylinder};
 use super::model::SinglePhoto;
 use super::{Pose, Resection, Solved};
 use crate::adjustment::{Adjustment, Model, leading_matrix, standardized};
@@ -63,8 +63,11 @@ pub struct Solution {
     pub history: Vec<Pose>,
     /// Other minima whose sum of squares is larger by at most nine times the variance of unit weight (at least nine).
     pub alternatives: Vec<Alternative>,
-    /// Distance of the projection centre from the right cylinder over the circle through the points, negative inside; None
-    /// where they are on no circle. On this danger cylinder the points do not determine the pose.
+    /// A pose that fits as well, but is not determined, and why: with three points there may be one on the danger cylinder
+    /// beside others that are determined.
+    pub undetermined: Option<Degeneracy>,
+    /// Distance of the projection centre from the right cylinder over the circle through three points, negative inside; None
+    /// unless there are exactly three. On this danger cylinder they do not determine the pose.
     pub outside_danger_cylinder: Option<f64>,
     /// Status, iterations, counts.
     pub adjustment: Adjustment,
@@ -77,11 +80,15 @@ const NINE: f64 = 9.0;
 
 impl Solution {
     /// Takes the best of the adjustments, the others being alternatives; None where there is none.
-    pub(super) fn new(resection: &Resection, solved: Vec<Solved>) -> Option<Self> {
+    pub(super) fn new(
+        resection: &Resection,
+        solved: Vec<Solved>,
+        undetermined: Option<Degeneracy>,
+    ) -> Option<Self> {
         let mut rest = solved.into_iter();
         let best = rest.next()?;
         let sum_of_squares = best.sum_of_squares();
-        let mut solution = Self::of(resection, best, sum_of_squares);
+        let mut solution = Self { undetermined, ..Self::of(resection, best, sum_of_squares) };
         let freedom = solution.degrees_of_freedom;
         let variance = if freedom > 0 { (sum_of_squares / freedom as f64).max(1.0) } else { 1.0 };
         for other in rest.filter(Solved::converged) {
@@ -131,8 +138,12 @@ impl Solution {
             start,
             history,
             alternatives: vec![],
-            outside_danger_cylinder: Circle::through(&resection.sight().points)
-                .map(|circle| circle.outside_cylinder(&resection.space.cartesian(pose.position))),
+            undetermined: None,
+            outside_danger_cylinder: outside_cylinder(
+                &resection.sight().points,
+                &resection.space.cartesian(pose.position),
+            )
+            .map(|(outside, _)| outside),
             adjustment,
         }
     }

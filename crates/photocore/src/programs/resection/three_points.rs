@@ -17,9 +17,14 @@ pub struct Placement {
     pub to_photo: Matrix3,
 }
 
+/// Discriminant of a quadratic equation, relative to b^2, and misclosures of the squared sides, relative to these, that errors of
+/// the rays may cause near the danger cylinder, where two solutions fall together and vanish.
+const NOT_REAL: f64 = 1e-2;
+const NOT_CLOSED: f64 = 1e-2;
+
 /// Every place from which three points are seen along three unit rays (in the photo), in front of the camera: up to four.
 ///
-/// Two solutions that fall together, as they do near the danger cylinder, may come out as one.
+/// Near the danger cylinder two solutions may come out as one, and what is only nearly a solution as one too.
 pub fn three_points(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Vec<Placement> {
     let triangle = Triangle::new(rays, points);
     let mut found: Vec<Vector3> = Vec::new();
@@ -124,7 +129,7 @@ impl Triangle {
             }
             (l, best) = (next, error);
         }
-        let closed = best < 1e-8 && l.iter().all(|&value| value > 0.0);
+        let closed = best < NOT_CLOSED * NOT_CLOSED && l.iter().all(|&value| value > 0.0);
         closed.then_some(l)
     }
 }
@@ -229,10 +234,10 @@ fn real_roots(c: &[f64; 4]) -> Vec<f64> {
     depressed.into_iter().map(polish).filter(|x| x.is_finite()).collect()
 }
 
-/// Real roots of a x^2 + b x + c; a pair that falls short of real by rounding counts as a double root.
+/// Real roots of a x^2 + b x + c; a pair that falls little short of real counts as a double root.
 fn quadratic_roots(a: f64, b: f64, c: f64) -> Vec<f64> {
     let discriminant = b * b - 4.0 * a * c;
-    if discriminant < -1e-8 * b * b {
+    if discriminant < -NOT_REAL * b * b {
         return vec![];
     }
     let q = -0.5 * (b + b.signum() * discriminant.max(0.0).sqrt());
