@@ -31,7 +31,11 @@ def expected(golden: Path) -> Callable[[str], Any]:
 
 
 def project_grid(
-    plate: np.ndarray, heights: np.ndarray, position: np.ndarray, minutes: np.ndarray, principal_distance: float
+    plate: np.ndarray,
+    heights: np.ndarray,
+    position: np.ndarray,
+    minutes: np.ndarray,
+    principal_distance: float,
 ) -> np.ndarray:
     """Model coordinates (n, 3) of plate points at given heights."""
     to_photo = rotation_matrix(np.radians(minutes / 60.0)[np.newaxis])[0]
@@ -42,7 +46,7 @@ def project_grid(
 
 @pytest.fixture
 def make_grid() -> Callable[..., Grid]:
-    """Return a function that makes a grid with errors in the model: points in rows, any kappa, any heights."""
+    """Return a function that makes a grid with errors in the model, of any kappa and heights."""
 
     def make(
         *,
@@ -58,7 +62,9 @@ def make_grid() -> Callable[..., Grid]:
         plate = np.array([(x, y) for y in axis for x in axis])
         random = np.random.default_rng(seed)
         heights = relief * random.uniform(-1.0, 1.0, len(plate))
-        model = project_grid(plate, heights, np.array([250.4, 249.7, 310.25]), np.array([12.0, -7.0, kappa]), 150.0)
+        model = project_grid(
+            plate, heights, np.array([250.4, 249.7, 310.25]), np.array([12.0, -7.0, kappa]), 150.0
+        )
         scale = sd if weights is None else sd / np.sqrt(weights)[:, np.newaxis]
         model[:, :2] += scale * random.normal(size=(len(plate), 2))
         return Grid(list(range(1, len(plate) + 1)), plate, model, 150.0, initial=initial)

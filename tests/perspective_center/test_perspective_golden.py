@@ -97,7 +97,11 @@ def test_no_convergence_goes_on_with_the_last_values(golden, expected):
     compare_exactly(result, wanted["listing_double"])
     text = listing(run)
     assert wanted["message"] in text
-    for missing in ("WITH THIS ITERATION", "COORDINATES OF THE PERSPECTIVE CENTER", "STEREOPLOTTER CALIBRATION"):
+    for missing in (
+        "WITH THIS ITERATION",
+        "COORDINATES OF THE PERSPECTIVE CENTER",
+        "STEREOPLOTTER CALIBRATION",
+    ):
         assert missing not in text
     assert "RESIDUAL AND DISTORTION VALUES" in text
     assert "STANDARD ERRORS OF THE PERSPECTIVE CENTER PARAMETERS" in text
@@ -161,8 +165,12 @@ def test_sample_against_the_printout(golden, sample, as_published):
     printed = sample["printed_iterations"]
     first, last = result.cycles[0], printed[-1]
     if as_published:
-        np.testing.assert_allclose(first.correction, [printed[1][f"d{k}"] for k in "XYZ"], rtol=0, atol=5.1e-5)
-        np.testing.assert_allclose(first.attitude_minutes, [printed[1][k] for k in ORDER], rtol=0, atol=5.1e-5)
+        np.testing.assert_allclose(
+            first.correction, [printed[1][f"d{k}"] for k in "XYZ"], rtol=0, atol=5.1e-5
+        )
+        np.testing.assert_allclose(
+            first.attitude_minutes, [printed[1][k] for k in ORDER], rtol=0, atol=5.1e-5
+        )
         assert len(result.cycles) == 2
     np.testing.assert_allclose(result.position, [last[k] for k in "XYZ"], rtol=0, atol=0.0051)
     assert result.sigma0_plate == pytest.approx(sample["printed_std_unit_weight_mm"], abs=5.1e-6)

@@ -122,6 +122,8 @@ def _parenthesised(text: str) -> str:
     depth = 0
     for position, character in enumerate(text):
         depth += (character == "(") - (character == ")")
-        if depth == 0:
+        if depth == 0 and position > 0:
             return text[: position + 1]
-    raise ValueError(f"{text} does not close its parentheses")
+        if depth == 0:
+            break
+    raise ValueError(f"{text!r} is no FORMAT in parentheses")

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
+from photogram.arrays import shaped
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.geometry import rotation_matrix
 from photogram.messages import Message
@@ -180,7 +181,7 @@ def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats
     if weights not in get_args(Weights):
         raise InputError(f"weights is one of {', '.join(get_args(Weights))}, not {weights!r}")
     if model_sd is not None:
-        variance = np.broadcast_to(np.asarray(model_sd, dtype=np.float64), len(grid.ids)) ** 2
+        variance = shaped("model_sd", model_sd, (len(grid.ids),)) ** 2
     elif weights == "deviations":
         variance = (grid.reading_sd**2).mean(axis=1) / grid.readings
     else:
@@ -210,10 +211,16 @@ def _strictly(grid: Grid, observed: Observed) -> Solved:
             if start is None:
                 raise
         else:
-            if solution.status == "converged" or start is None:
+            if start is None or (solution.status == "converged" and _in_front(grid, solution.pose)):
                 break
         messages = [Message("the initial approximations lead to no solution; a direct one was taken instead")]
     return solution, messages
+
+
+def _in_front(grid: Grid, pose: Floats) -> bool:
+    """Whether the projector looks at all points; the equations hold for points behind it as well."""
+    ahead = -rotation_matrix(pose[np.newaxis, 3:])[0, 2]
+    return bool(((grid.model - pose[:3]) @ ahead > 0).all())
 
 
 def _as_published(grid: Grid, observed: Observed) -> Solved:

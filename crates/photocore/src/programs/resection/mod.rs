@@ -16,7 +16,8 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Options, Problem, Status};
-use crate::geometry::{ObjectSpace, RotationSense, Vector3, rotation, rotation_angles};
+use crate::geometry::vector::{difference, dot};
+use crate::geometry::{ObjectSpace, Photo, RotationSense, Vector3, rotation, rotation_angles};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 pub use degenerate::Degeneracy;
@@ -112,7 +113,7 @@ pub struct Resection {
 /// Why there is no resection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum ResectionError {
-    /// Fewer than three points, and no initial values.
+    /// Fewer than three points.
     #[error("{0} points do not determine a pose; it takes three")]
     TooFewPoints(usize),
     /// All points on one line.
@@ -179,7 +180,16 @@ impl Resection {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, ResectionError> {
-        let starts = self.start.map_or_else(|| self.starts(), |start| Ok(vec![start]))?;
+        let starts = match self.start {
+            Some(start) => {
+                // Rounding may hide from the adjustment that the points determine nothing.
+                if self.position.sd.iter().chain(&self.attitude.sd).all(|sd| sd.is_infinite()) {
+                    self.enough_points()?;
+                }
+                vec![start]
+            }
+            None => self.starts()?,
+        };
         let mut solved: Vec<Solved> = Vec::new();
         let mut failure = ResectionError::NoPlacement;
         let mut undetermined = None;
@@ -189,6 +199,7 @@ impl Resection {
                 adjusted = self.adjust_from(turned, options, pool, watch);
             }
             match adjusted {
+                Ok(adjusted) if self.start.is_none() && !self.in_front(&adjusted.pose()) => {}
                 Ok(adjusted) => solved.push(adjusted),
                 Err(ResectionError::Interrupted) => return Err(ResectionError::Interrupted),
                 Err(other) => {
@@ -231,6 +242,14 @@ impl Resection {
         let beyond = attitude[1].abs() > std::f64::consts::FRAC_PI_2;
         let free = self.attitude.sd.iter().all(|sd| sd.is_infinite());
         (beyond && free).then(|| Pose { position, attitude: rotation_angles(&rotation(attitude)) })
+    }
+
+    /// Whether all points lie in front of the camera.
+    fn in_front(&self, pose: &Pose) -> bool {
+        let photo = Photo::new(self.space, self.sense, pose.position, pose.attitude, self.principal_distance);
+        let ahead = photo.ray([0.0; 2]).direction;
+        let centre = photo.centre();
+        self.sight().points.iter().all(|point| dot(&difference(point, &centre), &ahead) > 0.0)
     }
 
     /// What is degenerate about the points seen from a pose.

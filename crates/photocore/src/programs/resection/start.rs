@@ -32,18 +32,26 @@ impl Resection {
         let known = [self.position.value, self.attitude.value].concat();
         let given = known.iter().all(|value| value.is_finite());
         let given = given.then_some(Pose { position: self.position.value, attitude: self.attitude.value });
-        let sight = self.sight();
-        let collinear = collinear(&sight.points);
-        let mut placements = match given {
-            None if sight.points.len() < 3 => return Err(ResectionError::TooFewPoints(sight.points.len())),
-            None if collinear => return Err(ResectionError::Collinear),
-            _ if collinear || sight.points.len() < 3 => vec![],
-            _ => sight.placements(),
+        let mut placements = match (self.enough_points(), given) {
+            (Ok(()), _) => self.sight().placements(),
+            (Err(_), Some(_)) => vec![],
+            (Err(why), None) => return Err(why),
         };
         placements.truncate(STARTS);
         let found = placements.iter().map(|placement| self.held(self.pose(placement)));
         let starts: Vec<Pose> = given.into_iter().chain(found).collect();
         if starts.is_empty() { Err(ResectionError::NoPlacement) } else { Ok(starts) }
+    }
+
+    /// Whether the points could determine a pose from nothing else: three of them, not on one line.
+    pub(super) fn enough_points(&self) -> Result<(), ResectionError> {
+        if self.points.len() < 3 {
+            Err(ResectionError::TooFewPoints(self.points.len()))
+        } else if collinear(&self.sight().points) {
+            Err(ResectionError::Collinear)
+        } else {
+            Ok(())
+        }
     }
 
     /// The rays of the images and the cartesian positions of the points.

@@ -21,20 +21,32 @@ pub struct Placement {
 /// the rays may cause near the danger cylinder, where two solutions fall together and vanish.
 const NOT_REAL: f64 = 1e-2;
 const NOT_CLOSED: f64 = 1e-2;
+/// Solutions whose distances differ by less than this, relatively, are one.
+const TWINS: f64 = 1e-4;
 
 /// Every place from which three points are seen along three unit rays (in the photo), in front of the camera: up to four.
 ///
 /// Near the danger cylinder two solutions may come out as one, and what is only nearly a solution as one too.
 pub fn three_points(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Vec<Placement> {
     let triangle = Triangle::new(rays, points);
+    let mut candidates = triangle.distances();
+    candidates.sort_by(|a, b| a.misclosure.total_cmp(&b.misclosure));
     let mut found: Vec<Vector3> = Vec::new();
-    for distances in triangle.distances() {
-        let twin = |other: &Vector3| square(&difference(other, &distances)) <= 1e-12 * square(&distances);
-        if !found.iter().any(twin) {
+    for Candidate { distances, .. } in candidates {
+        let twin =
+            |other: &Vector3| square(&difference(other, &distances)) <= (TWINS * TWINS) * square(&distances);
+        if found.len() < 4 && !found.iter().any(twin) {
             found.push(distances);
         }
     }
     found.iter().filter_map(|distances| place(rays, points, distances)).collect()
+}
+
+/// Distances of three points.
+struct Candidate {
+    distances: Vector3,
+    /// Sum of squares of the misclosures of the squared sides, relative to these.
+    misclosure: f64,
 }
 
 /// Squared sides and cosines between rays; `[0, 1, 2]` stand for the pairs 12, 13, 23.
@@ -60,8 +72,8 @@ impl Triangle {
         cone
     }
 
-    /// Positive distances that satisfy the three equations.
-    fn distances(&self) -> Vec<Vector3> {
+    /// Positive distances that satisfy the three equations, some of them more than once.
+    fn distances(&self) -> Vec<Candidate> {
         let [c12, c13, c23] = [0, 1, 2].map(|pair| self.cone(pair));
         let [a12, a13, a23] = self.side;
         let d1 = combination(a23, &c12, -a12, &c23);
@@ -112,7 +124,7 @@ impl Triangle {
     }
 
     /// A few steps of Newton's method on the three equations; None where they lead nowhere.
-    fn polish(&self, start: Vector3) -> Option<Vector3> {
+    fn polish(&self, start: Vector3) -> Option<Candidate> {
         let misclosure = |l: &Vector3| -> Vector3 {
             std::array::from_fn(|pair| self.side[pair] - dot(l, &apply(&self.cone(pair), l)))
         };
@@ -130,7 +142,7 @@ impl Triangle {
             (l, best) = (next, error);
         }
         let closed = best < NOT_CLOSED * NOT_CLOSED && l.iter().all(|&value| value > 0.0);
-        closed.then_some(l)
+        closed.then_some(Candidate { distances: l, misclosure: best })
     }
 }
 
