@@ -71,8 +71,7 @@ def perspective_center(
 ) -> None:
     """Determine perspective centre, attitude and distortion of projectors from grid measurements.
 
-    The run stops at the first set that cannot be read or solved, as the 1969 program does; what was solved
-    before is written, and the listing ends with the message.
+    The run stops at the first set that cannot be read or solved; what was solved before is written.
     """
     if example == (deck is not None):
         raise typer.BadParameter("give a deck, or --example", param_hint="DECK")
