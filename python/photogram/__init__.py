@@ -10,6 +10,7 @@ from photogram.messages import Message
 from photogram.planning import Plan, plan
 from photogram.prediction import predict
 from photogram.refraction import Refraction
+from photogram.resection import Pose, Resection, resect
 from photogram.result import Result
 from photogram.simulation import Simulation, simulate
 
@@ -22,9 +23,11 @@ __all__ = [
     "Message",
     "PhotogramError",
     "Plan",
+    "Pose",
     "Progress",
     "RankError",
     "Refraction",
+    "Resection",
     "Result",
     "Simulation",
     "Spheroid",
@@ -32,5 +35,6 @@ __all__ = [
     "adjust",
     "plan",
     "predict",
+    "resect",
     "simulate",
 ]

@@ -371,3 +371,147 @@ class BlockSolution:
     @property
     def seconds(self) -> dict[str, float]:
         """Seconds in `form`, `factor`, `solve`, `invert` and `cofactors`, over all iterations."""
+
+class ResectionError(Exception):
+    """A photo that cannot be resected.
+
+    `args` is (kind, message): kind is `too few points`, `collinear`, `danger cylinder`, `undetermined`, `no
+    placement`, `not finite` or `input`.
+    """
+
+def resect(
+    points: _Floats,
+    point_sd: _Floats,
+    image_xy: _Floats,
+    image_sd: _Floats,
+    principal_distance: float,
+    *,
+    known: _Floats,
+    known_sd: _Floats,
+    start: _Floats | None,
+    spheroid: tuple[float, float] | None,
+    photo_to_ground: bool,
+    at_measured: bool,
+    criterion: str,
+    limit: float,
+    max_iterations: int,
+    covariance: bool,
+) -> ResectionSolution:
+    """Resect one photo by least squares, on the calling thread; Ctrl-C is looked after between iterations.
+
+    Parameters
+    ----------
+    points, point_sd
+        (n, 3) control, X, Y, Z or longitude (rad), latitude (rad), height; finite standard deviations, 0 to
+        fix it.
+    image_xy, image_sd
+        (n, 2) millimetres.
+    principal_distance
+        Millimetres, signed.
+    known, known_sd
+        (6,) position and attitude as they are known beforehand (NaN where unknown), and their standard
+        deviations: infinite free, 0 fixed.
+    start
+        (6,) initial values; None to find some from triples of points.
+    spheroid
+        Semi-axes (a, b) for geographic space, None for rectangular space.
+    photo_to_ground
+        The sense of the angles.
+    at_measured
+        Form the partials at the measured image positions, as program W5344 does (USGS Computer Contribution
+        2, 1969, equations 4 and 5), instead of the computed ones.
+    criterion, limit
+        `fraction`: no unknown changes by more than `limit` of its standard deviation; `position`: the
+        correction of the position is shorter than `limit`, full steps without damping (program W5344).
+    max_iterations
+        Iterations at the most, from each start.
+    covariance
+        Whether to compute cofactors and redundancy numbers; NaN otherwise.
+
+    Raises
+    ------
+    ResectionError
+        A photo that cannot be resected.
+    ValueError
+        An argument of another shape, length or choice; the message names it.
+    """
+
+@final
+class ResectionSolution:
+    """A resected photo with n points. Cofactors hold for a priori unit weight."""
+
+    @property
+    def status(self) -> str:
+        """`converged`, `not converged` or `diverged`."""
+
+    @property
+    def iterations(self) -> list[IterationRow]:
+        """Every iteration."""
+
+    @property
+    def history(self) -> _Floats:
+        """(k, 6) position and attitude after each iteration."""
+
+    @property
+    def start(self) -> _Floats:
+        """(6,) the pose from which the adjustment started."""
+
+    @property
+    def pose(self) -> _Floats:
+        """(6,) position, then omega, phi, kappa in radians."""
+
+    @property
+    def cofactors(self) -> _Floats:
+        """(6, 6), in the units of the values; with the criterion `position` before the last correction."""
+
+    @property
+    def pose_redundancy(self) -> _Floats:
+        """(6,) redundancy numbers of position and attitude as observations; 0 unless weighted."""
+
+    @property
+    def point_positions(self) -> _Floats:
+        """(n, 3) adjusted control."""
+
+    @property
+    def point_cofactors(self) -> _Floats:
+        """(n, 3, 3) in the units of the values."""
+
+    @property
+    def point_redundancy(self) -> _Floats:
+        """(n, 3) redundancy numbers of control coordinates; 0 unless weighted."""
+
+    @property
+    def residuals(self) -> _Floats:
+        """(n, 2) observed minus computed, millimetres."""
+
+    @property
+    def redundancy(self) -> _Floats:
+        """(n, 2) redundancy numbers."""
+
+    @property
+    def standardized(self) -> _Floats:
+        """(n, 2) residual / (standard deviation x root of redundancy number), a priori unit weight."""
+
+    @property
+    def partials(self) -> _Floats:
+        """(n, 2, 6) partials of x and y with respect to position and attitude, at the solution."""
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Weighted sum of squares."""
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Observations and weighted unknowns less unknowns."""
+
+    @property
+    def alternatives(self) -> list[tuple[list[float], float]]:
+        """Other poses (6 values) that fit about as well, with their sums of squares."""
+
+    @property
+    def undetermined(self) -> str | None:
+        """Why a further pose that fits is not determined, a kind as in `ResectionError`; None without one."""
+
+    @property
+    def outside_danger_cylinder(self) -> float | None:
+        """Distance of the projection centre from the danger cylinder, negative inside, or None."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from photogram.arrays import shaped
 from photogram.errors import InputError
 from photogram.refraction import Refraction, metres_per_unit
 
@@ -109,7 +110,7 @@ class Block:
             "point_sd": (points, 3),
         }
         for name, shape in shapes.items():
-            setattr(self, name, _array(name, getattr(self, name), shape))
+            setattr(self, name, shaped(name, getattr(self, name), shape))
         for name, count in (("image_photos", photos), ("image_points", points)):
             setattr(self, name, _index(name, getattr(self, name), images, count))
         self._check_values()
@@ -243,18 +244,6 @@ def _names(name: str, values: Sequence[str]) -> list[str]:
         repeated = next(value for value in names if value in seen or seen.add(value))  # type: ignore[func-returns-value]
         raise InputError(f"{name}: {repeated!r} stands there more than once")
     return names
-
-
-def _array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} is not an array of numbers: {error}") from None
-    if array.ndim == 0:
-        array = np.full(shape, array)
-    if array.shape != shape:
-        raise InputError(f"{name} has the shape {array.shape}, not {shape}")
-    return np.ascontiguousarray(array)
 
 
 def _index(name: str, value: ArrayLike, length: int, count: int) -> Indices:

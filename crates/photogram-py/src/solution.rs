@@ -16,6 +16,15 @@ pub fn iteration_row(iteration: &Iteration) -> IterationRow {
     (iteration.number, iteration.sum_of_squares, iteration.largest_change, iteration.damping)
 }
 
+/// How an adjustment ended, as Python says it.
+pub fn status_name(status: Status) -> &'static str {
+    match status {
+        Status::Converged => "converged",
+        Status::NotConverged => "not converged",
+        Status::Diverged => "diverged",
+    }
+}
+
 /// An adjusted block.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct BlockSolution {
@@ -41,11 +50,7 @@ impl BlockSolution {
 impl BlockSolution {
     #[getter]
     fn status(&self) -> &'static str {
-        match self.solution.adjustment.status {
-            Status::Converged => "converged",
-            Status::NotConverged => "not converged",
-            Status::Diverged => "diverged",
-        }
+        status_name(self.solution.adjustment.status)
     }
 
     #[getter]
@@ -206,7 +211,8 @@ impl BlockSolution {
     }
 }
 
-fn squares<const N: usize>(
+/// Matrices as an (n, N, N) array.
+pub fn squares<const N: usize>(
     py: Python<'_>,
     matrices: Vec<[[f64; N]; N]>,
 ) -> PyResult<Bound<'_, PyArray3<f64>>> {

@@ -1,4 +1,4 @@
-"""The command line: `photogram giant`, `photogram simulate`, `photogram plan`.
+"""The command line: one command for each program, and `plan` and `simulate`.
 
 Results go to files and standard output, errors and progress to standard error. Heavy modules are imported by
 the commands that need them, so that `photogram --help` is quick.
@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from photogram.cli import check, giant, plan, simulate
+from photogram.cli import check, giant, perspective_center, plan, simulate
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
 
@@ -32,6 +32,7 @@ giant_app.command("check")(check.check)
 app.add_typer(giant_app)
 app.command()(simulate.simulate)
 app.command()(plan.plan)
+app.command("perspective-center")(perspective_center.perspective_center)
 
 
 def main() -> None:

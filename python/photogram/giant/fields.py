@@ -103,7 +103,7 @@ def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
     packed = parse_real(field, decimals)
     if abs(packed) > LARGEST_PACKED:
         raise ValueError(
-            f"ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is beyond 360 degrees"
+            f"**ILLEGAL DMS FIELD DETECTED IN INPUT STREAM: {field.strip()!r} is beyond 360 degrees"
         )
     sign, degrees, minutes, seconds = unpack_dms(packed)
     if degrees > 360 or minutes > 60 or seconds > 60:

@@ -1,6 +1,6 @@
 //! Iteration to the least-squares solution.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::time::Instant;
 
 use rayon::ThreadPool;
@@ -19,6 +19,16 @@ pub enum Criterion {
     /// When the weighted sum of squares changes by less than this percentage from one iteration to the next, as in the
     /// 1987 program (GIANT guide, section 6); no damping.
     Percent(f64),
+    /// When the corrections of some unknowns, taken as one vector, are shorter than `limit`, as in program W5344 (USGS Computer
+    /// Contribution 2, 1969); no damping. The cofactors are those of the normal equations that gave the last corrections.
+    Length {
+        /// The first of these unknowns, in the order of the layout.
+        first: usize,
+        /// How many there are.
+        count: usize,
+        /// In their units.
+        limit: f64,
+    },
 }
 
 /// How to adjust.
@@ -111,8 +121,8 @@ pub struct Adjustment {
     pub initial_sum_of_squares: f64,
     /// Every iteration.
     pub iterations: Vec<Iteration>,
-    /// For every iteration, the corrections of all unknowns that are not local, in the order of the layout.
-    pub corrections: Vec<Vec<f64>>,
+    /// All unknowns that are not local, in the order of the layout: at first and after each iteration.
+    pub history: Vec<Vec<f64>>,
     /// The corrections of the local unknowns in the last iteration; zero where there was none.
     pub last_local_corrections: Vec<f64>,
     /// Adjusted unknowns, in the order of the layout.
@@ -139,6 +149,13 @@ pub struct Adjustment {
     pub predictions: Vec<(Ordering, f64)>,
     /// Kept blocks (the border is the block after the last) in the order of their elimination.
     pub order: Vec<usize>,
+}
+
+impl Adjustment {
+    /// For every iteration, the corrections of all unknowns that are not local, in the order of the layout.
+    pub fn corrections(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
+        self.history.windows(2).map(|pair| pair[0].iter().zip(&pair[1]).map(|(from, to)| to - from).collect())
+    }
 }
 
 /// Why there is no adjustment.
@@ -179,7 +196,7 @@ pub fn adjust<M: Model>(
         seconds: Seconds::default(),
         formations: 0,
         iterations: vec![],
-        corrections: vec![],
+        history: vec![problem.initial[problem.layout().all_locals().end..].to_vec()],
         last_local_corrections: vec![0.0; problem.layout().all_locals().len()],
     };
     let start = run.form(problem.initial.clone(), 0.0)?;
@@ -190,6 +207,7 @@ pub fn adjust<M: Model>(
     let end = match options.criterion {
         Criterion::Fraction(fraction) => run.strictly(start, fraction)?,
         Criterion::Percent(percent) => run.as_published(start, percent)?,
+        Criterion::Length { first, count, limit } => run.until_short(start, first..first + count, limit)?,
     };
     run.finish(end, initial_sum_of_squares)
 }
@@ -235,7 +253,7 @@ struct Run<'a, 'w, M: Model> {
     seconds: Seconds,
     formations: usize,
     iterations: Vec<Iteration>,
-    corrections: Vec<Vec<f64>>,
+    history: Vec<Vec<f64>>,
     last_local_corrections: Vec<f64>,
 }
 
@@ -332,6 +350,37 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.stay(state, Status::NotConverged)
     }
 
+    /// The iteration of program W5344: full steps until the corrections of the unknowns in `tested` are short.
+    fn until_short(
+        &mut self,
+        start: State<'a, M>,
+        tested: Range<usize>,
+        limit: f64,
+    ) -> Result<End<'a, M>, AdjustError> {
+        let mut state = start;
+        loop {
+            let unknowns = state.unknowns.clone();
+            let Some(Solved { basis, step, change }) = self.solve_unless_lost(state)? else {
+                return Ok(End { status: Status::Diverged, unknowns, basis: None, last: None });
+            };
+            let number = self.iterations.len() + 1;
+            let length = step[tested.clone()].iter().map(|dx| dx * dx).sum::<f64>().sqrt();
+            let values: Vec<f64> = unknowns.iter().zip(&step).map(|(x, dx)| x + dx).collect();
+            let mut iteration =
+                Iteration { number, sum_of_squares: f64::NAN, largest_change: change, damping: 0.0 };
+            if length < limit || number >= self.options.max_iterations {
+                let status = if length < limit { Status::Converged } else { Status::NotConverged };
+                return Ok(End { status, unknowns, basis: Some(basis), last: Some((iteration, step)) });
+            }
+            state = self.form(values, 0.0)?;
+            iteration.sum_of_squares = state.sum_of_squares;
+            if !iteration.sum_of_squares.is_finite() {
+                return Ok(End { status: Status::Diverged, unknowns, basis: Some(basis), last: None });
+            }
+            self.accept(iteration, &unknowns, &state.unknowns)?;
+        }
+    }
+
     /// Ends at the values reached, without a further step.
     fn stay(&mut self, state: State<'a, M>, status: Status) -> Result<End<'a, M>, AdjustError> {
         let unknowns = state.unknowns.clone();
@@ -422,7 +471,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             status: end.status,
             initial_sum_of_squares,
             iterations: self.iterations,
-            corrections: self.corrections,
+            history: self.history,
             last_local_corrections: self.last_local_corrections,
             unknowns,
             residuals,
@@ -462,10 +511,11 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// Keeps an iteration that stands, with its corrections, and tells of it.
     fn accept(&mut self, iteration: Iteration, before: &[f64], after: &[f64]) -> Result<(), AdjustError> {
-        let mut corrections: Vec<f64> = before.iter().zip(after).map(|(from, to)| to - from).collect();
-        let kept = corrections.split_off(self.problem.layout().all_locals().end);
-        self.last_local_corrections = corrections;
-        self.corrections.push(kept);
+        let locals = self.problem.layout().all_locals();
+        let corrections =
+            before[locals.clone()].iter().zip(&after[locals.clone()]).map(|(from, to)| to - from);
+        self.last_local_corrections = corrections.collect();
+        self.history.push(after[locals.end..].to_vec());
         self.iterations.push(iteration);
         stopped((self.watch)(Event::Iteration(iteration)))
     }

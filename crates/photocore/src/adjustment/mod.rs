@@ -12,4 +12,4 @@ pub use iterate::{
     AdjustError, Adjustment, Criterion, Event, Iteration, Options, Phase, Seconds, Status, adjust,
 };
 pub use problem::{Model, Problem};
-pub use statistics::Counts;
+pub use statistics::{Counts, leading_matrix, standardized};

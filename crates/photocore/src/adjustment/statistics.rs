@@ -19,6 +19,17 @@ pub struct Counts {
     pub unknowns: usize,
 }
 
+/// Residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w); NaN without redundancy.
+pub fn standardized(residual: f64, sd: f64, redundancy: f64) -> f64 {
+    // What rounding leaves of a redundancy of zero would make a test value of noise.
+    if redundancy > 1e-10 { residual / (sd * redundancy.sqrt()) } else { f64::NAN }
+}
+
+/// The matrix at the start of a run of cofactors; NaN where there are none.
+pub fn leading_matrix<const N: usize>(cofactors: Option<&[f64]>) -> [[f64; N]; N] {
+    std::array::from_fn(|i| std::array::from_fn(|j| cofactors.map_or(f64::NAN, |values| values[N * i + j])))
+}
+
 impl<M> Problem<M> {
     /// Counts observations and unknowns.
     pub fn counts(&self) -> Counts {

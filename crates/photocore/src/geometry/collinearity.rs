@@ -38,6 +38,14 @@ impl ObjectSpace {
             ObjectSpace::Geographic(ellipsoid) => ellipsoid.geographic(position),
         }
     }
+
+    /// The cartesian position of given coordinates.
+    pub fn cartesian(self, coordinates: Vector3) -> Vector3 {
+        match self {
+            ObjectSpace::Rectangular => coordinates,
+            ObjectSpace::Geographic(ellipsoid) => ellipsoid.geocentric(coordinates),
+        }
+    }
 }
 
 /// A point: its cartesian position and the partials of that with respect to the three unknown coordinates.
@@ -169,11 +177,25 @@ impl Photo {
     /// projection centre.
     #[inline(always)]
     pub fn linearize(&self, point: &Point) -> Projection {
+        self.linearize_with(point, |computed| computed)
+    }
+
+    /// The image position of a point and, in place of its partials, those of program W5344 (USGS Computer Contribution 2, 1969,
+    /// equations 4 and 5): with the measured image position where the computed one stands in the partials. Both are the same
+    /// where the residuals are zero.
+    pub fn linearize_at_measured(&self, point: &Point, measured: [f64; 2]) -> Projection {
+        self.linearize_with(point, |_| measured)
+    }
+
+    /// x = c u1/u3 has the gradient (c/u3, 0, -x/u3) with respect to u; `in_partials` chooses this x from the computed one.
+    #[inline(always)]
+    fn linearize_with(&self, point: &Point, in_partials: impl Fn([f64; 2]) -> [f64; 2]) -> Projection {
         let u = apply(&self.to_photo, &difference(&point.position, &self.centre));
         let scale = self.principal_distance / u[2];
         let xy = [scale * u[0], scale * u[1]];
-        let (x_photo, x_point) = self.partials(&[scale, 0.0, -xy[0] / u[2]], &u, point);
-        let (y_photo, y_point) = self.partials(&[0.0, scale, -xy[1] / u[2]], &u, point);
+        let [x, y] = in_partials(xy);
+        let (x_photo, x_point) = self.partials(&[scale, 0.0, -x / u[2]], &u, point);
+        let (y_photo, y_point) = self.partials(&[0.0, scale, -y / u[2]], &u, point);
         Projection { xy, photo: [x_photo, y_photo], point: [x_point, y_point] }
     }
 

@@ -2,7 +2,7 @@
 
 use super::model::CentralPerspective;
 use super::{Block, Dropped, Options, UnitVariance};
-use crate::adjustment::{Adjustment, Problem};
+use crate::adjustment::{Adjustment, Problem, leading_matrix, standardized};
 use crate::geometry::Vector3;
 
 /// An adjusted photograph.
@@ -115,7 +115,7 @@ impl Solution {
         let photos = photo_part.as_chunks::<6>().0.iter().enumerate().map(|(photo, values)| AdjustedPhoto {
             position: absolute(block.photos[photo].position, block.photos[photo].position_sd, values, origin),
             attitude: std::array::from_fn(|k| values[3 + k]),
-            cofactors: square(cofactors.as_ref().map(|all| &all.kept[36 * photo..])),
+            cofactors: leading_matrix(cofactors.as_ref().map(|all| &all.kept[36 * photo..])),
             redundancy: std::array::from_fn(|k| redundancy_of(3 * points.len() + 6 * photo + k)),
         });
         let mut adjusted_points = vec![None; block.points.len()];
@@ -128,16 +128,15 @@ impl Solution {
                     values,
                     origin,
                 ),
-                cofactors: square(cofactors.as_ref().map(|all| &all.local[9 * local..])),
+                cofactors: leading_matrix(cofactors.as_ref().map(|all| &all.local[9 * local..])),
                 redundancy: std::array::from_fn(|k| redundancy_of(3 * local + k)),
                 last_correction: std::array::from_fn(|k| adjustment.last_local_corrections[3 * local + k]),
                 rays: layout.groups_of(local).len(),
             });
         }
-        let corrections = std::mem::take(&mut adjustment.corrections);
         Self {
             photos: photos.collect(),
-            photo_corrections: corrections.iter().map(|all| all.as_chunks().0.to_vec()).collect(),
+            photo_corrections: adjustment.corrections().map(|all| all.as_chunks().0.to_vec()).collect(),
             points: adjusted_points,
             images: images(block, problem, &mut adjustment),
             dropped,
@@ -152,10 +151,6 @@ impl Solution {
 /// Coordinates counted from the origin of the object space again; fixed ones as they were given, to the last bit.
 fn absolute(given: Vector3, sd: Vector3, values: &[f64], origin: Vector3) -> Vector3 {
     std::array::from_fn(|k| if sd[k] == 0.0 { given[k] } else { values[k] + origin[k] })
-}
-
-fn square<const N: usize>(values: Option<&[f64]>) -> [[f64; N]; N] {
-    std::array::from_fn(|i| std::array::from_fn(|j| values.map_or(f64::NAN, |values| values[N * i + j])))
 }
 
 /// Sums of squares by group, and degrees of freedom (GIANT guide, Appendix E): observations are the image coordinates, the
@@ -196,14 +191,7 @@ fn images(
         let redundancy: [f64; 2] =
             std::array::from_fn(|row| redundancy.as_ref().map_or(f64::NAN, |all| all[2 * group + row]));
         let sd = block.images[image].sd;
-        let standardized = std::array::from_fn(|row| {
-            // What rounding leaves of a redundancy of zero would make a test value of noise.
-            if redundancy[row] > 1e-10 {
-                residual[row] / (sd[row] * redundancy[row].sqrt())
-            } else {
-                f64::NAN
-            }
-        });
+        let standardized = std::array::from_fn(|row| standardized(residual[row], sd[row], redundancy[row]));
         images[image] = Some(AdjustedImage { residual, redundancy, standardized });
     }
     images

@@ -1,0 +1,68 @@
+//! Configurations that do not determine a pose.
+
+use super::three_points::{square, unit};
+use crate::geometry::Vector3;
+use crate::geometry::vector::{cross, difference, dot};
+
+/// Distances of all points from a line, relative to their extent, below which they count as collinear.
+const COLLINEAR: f64 = 1e-7;
+/// Distance of the projection centre from the danger cylinder, relative to its radius, at which it counts as on it.
+const ON_CYLINDER: f64 = 1e-4;
+
+/// Why the observations do not determine the pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Degeneracy {
+    /// Fewer than three points.
+    TooFewPoints,
+    /// All points are on one line.
+    Collinear,
+    /// There are three points, and the projection centre is on the right cylinder over the circle through them.
+    DangerCylinder,
+    /// None of these.
+    Unnamed,
+}
+
+impl Degeneracy {
+    /// Names what is wrong with points seen from a projection centre (cartesian).
+    pub(super) fn of(points: &[Vector3], centre: &Vector3) -> Self {
+        let on_cylinder = |(outside, radius): (f64, f64)| outside.abs() <= ON_CYLINDER * radius;
+        if points.len() < 3 {
+            Degeneracy::TooFewPoints
+        } else if collinear(points) {
+            Degeneracy::Collinear
+        } else if outside_cylinder(points, centre).is_some_and(on_cylinder) {
+            Degeneracy::DangerCylinder
+        } else {
+            Degeneracy::Unnamed
+        }
+    }
+}
+
+/// Whether all points are on one line.
+pub(super) fn collinear(points: &[Vector3]) -> bool {
+    let Some(&first) = points.first() else { return true };
+    let offsets: Vec<Vector3> = points.iter().map(|point| difference(point, &first)).collect();
+    let farthest = offsets.iter().copied().max_by(|a, b| square(a).total_cmp(&square(b))).unwrap_or_default();
+    let limit = (COLLINEAR * square(&farthest)).powi(2);
+    offsets.iter().all(|offset| square(&cross(offset, &farthest)) <= limit)
+}
+
+/// Distance of a position from the danger cylinder of three points, the right cylinder over the circle through them, negative
+/// inside, and its radius. None unless there are exactly three points, and not on one line.
+///
+/// There the three points do not determine the pose: a small movement along the cylinder changes no angle between their rays
+/// to first order (Finsterwalder 1903). With a fourth point the cylinder is harmless.
+pub(super) fn outside_cylinder(points: &[Vector3], position: &Vector3) -> Option<(f64, f64)> {
+    let &[first, second, third] = points else { return None };
+    let (along, side) = (difference(&second, &first), difference(&third, &first));
+    let normal = cross(&along, &side);
+    let axis = unit(&normal)?;
+    // The circumcentre of a triangle from one corner: (|a|^2 (b x n) + |b|^2 (n x a)) / 2 |n|^2.
+    let (p, q) = (cross(&side, &normal), cross(&normal, &along));
+    let offset: Vector3 =
+        std::array::from_fn(|k| (square(&along) * p[k] + square(&side) * q[k]) / (2.0 * square(&normal)));
+    let radius = square(&offset).sqrt();
+    let from: Vector3 = std::array::from_fn(|k| position[k] - first[k] - offset[k]);
+    let height = dot(&from, &axis);
+    Some(((square(&from) - height * height).max(0.0).sqrt() - radius, radius))
+}

@@ -1,0 +1,51 @@
+//! The observation equations of one photo.
+
+use super::{ControlPoint, Partials, Pose};
+use crate::adjustment::Model;
+use crate::geometry::{ObjectSpace, Photo, Point, Projection, RotationSense};
+use crate::normals::GroupRows;
+
+/// One photo of control points: the collinearity equations. The local blocks are the points, the kept block is the photo.
+#[derive(Debug)]
+pub struct SinglePhoto {
+    pub space: ObjectSpace,
+    pub sense: RotationSense,
+    /// In millimetres, signed.
+    pub principal_distance: f64,
+    pub partials: Partials,
+    /// Coordinates counted from the local origin.
+    pub points: Vec<ControlPoint>,
+}
+
+impl SinglePhoto {
+    /// The image of a point with its partials.
+    #[inline]
+    pub fn linearize(&self, photo: &Photo, point: &Point, index: usize) -> Projection {
+        match self.partials {
+            Partials::AtComputed => photo.linearize(point),
+            Partials::AtMeasured => photo.linearize_at_measured(point, self.points[index].xy),
+        }
+    }
+}
+
+impl Model for SinglePhoto {
+    type Prepared = (Photo, Vec<Point>);
+
+    fn prepare(&self, unknowns: &[f64]) -> Self::Prepared {
+        let (points, photo) = unknowns.split_at(3 * self.points.len());
+        let points = points.as_chunks().0.iter().map(|&coordinates| Point::new(self.space, coordinates));
+        let Pose { position, attitude } = Pose::from_unknowns(photo);
+        let photo = Photo::new(self.space, self.sense, position, attitude, self.principal_distance);
+        (photo, points.collect())
+    }
+
+    fn observe(&self, (photo, points): &Self::Prepared, local: usize, _: usize, rows: &mut GroupRows<'_>) {
+        let measured = self.points[local].xy;
+        let projection = self.linearize(photo, &points[local], local);
+        for row in 0..2 {
+            rows.constant[row] = measured[row] - projection.xy[row];
+            rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
+            rows.kept[6 * row..][..6].copy_from_slice(&projection.photo[row]);
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! The adjusted photo.
+
+use super::degenerate::{Degeneracy, outside_cylinder};
+use super::model::SinglePhoto;
+use super::{Pose, Resection, Solved};
+use crate::adjustment::{Adjustment, Model, leading_matrix, standardized};
+use crate::geometry::{Point, Vector3};
+
+/// A control point after the adjustment.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustedControl {
+    /// Coordinates in the object space.
+    pub coordinates: Vector3,
+    /// Cofactors (a priori unit weight); NaN when not asked for.
+    pub cofactors: [[f64; 3]; 3],
+    /// Redundancy numbers of its coordinates as observations; zero unless weighted, NaN when not asked for.
+    pub redundancy: [f64; 3],
+}
+
+/// An image point after the adjustment.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustedImage {
+    /// Observed minus computed, in millimetres.
+    pub residual: [f64; 2],
+    /// Redundancy numbers; NaN when not asked for.
+    pub redundancy: [f64; 2],
+    /// Residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w); NaN when not asked
+    /// for, and where the redundancy is zero.
+    pub standardized: [f64; 2],
+    /// Partials of x and y with respect to position and attitude, at the solution.
+    pub partials: [[f64; 6]; 2],
+}
+
+/// Another pose that fits.
+#[derive(Debug, Clone, Copy)]
+pub struct Alternative {
+    /// The pose.
+    pub pose: Pose,
+    /// Its weighted sum of squares.
+    pub sum_of_squares: f64,
+}
+
+/// A resected photo, its points and images as in the input.
+#[derive(Debug)]
+pub struct Solution {
+    /// Position and attitude.
+    pub pose: Pose,
+    /// Their cofactors (a priori unit weight); NaN when not asked for.
+    pub cofactors: [[f64; 6]; 6],
+    /// Redundancy numbers of position and attitude as observations; zero unless weighted, NaN when not asked for.
+    pub redundancy: [f64; 6],
+    /// The control points.
+    pub points: Vec<AdjustedControl>,
+    /// Their images.
+    pub images: Vec<AdjustedImage>,
+    /// Weighted sum of squares of everything observed.
+    pub sum_of_squares: f64,
+    /// Observations and weighted unknowns less unknowns.
+    pub degrees_of_freedom: i64,
+    /// The pose from which the adjustment started.
+    pub start: Pose,
+    /// The pose after each iteration.
+    pub history: Vec<Pose>,
+    /// Other minima whose sum of squares is larger by at most nine times the variance of unit weight (at least nine).
+    pub alternatives: Vec<Alternative>,
+    /// A pose that fits as well, but is not determined, and why: with three points there may be one on the danger cylinder
+    /// beside others that are determined.
+    pub undetermined: Option<Degeneracy>,
+    /// Distance of the projection centre from the right cylinder over the circle through three points, negative inside; None
+    /// unless there are exactly three. On this danger cylinder they do not determine the pose.
+    pub outside_danger_cylinder: Option<f64>,
+    /// Status, iterations, counts.
+    pub adjustment: Adjustment,
+}
+
+/// Poses that differ by less than this, in radians and in parts of the distance to the points, are the same minimum.
+const SAME: f64 = 1e-6;
+/// How much larger the sum of squares of another pose may be, in variances of unit weight: three standard deviations.
+const NINE: f64 = 9.0;
+
+impl Solution {
+    /// Takes the best of the adjustments, the others being alternatives; None where there is none.
+    pub(super) fn new(
+        resection: &Resection,
+        solved: Vec<Solved>,
+        undetermined: Option<Degeneracy>,
+    ) -> Option<Self> {
+        let mut rest = solved.into_iter();
+        let best = rest.next()?;
+        let sum_of_squares = best.sum_of_squares();
+        let mut solution = Self { undetermined, ..Self::of(resection, best, sum_of_squares) };
+        let freedom = solution.degrees_of_freedom;
+        let variance = if freedom > 0 { (sum_of_squares / freedom as f64).max(1.0) } else { 1.0 };
+        for other in rest.filter(Solved::converged) {
+            let pose = other.pose();
+            let found = solution
+                .alternatives
+                .iter()
+                .map(|known| known.pose)
+                .chain([solution.pose])
+                .collect::<Vec<_>>();
+            let fits = other.sum_of_squares() - sum_of_squares <= NINE * variance;
+            if fits && !found.iter().any(|known| resection.same(known, &pose)) {
+                solution.alternatives.push(Alternative { pose, sum_of_squares: other.sum_of_squares() });
+            }
+        }
+        Some(solution)
+    }
+
+    fn of(resection: &Resection, solved: Solved, sum_of_squares: f64) -> Self {
+        let pose = solved.pose();
+        let Solved { problem, mut adjustment, start, origin } = solved;
+        let unknowns = std::mem::take(&mut adjustment.unknowns);
+        let counts = adjustment.counts;
+        let cofactors = adjustment.cofactors.take();
+        let own = adjustment.prior_redundancy.take();
+        let redundancy_of = |unknown: usize| own.as_ref().map_or(f64::NAN, |all| all[unknown]);
+        let first = problem.layout().all_kept().start;
+        let local = cofactors.as_ref().map(|all| &all.local[..]);
+        let control = |point: usize| AdjustedControl {
+            coordinates: std::array::from_fn(|k| {
+                let given = &resection.points[point];
+                let value = unknowns[3 * point + k] + origin[k];
+                if given.sd[k] == 0.0 { given.coordinates[k] } else { value }
+            }),
+            cofactors: leading_matrix(local.map(|all| &all[9 * point..])),
+            redundancy: std::array::from_fn(|k| redundancy_of(3 * point + k)),
+        };
+        let history = adjustment.history.iter().skip(1).map(|values| absolute(values, origin)).collect();
+        Self {
+            pose,
+            cofactors: leading_matrix(cofactors.as_ref().map(|all| &all.kept[..])),
+            redundancy: std::array::from_fn(|k| redundancy_of(first + k)),
+            points: (0..resection.points.len()).map(control).collect(),
+            images: images(&problem.model, &unknowns, &problem.observation_sd, &mut adjustment),
+            sum_of_squares,
+            degrees_of_freedom: (counts.observations + counts.weighted) as i64 - counts.unknowns as i64,
+            start,
+            history,
+            alternatives: vec![],
+            undetermined: None,
+            outside_danger_cylinder: outside_cylinder(
+                &resection.sight().points,
+                &resection.space.cartesian(pose.position),
+            )
+            .map(|(outside, _)| outside),
+            adjustment,
+        }
+    }
+}
+
+impl Resection {
+    /// Whether two poses are one minimum.
+    fn same(&self, a: &Pose, b: &Pose) -> bool {
+        let cartesian = |pose: &Pose| self.space.cartesian(pose.position);
+        let (first, second) = (cartesian(a), cartesian(b));
+        let distance =
+            self.sight().points.iter().fold(0.0, |most: f64, point| {
+                (0..3).map(|k| (point[k] - first[k]).abs()).fold(most, f64::max)
+            });
+        let turned = |k: usize| (a.attitude[k] - b.attitude[k]).sin().abs() < SAME;
+        (0..3).all(|k| turned(k) && (first[k] - second[k]).abs() < SAME * distance)
+    }
+}
+
+/// A pose counted from the origin of the object space again.
+pub(super) fn absolute(values: &[f64], origin: Vector3) -> Pose {
+    let local = Pose::from_unknowns(values);
+    local.counted_from(origin.map(|value| -value))
+}
+
+/// Residuals, test values and partials, image by image.
+fn images(
+    model: &SinglePhoto,
+    unknowns: &[f64],
+    sd: &[f64],
+    adjustment: &mut Adjustment,
+) -> Vec<AdjustedImage> {
+    let residuals = std::mem::take(&mut adjustment.residuals);
+    let redundancy = adjustment.redundancy.take().unwrap_or_else(|| vec![f64::NAN; sd.len()]);
+    let (photo, points): (_, Vec<Point>) = model.prepare(unknowns);
+    let image = |index: usize| {
+        let of = |values: &[f64]| [values[2 * index], values[2 * index + 1]];
+        let (residual, redundancy, sd) = (of(&residuals), of(&redundancy), of(sd));
+        AdjustedImage {
+            residual,
+            redundancy,
+            standardized: std::array::from_fn(|row| standardized(residual[row], sd[row], redundancy[row])),
+            partials: model.linearize(&photo, &points[index], index).photo,
+        }
+    };
+    (0..points.len()).map(image).collect()
+}

@@ -1,0 +1,188 @@
+//! Initial poses without initial values: well-spread triples of points, each checked against all others.
+
+use super::degenerate::collinear;
+use super::three_points::{Placement, square, three_points, unit};
+use super::{ControlPoint, Known, Pose, Resection, ResectionError};
+use crate::geometry::vector::{IDENTITY, Vector3, apply, cross, difference, dot, product, transposed};
+use crate::geometry::{ObjectSpace, RotationSense, local_vertical, rotation_angles};
+
+/// Points among which triples are formed, and triples that are solved.
+const SPREAD_POINTS: usize = 8;
+const TRIPLES: usize = 12;
+/// Poses that are handed to the adjustment, and how far they are apart at least: radians, or parts of the mean distance.
+const STARTS: usize = 8;
+const APART: f64 = 0.05;
+/// A pose is tried when it fits at most this much worse than the best, in squared directions.
+const WORSE: f64 = 400.0;
+
+/// What the photo sees: unit rays in the photo, and cartesian points.
+pub(super) struct Sight {
+    rays: Vec<Vector3>,
+    pub points: Vec<Vector3>,
+    /// Mean square of the directional errors that the standard deviations of the image coordinates let expect.
+    noise: f64,
+}
+
+impl Resection {
+    /// Poses that fit, the best first.
+    ///
+    /// # Errors
+    /// Too few points, points on one line, or rays that no pose in front of the camera explains.
+    pub(super) fn starts(&self) -> Result<Vec<Pose>, ResectionError> {
+        let known = [self.position.value, self.attitude.value].concat();
+        let given = known.iter().all(|value| value.is_finite());
+        let given = given.then_some(Pose { position: self.position.value, attitude: self.attitude.value });
+        let mut placements = match (self.enough_points(), given) {
+            (Ok(()), _) => self.sight().placements(),
+            (Err(_), Some(_)) => vec![],
+            (Err(why), None) => return Err(why),
+        };
+        placements.truncate(STARTS);
+        let found = placements.iter().map(|placement| self.held(self.pose(placement)));
+        let starts: Vec<Pose> = given.into_iter().chain(found).collect();
+        if starts.is_empty() { Err(ResectionError::NoPlacement) } else { Ok(starts) }
+    }
+
+    /// Whether the points could determine a pose from nothing else: three of them, not on one line.
+    pub(super) fn enough_points(&self) -> Result<(), ResectionError> {
+        if self.points.len() < 3 {
+            Err(ResectionError::TooFewPoints(self.points.len()))
+        } else if collinear(&self.sight().points) {
+            Err(ResectionError::Collinear)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// The rays of the images and the cartesian positions of the points.
+    pub(super) fn sight(&self) -> Sight {
+        let c = self.principal_distance;
+        let ray = |[x, y]: [f64; 2]| {
+            // u is parallel to (x, y, c) and u3 is negative: the camera looks along -z.
+            let signed = -(x * x + y * y + c * c).sqrt() * c.signum();
+            [x / signed, y / signed, c / signed]
+        };
+        let count = self.points.len().max(1) as f64;
+        let noise = |point: &ControlPoint| (point.xy_sd[0].powi(2) + point.xy_sd[1].powi(2)) / (c * c);
+        Sight {
+            rays: self.points.iter().map(|point| ray(point.xy)).collect(),
+            points: self.points.iter().map(|point| self.space.cartesian(point.coordinates)).collect(),
+            noise: self.points.iter().map(noise).sum::<f64>() / count,
+        }
+    }
+
+    /// Position and attitude of a placement.
+    fn pose(&self, placement: &Placement) -> Pose {
+        let position = self.space.coordinates(placement.centre);
+        let vertical = match self.space {
+            ObjectSpace::Rectangular => IDENTITY,
+            ObjectSpace::Geographic(_) => local_vertical(position[0], position[1]),
+        };
+        // G = M R or M^T R
+        let turn = product(&placement.to_photo, &transposed(&vertical));
+        let attitude = match self.sense {
+            RotationSense::GroundToPhoto => rotation_angles(&turn),
+            RotationSense::PhotoToGround => rotation_angles(&transposed(&turn)),
+        };
+        Pose { position, attitude: nearest_turns(attitude, self.attitude.value) }
+    }
+
+    /// Fixed components as they are given.
+    fn held(&self, pose: Pose) -> Pose {
+        let hold = |found: Vector3, known: &Known| -> Vector3 {
+            std::array::from_fn(|k| if known.sd[k] == 0.0 { known.value[k] } else { found[k] })
+        };
+        Pose { position: hold(pose.position, &self.position), attitude: hold(pose.attitude, &self.attitude) }
+    }
+}
+
+/// Angles shifted by whole turns so that they are nearest to known ones (NaN where unknown), with which they are compared.
+fn nearest_turns(angles: Vector3, known: Vector3) -> Vector3 {
+    const TURN: f64 = std::f64::consts::TAU;
+    std::array::from_fn(|k| {
+        let turns = ((known[k] - angles[k]) / TURN).round();
+        if turns.is_finite() { angles[k] + turns * TURN } else { angles[k] }
+    })
+}
+
+impl Sight {
+    /// Placements that fit, the best first, no two alike.
+    fn placements(&self) -> Vec<Placement> {
+        let mut scored: Vec<(f64, Placement)> = Vec::new();
+        for [i, j, k] in self.triples() {
+            let rays = [self.rays[i], self.rays[j], self.rays[k]];
+            let points = [self.points[i], self.points[j], self.points[k]];
+            scored.extend(three_points(&rays, &points).into_iter().map(|place| (self.misfit(&place), place)));
+        }
+        scored.retain(|(misfit, _)| misfit.is_finite());
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let limit = scored.first().map_or(0.0, |best| WORSE * best.0.max(self.noise));
+        let mut chosen: Vec<Placement> = Vec::new();
+        for (_, place) in scored.into_iter().take_while(|(misfit, _)| *misfit <= limit) {
+            if !chosen.iter().any(|other| self.alike(other, &place)) {
+                chosen.push(place);
+            }
+        }
+        chosen
+    }
+
+    /// Mean square of the chords between seen and computed directions; it grows to 4 behind the camera.
+    fn misfit(&self, place: &Placement) -> f64 {
+        let chord = |(ray, point): (&Vector3, &Vector3)| {
+            let seen = unit(&apply(&place.to_photo, &difference(point, &place.centre)));
+            seen.map_or(f64::NAN, |seen| square(&difference(&seen, ray)))
+        };
+        self.rays.iter().zip(&self.points).map(chord).sum::<f64>() / self.points.len() as f64
+    }
+
+    fn alike(&self, a: &Placement, b: &Placement) -> bool {
+        let offset = difference(&a.centre, &b.centre);
+        let from = difference(&self.points[0], &a.centre);
+        let trace: f64 = (0..3).map(|i| dot(&a.to_photo[i], &b.to_photo[i])).sum();
+        let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos();
+        angle < APART && square(&offset) < APART * APART * square(&from)
+    }
+
+    /// The triples that span most, in the image and in space.
+    fn triples(&self) -> Vec<[usize; 3]> {
+        let spread = self.spread();
+        let mut triples: Vec<(f64, [usize; 3])> = Vec::new();
+        for (a, &i) in spread.iter().enumerate() {
+            for (b, &j) in spread.iter().enumerate().skip(a + 1) {
+                for &k in &spread[b + 1..] {
+                    triples.push((self.span([i, j, k]), [i, j, k]));
+                }
+            }
+        }
+        triples.sort_by(|a, b| b.0.total_cmp(&a.0));
+        triples.into_iter().take(TRIPLES).map(|(_, triple)| triple).collect()
+    }
+
+    /// Area of the triangle in the image (in directions) times its area in space.
+    fn span(&self, [i, j, k]: [usize; 3]) -> f64 {
+        let area =
+            |p: &[Vector3]| square(&cross(&difference(&p[j], &p[i]), &difference(&p[k], &p[i]))).sqrt();
+        area(&self.rays) * area(&self.points)
+    }
+
+    /// Points far from each other in the image: each next one is the farthest from those chosen.
+    fn spread(&self) -> Vec<usize> {
+        let mean: Vector3 =
+            std::array::from_fn(|k| self.rays.iter().map(|ray| ray[k]).sum::<f64>() / self.rays.len() as f64);
+        let chord = |ray: &Vector3, other: &Vector3| square(&difference(ray, other));
+        let mut nearest: Vec<f64> = self.rays.iter().map(|ray| chord(ray, &mean)).collect();
+        let mut chosen = Vec::new();
+        while chosen.len() < SPREAD_POINTS.min(self.rays.len()) {
+            let free = (0..self.rays.len()).filter(|index| !chosen.contains(index));
+            let Some(next) = free.max_by(|&a, &b| nearest[a].total_cmp(&nearest[b])) else { break };
+            if chosen.is_empty() {
+                nearest.fill(f64::INFINITY);
+            }
+            chosen.push(next);
+            for (distance, ray) in nearest.iter_mut().zip(&self.rays) {
+                *distance = distance.min(chord(ray, &self.rays[next]));
+            }
+        }
+        chosen
+    }
+}

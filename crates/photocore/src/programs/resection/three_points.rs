@@ -1,0 +1,257 @@
+//! Resection from three points without initial values: the distances of the points from the projection centre by the law of
+//! cosines (Grunert 1841), reduced to one cubic as by Persson and Nordberg (Lambda Twist, ECCV 2018).
+//!
+//! With l_i the distances, y_i unit rays and d_ij the sides of the triangle, |l_i y_i - l_j y_j|^2 = d_ij^2. Two combinations
+//! of the three equations are homogeneous, l^T D1 l = 0 and l^T D2 l = 0: two cones. A cone D1 + g D2 with zero determinant is
+//! a pair of planes; on each plane one distance is a linear function of the other two, and a quadratic equation is left.
+
+use crate::geometry::vector::{apply, apply_transposed, cross, difference, dot, product, solve, transposed};
+use crate::geometry::{Matrix3, Vector3};
+
+/// Where a photo stands in cartesian object space: u = G (P - C).
+#[derive(Debug, Clone, Copy)]
+pub struct Placement {
+    /// C, the projection centre.
+    pub centre: Vector3,
+    /// G: object space to photo.
+    pub to_photo: Matrix3,
+}
+
+/// Discriminant of a quadratic equation, relative to b^2, and misclosures of the squared sides, relative to these, that errors of
+/// the rays may cause near the danger cylinder, where two solutions fall together and vanish.
+const NOT_REAL: f64 = 1e-2;
+const NOT_CLOSED: f64 = 1e-2;
+/// Solutions whose distances differ by less than this, relatively, are one.
+const TWINS: f64 = 1e-4;
+
+/// Every place from which three points are seen along three unit rays (in the photo), in front of the camera: up to four.
+///
+/// Near the danger cylinder two solutions may come out as one, and what is only nearly a solution as one too.
+pub fn three_points(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Vec<Placement> {
+    let triangle = Triangle::new(rays, points);
+    let mut candidates = triangle.distances();
+    candidates.sort_by(|a, b| a.misclosure.total_cmp(&b.misclosure));
+    let mut found: Vec<Vector3> = Vec::new();
+    for Candidate { distances, .. } in candidates {
+        let twin =
+            |other: &Vector3| square(&difference(other, &distances)) <= (TWINS * TWINS) * square(&distances);
+        if found.len() < 4 && !found.iter().any(twin) {
+            found.push(distances);
+        }
+    }
+    found.iter().filter_map(|distances| place(rays, points, distances)).collect()
+}
+
+/// Distances of three points.
+struct Candidate {
+    distances: Vector3,
+    /// Sum of squares of the misclosures of the squared sides, relative to these.
+    misclosure: f64,
+}
+
+/// Squared sides and cosines between rays; `[0, 1, 2]` stand for the pairs 12, 13, 23.
+struct Triangle {
+    side: Vector3,
+    cosine: Vector3,
+}
+
+const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
+
+impl Triangle {
+    fn new(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Self {
+        let side = PAIRS.map(|(i, j)| square(&difference(&points[i], &points[j])));
+        Self { side, cosine: PAIRS.map(|(i, j)| dot(&rays[i], &rays[j])) }
+    }
+
+    /// The matrix of the quadratic form d_ij^2 of one pair.
+    fn cone(&self, pair: usize) -> Matrix3 {
+        let (i, j) = PAIRS[pair];
+        let mut cone = [[0.0; 3]; 3];
+        (cone[i][i], cone[j][j]) = (1.0, 1.0);
+        (cone[i][j], cone[j][i]) = (-self.cosine[pair], -self.cosine[pair]);
+        cone
+    }
+
+    /// Positive distances that satisfy the three equations, some of them more than once.
+    fn distances(&self) -> Vec<Candidate> {
+        let [c12, c13, c23] = [0, 1, 2].map(|pair| self.cone(pair));
+        let [a12, a13, a23] = self.side;
+        let d1 = combination(a23, &c12, -a12, &c23);
+        let d2 = combination(a23, &c13, -a13, &c23);
+        let (adjugate1, adjugate2) = (cofactors(&d1), cofactors(&d2));
+        let inner = |a: &Matrix3, b: &Matrix3| (0..3).map(|i| dot(&a[i], &b[i])).sum::<f64>();
+        // det(D1 + g D2) = det D1 + g <adj D1, D2> + g^2 <D1, adj D2> + g^3 det D2
+        let cubic = [
+            dot(&d1[0], &adjugate1[0]),
+            inner(&adjugate1, &d2),
+            inner(&d1, &adjugate2),
+            dot(&d2[0], &adjugate2[0]),
+        ];
+        // Beside each pair of planes stands a cone of the pencil that does not vanish on them.
+        let pair = |g: f64| (combination(1.0, &d1, g, &d2), combination(1.0, &d2, -g, &d1));
+        let mut pencil: Vec<(Matrix3, Matrix3)> = real_roots(&cubic).into_iter().map(pair).collect();
+        if pencil.len() < 3 {
+            // The root at infinity, where D2 is a pair of planes (an isosceles triangle seen from above its axis).
+            pencil.push((d2, d1));
+        }
+        let on_planes = |(cone, other): &(Matrix3, Matrix3)| -> Vec<Vector3> {
+            planes(cone).iter().flat_map(|plane| self.on_plane(plane, other)).collect()
+        };
+        pencil.iter().flat_map(on_planes).filter_map(|distances| self.polish(distances)).collect()
+    }
+
+    /// Distances on the plane n . l = 0 and on a cone: the largest component of n gives one distance from the other two.
+    fn on_plane(&self, n: &Vector3, cone: &Matrix3) -> Vec<Vector3> {
+        let k = (0..3).max_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs())).unwrap_or(0);
+        let (p, q) = ((k + 1) % 3, (k + 2) % 3);
+        // l = l_p (e + t f), t = l_q / l_p
+        let (mut e, mut f) = ([0.0; 3], [0.0; 3]);
+        (e[p], e[k]) = (1.0, -n[p] / n[k]);
+        (f[q], f[k]) = (1.0, -n[q] / n[k]);
+        let (ce, cf) = (apply(cone, &e), apply(cone, &f));
+        let ratios = quadratic_roots(dot(&f, &cf), 2.0 * dot(&e, &cf), dot(&e, &ce));
+        let distances = ratios.into_iter().filter_map(|t| {
+            let direction: Vector3 = std::array::from_fn(|i| e[i] + t * f[i]);
+            let sizes = [0, 1, 2].map(|pair| dot(&direction, &apply(&self.cone(pair), &direction)));
+            // The longest side gives the scale.
+            let longest = (0..3).max_by(|&a, &b| self.side[a].total_cmp(&self.side[b]))?;
+            let scale = (self.side[longest] / sizes[longest]).sqrt();
+            let distances = direction.map(|value| scale * value);
+            let positive = distances.iter().all(|&value| value.is_finite() && value > 0.0);
+            positive.then_some(distances)
+        });
+        distances.collect()
+    }
+
+    /// A few steps of Newton's method on the three equations; None where they lead nowhere.
+    fn polish(&self, start: Vector3) -> Option<Candidate> {
+        let misclosure = |l: &Vector3| -> Vector3 {
+            std::array::from_fn(|pair| self.side[pair] - dot(l, &apply(&self.cone(pair), l)))
+        };
+        let size = |v: &Vector3| (0..3).map(|pair| (v[pair] / self.side[pair]).powi(2)).sum::<f64>();
+        let (mut l, mut best) = (start, size(&misclosure(&start)));
+        for _ in 0..6 {
+            let jacobian: Matrix3 =
+                std::array::from_fn(|pair| apply(&self.cone(pair), &l).map(|value| 2.0 * value));
+            let Some(step) = solve(&jacobian, &misclosure(&l), 1e-14) else { break };
+            let next: Vector3 = std::array::from_fn(|i| l[i] + step[i]);
+            let error = size(&misclosure(&next));
+            if error.is_nan() || error >= best {
+                break;
+            }
+            (l, best) = (next, error);
+        }
+        let closed = best < NOT_CLOSED * NOT_CLOSED && l.iter().all(|&value| value > 0.0);
+        closed.then_some(Candidate { distances: l, misclosure: best })
+    }
+}
+
+/// The place that puts the points at the given distances along the rays: two congruent triangles made to coincide.
+fn place(rays: &[Vector3; 3], points: &[Vector3; 3], distances: &Vector3) -> Option<Placement> {
+    let seen: [Vector3; 3] = std::array::from_fn(|i| rays[i].map(|value| distances[i] * value));
+    // Columns of `axes` are unit vectors fixed to the triangle.
+    let to_photo = product(&axes(&seen)?, &transposed(&axes(points)?));
+    let back = apply_transposed(&to_photo, &seen[0]);
+    Some(Placement { centre: difference(&points[0], &back), to_photo })
+}
+
+fn axes(corners: &[Vector3; 3]) -> Option<Matrix3> {
+    let along = unit(&difference(&corners[1], &corners[0]))?;
+    let normal = unit(&cross(&along, &difference(&corners[2], &corners[0])))?;
+    Some(transposed(&[along, cross(&normal, &along), normal]))
+}
+
+/// |v|^2
+pub(super) fn square(v: &Vector3) -> f64 {
+    dot(v, v)
+}
+
+/// v / |v|; None for a vector without direction.
+pub(super) fn unit(v: &Vector3) -> Option<Vector3> {
+    let length = square(v).sqrt();
+    (length > 0.0 && length.is_finite()).then(|| v.map(|value| value / length))
+}
+
+/// a A + b B
+fn combination(a: f64, first: &Matrix3, b: f64, second: &Matrix3) -> Matrix3 {
+    std::array::from_fn(|i| std::array::from_fn(|j| a * first[i][j] + b * second[i][j]))
+}
+
+/// The matrix of cofactors; of a symmetric matrix also the adjugate.
+fn cofactors(m: &Matrix3) -> Matrix3 {
+    [cross(&m[1], &m[2]), cross(&m[2], &m[0]), cross(&m[0], &m[1])]
+}
+
+/// The normals of the two planes of a symmetric cone with zero determinant, v1 sqrt(e1) +- v2 sqrt(-e2); none where the
+/// planes are not real.
+fn planes(cone: &Matrix3) -> Vec<Vector3> {
+    // Eigenvalues other than zero: their sum is the trace, their product that of the principal minors.
+    let trace = cone[0][0] + cone[1][1] + cone[2][2];
+    let adjugate = cofactors(cone);
+    let minors = adjugate[0][0] + adjugate[1][1] + adjugate[2][2];
+    let root = (trace * trace / 4.0 - minors).max(0.0).sqrt();
+    let (positive, negative) = (trace / 2.0 + root, trace / 2.0 - root);
+    if positive <= 0.0 || negative > 0.0 {
+        return vec![];
+    }
+    let (Some(v1), Some(v2)) = (eigenvector(cone, positive), eigenvector(cone, negative)) else {
+        return vec![];
+    };
+    let (s1, s2) = (positive.sqrt(), (-negative).sqrt());
+    let normal = |sign: f64| std::array::from_fn(|i| s1 * v1[i] + sign * s2 * v2[i]);
+    vec![normal(1.0), normal(-1.0)]
+}
+
+/// The vector across the rows of A - e I: the largest of the three cross products.
+fn eigenvector(matrix: &Matrix3, eigenvalue: f64) -> Option<Vector3> {
+    let mut shifted = *matrix;
+    (0..3).for_each(|i| shifted[i][i] -= eigenvalue);
+    let rows = cofactors(&shifted);
+    let largest = rows.iter().max_by(|a, b| square(a).total_cmp(&square(b)))?;
+    unit(largest)
+}
+
+/// Real roots of c0 + c1 x + c2 x^2 + c3 x^3, of a lower degree where the leading coefficients vanish.
+fn real_roots(c: &[f64; 4]) -> Vec<f64> {
+    let largest = c.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    if c[3].abs() <= 1e-14 * largest {
+        return quadratic_roots(c[2], c[1], c[0]);
+    }
+    // x = t - b/3: t^3 + p t + q = 0
+    let [d, b1, b] = [c[0] / c[3], c[1] / c[3], c[2] / c[3]];
+    let p = b1 - b * b / 3.0;
+    let q = 2.0 * b.powi(3) / 27.0 - b * b1 / 3.0 + d;
+    let discriminant = (q / 2.0).powi(2) + (p / 3.0).powi(3);
+    let depressed: Vec<f64> = if discriminant > 0.0 {
+        let larger = q.signum() * (q.abs() / 2.0 + discriminant.sqrt());
+        let u = -larger.cbrt();
+        vec![u - p / (3.0 * u)]
+    } else {
+        let radius = 2.0 * (-p / 3.0).max(0.0).sqrt();
+        let cosine = if radius > 0.0 { (3.0 * q / (p * radius)).clamp(-1.0, 1.0) } else { 1.0 };
+        let angle = cosine.acos() / 3.0;
+        [0.0, 1.0, 2.0].map(|k| radius * (angle - k * std::f64::consts::TAU / 3.0).cos()).to_vec()
+    };
+    let polish = |t: f64| {
+        let mut x = t - b / 3.0;
+        for _ in 0..4 {
+            let slope = (3.0 * x + 2.0 * b) * x + b1;
+            if slope == 0.0 {
+                break;
+            }
+            x -= (((x + b) * x + b1) * x + d) / slope;
+        }
+        x
+    };
+    depressed.into_iter().map(polish).filter(|x| x.is_finite()).collect()
+}
+
+/// Real roots of a x^2 + b x + c; a pair that falls little short of real counts as a double root.
+fn quadratic_roots(a: f64, b: f64, c: f64) -> Vec<f64> {
+    let discriminant = b * b - 4.0 * a * c;
+    if discriminant < -NOT_REAL * b * b {
+        return vec![];
+    }
+    let q = -0.5 * (b + b.signum() * discriminant.max(0.0).sqrt());
+    [q / a, c / q].into_iter().filter(|x| x.is_finite()).collect()
+}

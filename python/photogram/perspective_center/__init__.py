@@ -1,0 +1,19 @@
+"""Perspective centre of a projector from grid measurements (USGS Computer Contribution 2, 1969)."""
+
+from photogram.perspective_center.batch import Run, Stop, run_deck
+from photogram.perspective_center.deck import read_deck
+from photogram.perspective_center.grid import Coordinatograph, Grid, reduce
+from photogram.perspective_center.solution import Cycle, PerspectiveCenter, determine
+
+__all__ = [
+    "Coordinatograph",
+    "Cycle",
+    "Grid",
+    "PerspectiveCenter",
+    "Run",
+    "Stop",
+    "determine",
+    "read_deck",
+    "reduce",
+    "run_deck",
+]

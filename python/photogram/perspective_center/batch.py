@@ -1,0 +1,89 @@
+"""The program as a whole: all sets of a deck, one after the other, until one cannot be solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from photogram.errors import PhotogramError
+from photogram.messages import Message
+from photogram.perspective_center.deck import Deck
+from photogram.perspective_center.grid import Grid
+from photogram.perspective_center.solution import PerspectiveCenter, Weights, determine
+
+__all__ = ["Run", "Stop", "run_deck"]
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Where a run stopped before the end of the deck.
+
+    Attributes
+    ----------
+    error
+        Why.
+    title, number
+        Title of the job, and number of the set, that were at work; None and 0 before them.
+    grid
+        The set, where it was read but could not be solved.
+    """
+
+    error: PhotogramError
+    title: str | None
+    number: int
+    grid: Grid | None
+
+
+@dataclass
+class Run:
+    """What a run through a deck gave.
+
+    Attributes
+    ----------
+    results
+        The sets that were solved, in the order of the deck.
+    messages
+        Remarks on the cards and the solutions.
+    stop
+        None when the whole deck was processed.
+    """
+
+    results: list[PerspectiveCenter] = field(default_factory=list)
+    messages: list[Message] = field(default_factory=list)
+    stop: Stop | None = None
+
+    @property
+    def converged(self) -> bool:
+        """Whether all sets of the deck were solved and converged."""
+        return self.stop is None and all(result.converged for result in self.results)
+
+
+def run_deck(path: Path, *, as_published: bool = False, weights: Weights = "equal") -> Run:
+    """Run through a deck as the program does: it stops at the first set that cannot be read or solved.
+
+    A set that does not converge stops nothing. What was solved before the stop is kept.
+
+    Parameters
+    ----------
+    path
+        The deck.
+    as_published, weights
+        As in :func:`photogram.perspective_center.determine`.
+
+    Raises
+    ------
+    InputError
+        The deck cannot be read at all.
+    """
+    deck = Deck(path)
+    run = Run()
+    grid: Grid | None = None
+    try:
+        for grid in deck.grids():
+            result = determine(grid, as_published=as_published, weights=weights)
+            run.results.append(result)
+            grid = None
+    except PhotogramError as error:
+        run.stop = Stop(error, deck.title, deck.number, grid)
+    run.messages = [*deck.messages, *(message for result in run.results for message in result.messages)]
+    return run

@@ -1,0 +1,70 @@
+"""The JSON document of a run; `docs/perspective-center.md` describes it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import orjson
+
+from photogram import _photocore
+from photogram.perspective_center.batch import Run
+from photogram.perspective_center.solution import PerspectiveCenter
+
+__all__ = ["to_json"]
+
+
+def to_json(run: Run) -> bytes:
+    """Return a run as JSON (UTF-8). What is not a number is null."""
+    document = {
+        "program": f"photogram {_photocore.__version__}",
+        "units": {
+            "perspective_center": "unit of the model",
+            "attitude_minutes": "omega, phi, kappa in minutes of arc, 3437.7468 to the radian",
+            "standard_errors": "unit of the model; minutes of arc",
+            "sigma0_plate": "mm",
+            "sigma0_model": "unit of the model",
+            "covariance": "omega, phi, kappa in rad, X, Y, Z in the unit of the model; products",
+            "mean": "unit of the model",
+            "residual": "measured minus projected, unit of the model",
+            "radial_distortion": "mm on the plate, positive outward",
+            "standardized": "residual / its own standard deviation, from sigma0_plate",
+        },
+        "messages": [str(message) for message in run.messages],
+        "error": None if run.stop is None else str(run.stop.error),
+        "sets": [_set(result) for result in run.results],
+    }
+    return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
+
+
+def _set(result: PerspectiveCenter) -> dict[str, Any]:
+    names = ("X", "Y", "Z", "omega_minutes", "phi_minutes", "kappa_minutes")
+    errors = [None] * 6 if result.standard_errors is None else result.standard_errors.tolist()
+    return {
+        "title": result.grid.title,
+        "data_set": result.grid.number,
+        "perspective_center": result.position.tolist(),
+        "attitude_minutes": result.attitude_minutes.tolist(),
+        "standard_errors": dict(zip(names, errors, strict=True)),
+        "sigma0_plate": result.sigma0_plate,
+        "sigma0_model": result.sigma0_model,
+        "covariance": None if result.covariance is None else result.covariance.tolist(),
+        "converged": result.converged,
+        "iterations": len(result.cycles),
+        "points": _points(result),
+    }
+
+
+def _points(result: PerspectiveCenter) -> list[dict[str, Any]]:
+    grid = result.grid
+    columns = zip(
+        grid.ids,
+        grid.readings.tolist(),
+        grid.model[:, :2].tolist(),
+        result.residual.tolist(),
+        result.radial_distortion.tolist(),
+        result.redundancy.tolist(),
+        result.standardized.tolist(),
+        strict=True,
+    )
+    names = ("id", "readings", "mean", "residual", "radial_distortion", "redundancy", "standardized")
+    return [dict(zip(names, row, strict=True)) for row in columns]

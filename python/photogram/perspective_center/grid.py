@@ -1,0 +1,158 @@
+"""A projected grid as it was measured: readings reduced to means, and corrected for the coordinatograph."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.arrays import shaped
+from photogram.errors import InputError
+
+__all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "reduce"]
+
+Floats = NDArray[np.float64]
+
+MINUTES_PER_RADIAN = 3437.7468
+"""CONV of the program, too large by 8.5e-9 of itself; all its angles in minutes are meant by it."""
+
+
+@dataclass(frozen=True)
+class Coordinatograph:
+    """Correction factors of a coordinatograph.
+
+    Attributes
+    ----------
+    x_scale, y_scale
+        Scale of its X and of its Y (XSCAL, YSCAL).
+    sine
+        By how much X is turned from the perpendicular to Y, per unit of Y (SINALP).
+    """
+
+    x_scale: float
+    y_scale: float
+    sine: float
+
+    def correct(self, xy: Floats) -> Floats:
+        """Correct the (n, 2) means of a set (specification, 5.3).
+
+        They are counted from the smallest absolute values of X and Y in the set, as the program does: for
+        positive coordinates the corner of the grid. X uses the uncorrected Y.
+        """
+        anchor = np.abs(xy).min(axis=0)
+        x, y = (xy - anchor).T
+        corrected = np.column_stack([self.x_scale * (x + y * self.sine), y * self.y_scale])
+        result: Floats = corrected + anchor
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A projected grid of n points: one set of readings.
+
+    Attributes
+    ----------
+    ids
+        n point numbers or names.
+    plate_xy
+        (n, 2) calibrated coordinates on the plate in millimetres, from the principal point.
+    model
+        (n, 3) mean coordinates in the model, corrected. The points need not be at one height.
+    principal_distance
+        Millimetres, positive.
+    initial
+        (6,) approximations: position in the unit of the model, then omega, phi, kappa in radians; None
+        without.
+    tolerance
+        Limit of the iteration as published (GDIF), in the unit of the model.
+    readings
+        (n,) number of readings of each point; 1 by default.
+    reading_sd
+        (n, 2) standard deviations of the readings of each point in X and Y; 0 where there is one reading.
+    corrected
+        Whether a correction for the coordinatograph was made.
+    title, number
+        Title of the job, and number of the set in it.
+
+    Raises
+    ------
+    InputError
+        Arrays of the wrong shape, values that are not finite.
+    """
+
+    ids: Sequence[int | str]
+    plate_xy: Floats
+    model: Floats
+    principal_distance: float
+    initial: Floats | None = None
+    tolerance: float = 0.001
+    readings: NDArray[np.int64] = field(default_factory=lambda: np.array(1))
+    reading_sd: Floats = field(default_factory=lambda: np.array(0.0))
+    corrected: bool = False
+    title: str = ""
+    number: int = 1
+
+    def __post_init__(self) -> None:
+        count = len(self.ids)
+        shapes: dict[str, tuple[int, ...]] = {
+            "plate_xy": (count, 2),
+            "model": (count, 3),
+            "reading_sd": (count, 2),
+        }
+        if self.initial is not None:
+            shapes["initial"] = (6,)
+        for name, shape in shapes.items():
+            values = shaped(name, getattr(self, name), shape)
+            if not np.isfinite(values).all():
+                raise InputError(f"{name} holds values that are not finite")
+            object.__setattr__(self, name, values)
+        readings = shaped("readings", self.readings, (count,)).astype(np.int64)
+        if (readings < 1).any():
+            raise InputError("readings: every point has one reading at least")
+        object.__setattr__(self, "readings", readings)
+        if not self.principal_distance > 0:
+            raise InputError(f"the principal distance must be positive, not {self.principal_distance}")
+
+
+def reduce(
+    readings: Sequence[Floats],
+    *,
+    ids: Sequence[int | str],
+    plate_xy: Floats,
+    principal_distance: float,
+    coordinatograph: Coordinatograph | None = None,
+    initial: Floats | None = None,
+    tolerance: float = 0.001,
+    title: str = "",
+    number: int = 1,
+) -> Grid:
+    """Reduce readings to a grid: means, standard deviations (divisor k - 1), corrections.
+
+    Parameters
+    ----------
+    readings
+        (k, 3) X, Y, Z of the k readings of each point.
+    coordinatograph
+        None to leave the means as they are. Standard deviations are always those of the raw readings.
+    ids, plate_xy, principal_distance, initial, tolerance, title, number
+        As in :class:`Grid`.
+    """
+    means = np.array([np.mean(each, axis=0) for each in readings])
+    sd = [np.std(each[:, :2], axis=0, ddof=1) if len(each) > 1 else np.zeros(2) for each in readings]
+    if coordinatograph is not None:
+        means = np.column_stack([coordinatograph.correct(means[:, :2]), means[:, 2]])
+    return Grid(
+        ids=ids,
+        plate_xy=plate_xy,
+        model=means,
+        principal_distance=principal_distance,
+        initial=initial,
+        tolerance=tolerance,
+        readings=np.array([len(each) for each in readings]),
+        reading_sd=np.array(sd),
+        corrected=coordinatograph is not None,
+        title=title,
+        number=number,
+    )

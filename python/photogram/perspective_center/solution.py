@@ -1,0 +1,336 @@
+"""Perspective centre and attitude of a projector from a projected grid (USGS Computer Contribution 2, 1969).
+
+Plate coordinates are the observations, mean model coordinates are taken as free of error, as in the report;
+the covariance and the test values follow from the residuals of the adjustment itself.
+`docs/perspective-center.md` has the formulae.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram import _photocore
+from photogram.arrays import shaped
+from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.geometry import rotation_matrix
+from photogram.messages import Message
+from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
+from photogram.resection import Observed, solve
+
+__all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]
+
+Floats = NDArray[np.float64]
+Weights = Literal["equal", "readings", "deviations"]
+
+MOST_CYCLES = 6
+"""Cycles of the program before it gives up."""
+STRICT_CYCLES = 50
+STRICT_FRACTION = 1e-9
+"""Of the standard deviations of the unknowns for a unit weight of a millimetre: far below those of a real
+plate."""
+SINGULAR = "NORMAL EQUATIONS MATRIX IS SINGULAR"
+REPORT_ORDER = [3, 4, 5, 0, 1, 2]
+"""Omega, phi, kappa before X, Y, Z."""
+TESTABLE = 1e-10
+"""A redundancy number below this is the rounding error of zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """One cycle of the iteration: position after it, its correction, angles after it in minutes."""
+
+    position: Floats
+    correction: Floats
+    attitude_minutes: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class PerspectiveCenter:
+    """Perspective centre and attitude of a projector, and how good they are; n points.
+
+    Lengths in the model are in its unit, on the plate in millimetres; angles are omega, phi, kappa.
+
+    Attributes
+    ----------
+    grid
+        What it was determined from.
+    as_published
+        Whether by the algorithm of the program.
+    converged
+        Whether the criterion of convergence was met.
+    cycles
+        The iteration.
+    position, attitude
+        (3,) Xc, Yc, Zc; (3,) in radians.
+    cofactors
+        (6, 6) of omega, phi, kappa, Xc, Yc, Zc for a unit weight of one millimetre on the plate.
+    sigma0_plate, sigma0_model
+        Standard error of unit weight of plate coordinates (mm) and of projected coordinates in the model (its
+        unit); None without redundancy.
+    degrees_of_freedom
+        2 n - 6.
+    weights
+        (n,) weights of the points, 1 in the mean.
+    residual, projected
+        (n, 2) measured minus projected, and projected coordinates, in the model.
+    observed_radius, fixed_radius, radial_distortion
+        (n,) radii on the plate of the measured point transformed there and of the grid point, and their
+        difference, positive outward.
+    redundancy, standardized
+        (n, 2) redundancy numbers of the residuals in X and Y, and residual / its own standard deviation, the
+        latter from `sigma0_plate`; NaN without redundancy.
+    messages
+        Remarks on the solution.
+    """
+
+    grid: Grid
+    as_published: bool
+    converged: bool
+    cycles: list[Cycle]
+    position: Floats
+    attitude: Floats
+    cofactors: Floats
+    sigma0_plate: float | None
+    sigma0_model: float | None
+    degrees_of_freedom: int
+    weights: Floats
+    residual: Floats
+    projected: Floats
+    observed_radius: Floats
+    fixed_radius: Floats
+    radial_distortion: Floats
+    redundancy: Floats
+    standardized: Floats
+    messages: list[Message]
+
+    @property
+    def attitude_minutes(self) -> Floats:
+        """(3,) omega, phi, kappa in minutes."""
+        return self.attitude * MINUTES_PER_RADIAN
+
+    @property
+    def covariance(self) -> Floats | None:
+        """(6, 6) variance-covariance matrix of omega, phi, kappa (rad), Xc, Yc, Zc, if any."""
+        return None if self.sigma0_plate is None else self.cofactors * self.sigma0_plate**2
+
+    @property
+    def standard_errors(self) -> Floats | None:
+        """(6,) of Xc, Yc, Zc, then omega, phi, kappa in minutes; None without redundancy."""
+        if self.covariance is None:
+            return None
+        deviations = np.sqrt(np.diagonal(self.covariance))
+        errors: Floats = np.concatenate([deviations[3:], deviations[:3] * MINUTES_PER_RADIAN])
+        return errors
+
+
+def determine(
+    grid: Grid,
+    *,
+    as_published: bool = False,
+    weights: Weights = "equal",
+    model_sd: ArrayLike | None = None,
+) -> PerspectiveCenter:
+    """Determine the perspective centre and the attitude of a projector.
+
+    Parameters
+    ----------
+    grid
+        The projected grid.
+    as_published
+        Iterate, and form residuals, as the program does: six cycles at the most, until the correction of the
+        position is shorter than the tolerance; coefficients with plate coordinates in place of computed ones;
+        the last correction in the residuals; one scale, that of the last point. Otherwise: least squares to
+        strict convergence, from a direct solution where the approximations do not lead there, residuals by
+        projection onto the height of each point.
+    weights
+        `equal` as in the report; `readings`: every mean has the weight of its number of readings;
+        `deviations`: its weight is the reciprocal square of the standard deviation of the mean, from its own
+        readings in X and Y together.
+    model_sd
+        (n,) standard deviations of the mean model coordinates; their reciprocal squares are the weights
+        instead.
+
+    Raises
+    ------
+    RankError
+        The points do not determine the projector: the program's NORMAL EQUATIONS MATRIX IS SINGULAR.
+    AdjustmentError
+        The approximations give coordinates that are not finite.
+    InputError
+        Weights that cannot be formed.
+    """
+    weight = _weights(grid, weights, model_sd)
+    observed = Observed.checked(
+        grid.model, 0.0, grid.plate_xy, np.repeat(weight[:, np.newaxis] ** -0.5, 2, axis=1),
+        -grid.principal_distance, [str(each) for each in grid.ids],
+    )  # fmt: skip
+    try:
+        solution, messages = (_as_published if as_published else _strictly)(grid, observed)
+    except RankError as error:
+        raise RankError(f"{SINGULAR}: {error}", [], error.points) from None
+    return _result(grid, weight, solution, messages, as_published)
+
+
+def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats:
+    """Return weights of the points, 1 in the mean."""
+    if weights not in get_args(Weights):
+        raise InputError(f"weights is one of {', '.join(get_args(Weights))}, not {weights!r}")
+    if model_sd is not None:
+        variance = shaped("model_sd", model_sd, (len(grid.ids),)) ** 2
+    elif weights == "deviations":
+        variance = (grid.reading_sd**2).mean(axis=1) / grid.readings
+    else:
+        variance = 1.0 / (grid.readings if weights == "readings" else np.ones(len(grid.ids)))
+    bad = np.flatnonzero(~((variance > 0) & np.isfinite(variance)))
+    if bad.size:
+        names = ", ".join(str(grid.ids[index]) for index in bad[:12])
+        raise InputError(
+            f"no standard deviation to weight by at the points {names}: one reading, or equal ones"
+        )
+    weight: Floats = 1.0 / variance
+    weight /= weight.mean()
+    return weight
+
+
+Solved = tuple[_photocore.ResectionSolution, list[Message]]
+
+
+def _strictly(grid: Grid, observed: Observed) -> Solved:
+    """Adjust to strict convergence; from a direct solution where the approximations lead nowhere."""
+    starts = [grid.initial] if grid.initial is not None else []
+    messages = []
+    for start in [*starts, None]:
+        try:
+            solution = solve(observed, start=start, limit=STRICT_FRACTION, max_iterations=STRICT_CYCLES)
+        except AdjustmentError:
+            if start is None:
+                raise
+        else:
+            if start is None or (solution.status == "converged" and _in_front(grid, solution.pose)):
+                break
+        messages = [Message("the initial approximations lead to no solution; a direct one was taken instead")]
+    return solution, messages
+
+
+def _in_front(grid: Grid, pose: Floats) -> bool:
+    """Whether the projector looks at all points; the equations hold for points behind it as well."""
+    ahead = -rotation_matrix(pose[np.newaxis, 3:])[0, 2]
+    return bool(((grid.model - pose[:3]) @ ahead > 0).all())
+
+
+def _as_published(grid: Grid, observed: Observed) -> Solved:
+    if grid.initial is None:
+        raise InputError("the program needs initial approximations")
+    solution = solve(
+        observed,
+        start=grid.initial,
+        criterion="position",
+        limit=grid.tolerance,
+        max_iterations=MOST_CYCLES,
+        at_measured=True,
+    )
+    if solution.status == "diverged":
+        raise RankError("the iteration has led to where the points do not determine it", [], observed.names)
+    return solution, []
+
+
+def _result(
+    grid: Grid,
+    weight: Floats,
+    solution: _photocore.ResectionSolution,
+    messages: list[Message],
+    as_published: bool,
+) -> PerspectiveCenter:
+    history = np.vstack([solution.start, solution.history])
+    corrections = np.diff(history, axis=0)
+    position, attitude = solution.pose[:3], solution.pose[3:]
+    if as_published:
+        # v = A d - L with the last correction d, although it has been applied already (specification, 3.2).
+        on_plate = np.einsum("nij,j->ni", solution.partials, corrections[-1]) - solution.residuals
+        scale = (grid.model[-1, 2] - position[2]) / -grid.principal_distance
+        to_model = np.tile(scale * np.eye(2), (len(grid.ids), 1, 1))
+        residual = scale * on_plate
+    else:
+        on_plate = -solution.residuals
+        projected, to_model = _projection(grid, position, attitude)
+        residual = grid.model[:, :2] - projected
+    freedom = solution.degrees_of_freedom
+    sigma0, sigma0_model = (
+        math.sqrt(float((weight[:, np.newaxis] * v**2).sum() / freedom)) if freedom > 0 else None
+        for v in (on_plate, residual)
+    )
+    redundancy, standardized = _tests(solution, weight, to_model, residual, sigma0)
+    observed_radius = np.hypot(*(grid.plate_xy - solution.residuals).T)
+    fixed_radius = np.hypot(*grid.plate_xy.T)
+    return PerspectiveCenter(
+        grid=grid,
+        as_published=as_published,
+        converged=solution.status == "converged",
+        cycles=[
+            Cycle(values[:3], correction[:3], values[3:] * MINUTES_PER_RADIAN)
+            for values, correction in zip(history[1:], corrections, strict=True)
+        ],
+        position=position,
+        attitude=attitude,
+        cofactors=solution.cofactors[np.ix_(REPORT_ORDER, REPORT_ORDER)],
+        sigma0_plate=sigma0,
+        sigma0_model=sigma0_model,
+        degrees_of_freedom=freedom,
+        weights=weight,
+        residual=residual,
+        projected=grid.model[:, :2] - residual,
+        observed_radius=observed_radius,
+        fixed_radius=fixed_radius,
+        radial_distortion=observed_radius - fixed_radius,
+        redundancy=redundancy,
+        standardized=standardized,
+        messages=messages,
+    )
+
+
+def _projection(grid: Grid, position: Floats, attitude: Floats) -> tuple[Floats, Floats]:
+    """Project the plate points onto the heights of the model points.
+
+    The ray of (x, y, -c) has the direction e = M^T (x, y, -c) and meets the height Z where X = Xc + t e, t =
+    (Z - Zc) / e_Z.
+
+    Returns
+    -------
+    (n, 2) X, Y, and (n, 2, 2) their partials with respect to x, y: t (I - (e_X, e_Y) / e_Z k^T) M^T.
+    """
+    to_photo = rotation_matrix(attitude[np.newaxis])[0]
+    plate = np.column_stack([grid.plate_xy, np.full(len(grid.ids), -grid.principal_distance)])
+    direction = plate @ to_photo
+    reach = (grid.model[:, 2] - position[2]) / direction[:, 2]
+    slope = direction[:, :2] / direction[:, 2:]
+    projected = position[:2] + reach[:, np.newaxis] * direction[:, :2]
+    across = to_photo[:2, :2].T - slope[:, :, np.newaxis] * to_photo[:2, 2]
+    return projected, reach[:, np.newaxis, np.newaxis] * across
+
+
+def _tests(
+    solution: _photocore.ResectionSolution,
+    weight: Floats,
+    to_model: Floats,
+    residual: Floats,
+    sigma0: float | None,
+) -> tuple[Floats, Floats]:
+    """Redundancy numbers and standardized residuals in the model.
+
+    The residuals on the plate have the cofactors P^-1 - A Q A^T; both sides turned into the model, the
+    quotient of their diagonals is the part of an error of X or Y that shows in its residual.
+    """
+    partials = solution.partials
+    observed = np.eye(2) / weight[:, np.newaxis, np.newaxis]
+    residuals = observed - partials @ solution.cofactors @ partials.transpose(0, 2, 1)
+    turned = [to_model @ each @ to_model.transpose(0, 2, 1) for each in (residuals, observed)]
+    of_residuals, of_observed = (np.diagonal(each, axis1=1, axis2=2) for each in turned)
+    redundancy: Floats = of_residuals / of_observed
+    testable = (redundancy > TESTABLE) & (sigma0 is not None)
+    scale = (sigma0 or math.nan) * np.sqrt(np.where(testable, of_residuals, np.nan))
+    return redundancy, residual / scale

@@ -1,0 +1,44 @@
+"""What the command prints of a run."""
+
+from __future__ import annotations
+
+from photogram.perspective_center.listing import NOT_CONVERGED
+from photogram.perspective_center.solution import PerspectiveCenter
+
+__all__ = ["summary"]
+
+SUSPECT = 3.29
+"""Standardized residuals beyond this are named: one in a thousand by chance."""
+
+
+def summary(result: PerspectiveCenter) -> list[str]:
+    """Return a set in a few lines: perspective centre, attitude, standard errors, suspects."""
+    grid = result.grid
+    how = "as published" if result.as_published else "least squares"
+    lines = [
+        f"{grid.title}, data set {grid.number}: {len(grid.ids)} points, {int(grid.readings.sum())} readings,"
+        f" {how}, {len(result.cycles)} iterations"
+    ]
+    if not result.converged:
+        lines.append(f"  {NOT_CONVERGED}")
+    errors = result.standard_errors
+    lines.append(f"  {'':16}{'X':>12}{'Y':>12}{'Z':>12}{'omega min':>12}{'phi min':>12}{'kappa min':>12}")
+    rows = [("value", [*result.position, *result.attitude_minutes], 4)]
+    if errors is not None:
+        rows.append(("standard error", errors.tolist(), 5))
+    for name, values, decimals in rows:
+        lines.append(f"  {name:<16}" + "".join(f"{value:>12.{decimals}f}" for value in values))
+    if result.sigma0_plate is None or result.sigma0_model is None:
+        return [*lines, "  no redundancy: no standard errors"]
+    lines.append(
+        f"  standard error of unit weight {result.sigma0_plate:.5f} mm on the plate,"
+        f" {result.sigma0_model:.5f} in the model; largest radial distortion"
+        f" {1000 * max(result.radial_distortion, key=abs):+.1f} um"
+    )
+    suspects = [
+        f"{name} {axis} ({value:+.2f})"
+        for name, pair in zip(grid.ids, result.standardized, strict=True)
+        for axis, value in zip("XY", pair, strict=True)
+        if abs(value) > SUSPECT
+    ]
+    return [*lines, f"  standardized residuals beyond {SUSPECT}: {', '.join(suspects) or 'none'}"]
