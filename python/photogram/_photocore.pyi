@@ -318,7 +318,7 @@ class BlockSolution:
         """Seconds in `form`, `factor`, `solve`, `invert` and `cofactors`, over all iterations."""
 
 class ComparatorError(Exception):
-    """The calibration cannot be adjusted: (message, cases, points), indices of the cases and points concerned."""
+    """The calibration cannot be adjusted: (message, cases, points), both by their indices."""
 
 @final
 class ComparatorSolution:
@@ -334,7 +334,7 @@ class ComparatorSolution:
 
     @property
     def comparator(self) -> list[float]:
-        """Scale x, scale y, lack of orthogonality (rad), coefficients of x, coefficients of y (unit of the grid)."""
+        """Scale x, scale y, lack of orthogonality (rad), coefficients of x, of y (unit of the grid)."""
 
     @property
     def comparator_cofactors(self) -> _Floats:
@@ -396,13 +396,15 @@ def adjust_comparator(
 ) -> ComparatorSolution:
     """Adjust a comparator, its polynomials, the placements of the plates and their grids together.
 
-    grid = M (x' + P(x') - centre) + t with x' = N S x: scales, lack of orthogonality, then polynomials, then rotation. Polynomials
-    are made of u^d, v^d, ... u^2, v^2; u and v are x' and y' less `centre` over `half_range`.
+    grid = M (x' + P(x') - centre) + t with x' = N S x: scales, lack of orthogonality, then polynomials, then
+    rotation. Polynomials are made of u^d, v^d, ... u^2, v^2; u and v are x' and y' less `centre` over
+    `half_range`.
 
     Parameters
     ----------
     grid_xy, grid_sd
-        (l, 2) coordinates of the grid points in the axes of their plate, and their standard deviations: infinite free, zero fixed.
+        (l, 2) coordinates of the grid points in the axes of their plate, and their standard deviations:
+        infinite free, zero fixed.
     case_placements
         (q, 3) initial rotation (rad) and grid coordinates of `centre`.
     case_left_handed
@@ -412,7 +414,8 @@ def adjust_comparator(
     measured_xy, measured_sd
         (m, 2) readings and their standard deviations, in the unit of the grid.
     coefficients, coefficient_sd
-        Initial coefficients in x and in y, in the unit of the grid, and their standard deviations: infinite free, zero fixed.
+        Initial coefficients in x and in y, in the unit of the grid, and their standard deviations: infinite
+        free, zero fixed.
     degree, centre, half_range
         Of the polynomials.
     limit, max_iterations

@@ -63,7 +63,8 @@ class AffineFit:
 def fit_affine(points: Integers, xy_um: Floats, grid_um: Floats) -> AffineFit:
     """Fit two scales, lack of orthogonality, rotation and translation; the grid is without error.
 
-    The form x + v = A X + T is linear; QR on centred coordinates takes the place of the listing's adjugate of the normal equations.
+    The form x + v = A X + T is linear; QR on centred coordinates takes the place of the listing's adjugate of
+    the normal equations.
 
     Parameters
     ----------

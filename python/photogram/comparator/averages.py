@@ -24,7 +24,8 @@ __all__ = ["PlateAverages", "average_residuals"]
 class PlateAverages:
     """Average residuals of the cases of one plate, in the axes of its first case.
 
-    X and Y are exchanged against the axes of the plate where that case is left-handed (`left_handed`), as the report prints them.
+    X and Y are exchanged against the axes of the plate where that case is left-handed (`left_handed`), as the
+    report prints them.
 
     Attributes
     ----------
@@ -43,10 +44,11 @@ class PlateAverages:
     squares_um2
         (2,) sums of squares of all grid residuals in X and in Y.
     locations, location_um
-        Numbers of the comparator locations, and averages of the comparator residuals there; None where the pattern of the plate
-        does not meet itself when the plate is turned.
+        Numbers of the comparator locations, and averages of the comparator residuals there; None where the
+        pattern of the plate does not meet itself when the plate is turned.
     xy_um
-        (l, 2) coordinates of the last case with corner 1 nearest the comparator's zero, else of the last case; NaN where missing.
+        (l, 2) coordinates of the last case with corner 1 nearest the comparator's zero, else of the last
+        case; NaN where missing.
     """
 
     plate: int
@@ -125,4 +127,7 @@ def _means(rows: Integers, values: Floats, count: int) -> Floats:
     """Average values by row; NaN where there are none."""
     counts = np.bincount(rows, minlength=count)
     sums = np.column_stack([np.bincount(rows, weights=values[:, axis], minlength=count) for axis in range(2)])
-    return np.divide(sums, counts[:, np.newaxis], out=np.full(sums.shape, np.nan), where=counts[:, None] > 0)
+    means: Floats = np.divide(
+        sums, counts[:, np.newaxis], out=np.full(sums.shape, np.nan), where=counts[:, None] > 0
+    )
+    return means

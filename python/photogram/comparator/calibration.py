@@ -27,7 +27,7 @@ from photogram.comparator.gridsigma import (
     text_grid_sigma,
     unbiased_grid_sigma,
 )
-from photogram.comparator.joint import JointFit, Weights, adjust_jointly
+from photogram.comparator.joint import LEAST_UM, JointFit, Weights, adjust_jointly
 from photogram.comparator.options import Options
 from photogram.comparator.placed import PlacedCase, place_case
 from photogram.comparator.pointing import Precision, pool_points
@@ -45,7 +45,7 @@ from photogram.messages import Message
 
 if TYPE_CHECKING:
     from photogram.adjusted import Floats
-    from photogram.comparator.readings import Session
+    from photogram.comparator.readings import Integers, Session
 
 __all__ = ["Calibration", "CaseResult", "PlateResult", "Pointing", "calibrate"]
 
@@ -131,13 +131,17 @@ class Calibration:
     linear, nonlinear
         Combined adjustments; `nonlinear` is None without polynomials.
     averages
-        For each stage (`case_linear`, `case_nonlinear`, `linear`, `nonlinear`) and each plate: average residuals and the grid.
+        For each stage (`case_linear`, `case_nonlinear`, `linear`, `nonlinear`) and each plate: average
+        residuals and the grid.
     variance
         Analysis of variance.
     polynomial_tests, case_test
         Significance of the polynomials; equality of the variances of the cases (None for one case).
     joint
         The rigorous adjustment; None where it was not asked for.
+    joint_check
+        Largest difference between the report's weighted mean and a joint adjustment under its assumptions (grid
+        without error, equal weights, no polynomials), in standard deviations.
     messages
         Remarks.
     """
@@ -153,6 +157,7 @@ class Calibration:
     polynomial_tests: PolynomialTest | None
     case_test: CaseVarianceTest | None
     joint: JointFit | None
+    joint_check: float | None
     messages: list[Message]
 
     @property
@@ -236,6 +241,7 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
         polynomial_tests=polynomial_tests(linear, nonlinear) if nonlinear else None,
         case_test=_case_test(cases),
         joint=_joint(session, placed, linear, pointing, nonlinear is not None, options, messages),
+        joint_check=_joint_check(session, placed, linear) if options.joint else None,
         messages=messages,
     )
 
@@ -265,7 +271,7 @@ def _case(session: Session, index: int, options: Options, messages: list[Message
 
 
 def _check_handedness(session: Session, cases: Sequence[CaseResult]) -> None:
-    """Refuse a handedness that no measurement shares; cases that differ were measured with the plate turned over."""
+    """Refuse a handedness that no case shares; where only some differ, the plate was turned over."""
     if session.left_handed is None:
         return
     if all(case.placed.orientation.left_handed != session.left_handed for case in cases):
@@ -346,7 +352,9 @@ def _variance(
     squares, points = 0.0, 0
     for plate, result in averages["nonlinear" if nonlinear else "linear"].items():
         known = session.grids[plate].sigma_um
-        sigma = _chosen_sigma(result, options) if options.variance_grid == "computed" or known is None else known
+        sigma = (
+            _chosen_sigma(result, options) if options.variance_grid == "computed" or known is None else known
+        )
         squares += len(result.averages.points) * (0.0 if math.isnan(sigma) else sigma) ** 2
         points += len(result.averages.points)
     analysis = analyse_variance(
@@ -402,6 +410,19 @@ def _joint(
         return None
 
 
+def _joint_check(session: Session, placed: Sequence[PlacedCase], linear: CombinedLinear) -> float:
+    """Compare the weighted mean with a joint adjustment under the same assumptions."""
+    fixed = Weights(dict.fromkeys(session.grids, 0.0), random_um=max(linear.sigma0_um, LEAST_UM))
+    joint = adjust_jointly(placed, session.grids, linear, fixed, polynomial=False).correction
+    mean = linear.correction
+    differences = [
+        mean.scale_x - joint.scale_x,
+        mean.scale_y - joint.scale_y,
+        mean.nonorthogonality_rad - joint.nonorthogonality_rad,
+    ]
+    return float((np.abs(differences) / np.sqrt(np.diag(joint.covariance)[:3])).max())
+
+
 def _remarks(
     session: Session,
     cases: Sequence[CaseResult],
@@ -418,8 +439,8 @@ def _remarks(
         if len({corners.count(corner) for corner in range(1, 5)}) > 1 or not complete:
             remarks.append(
                 Message(
-                    f"plate {plate}: GRID CALIBRATION CORRECTIONS ARE VALID ONLY IF ALL AVERAGE RESIDUALS ARE COMPUTED"
-                    " FROM A MULTIPLE OF FOUR EXACTLY 90 DEGREE ROTATION CASES"
+                    f"plate {plate}: GRID CALIBRATION CORRECTIONS ARE VALID ONLY IF ALL AVERAGE RESIDUALS"
+                    " ARE COMPUTED FROM A MULTIPLE OF FOUR EXACTLY 90 DEGREE ROTATION CASES"
                 )
             )
         missing = [len(grid.points) - len(case.placed.points) for case in own]
@@ -433,7 +454,7 @@ def _remarks(
     return remarks
 
 
-def _suspects(case: CaseResult, points: Floats, residuals: Floats) -> list[Message]:
+def _suspects(case: CaseResult, points: Integers, residuals: Floats) -> list[Message]:
     # The median is not moved by what it is to show; 0.6745 is that of |N(0, 1)|.
     sigma = float(np.median(np.abs(residuals))) / 0.6745
     large = np.abs(residuals).max(axis=1)

@@ -111,13 +111,20 @@ def _micrometres(record: Record, columns: tuple[int, int], decimals: int) -> flo
     if figures and not (figures.isascii() and figures.isdigit()):
         raise record.error(f"columns {first}-{last}: {record.columns(first, last)!r} is not a number")
     places = len(fraction) if point else decimals
-    return sign * int(figures or 0) * 1e6 / 10**places
+    return sign * int(figures or 0) * 1e6 / float(10**places)
 
 
 def _header(record: Record) -> Header:
-    flags = [_integer(record, column, column) != 0 for column in range(1, 6)]
+
+    def flag(column: int) -> bool:
+        return _integer(record, column, column) != 0
+
     header = Header(
-        *flags,
+        left_handed=flag(1),
+        sorted_input=flag(2),
+        other_least_count=flag(3),
+        skip_card=flag(4),
+        plot_each_case=flag(5),
         comparator=_integer(record, 6, 7),
         secondary=record.columns(8, 8) == "R",
         operators=tuple(_integer(record, 10 + 3 * case, 12 + 3 * case) for case in range(CASES)),
@@ -202,7 +209,9 @@ class _Deck:
                 break
             reading = self._reading(card, layout)
             if reading.xy_um == (0.0, 0.0):
-                self.messages.append(_message(card, f"point {reading.point} is missing: both readings are zero"))
+                self.messages.append(
+                    _message(card, f"point {reading.point} is missing: both readings are zero")
+                )
             else:
                 readings.append(reading)
         session = Session(
@@ -321,9 +330,7 @@ def to_cards(session: Session) -> bytes:
     )
     named = "".join(f"{operators.get(case, 0):3d}" for case in range(1, CASES + 1))
     stage = "R" if session.secondary else " "
-    lines = [
-        f"{flags}{session.comparator:2d}{stage} {named}  {session.date:8.8}{BUILT_IN.index(number)}"
-    ]
+    lines = [f"{flags}{session.comparator:2d}{stage} {named}  {session.date:8.8}{BUILT_IN.index(number)}"]
     for case in session.cases:
         kase = 100 * (number % 100) + case.number
         rows = zip(case.legs.tolist(), case.points.tolist(), case.xy_um.tolist(), strict=True)

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.errors import InputError
-
 if TYPE_CHECKING:
     from photogram.adjusted import Floats
     from photogram.comparator.readings import Case
@@ -107,7 +105,9 @@ def _remarks(case: Case, closeouts: list[Closeout]) -> list[Message]:
     if first.verdict == "none":
         texts.append(f"NO CLOSEOUT MEASUREMENTS ON INITIAL POINT {first.point} MADE")
     elif first.counts[-1] < ENOUGH:
-        texts.append(f"the close-out on point {first.point} has {first.counts[-1]} pointings; 3 are asked for")
+        texts.append(
+            f"the close-out on point {first.point} has {first.counts[-1]} pointings; 3 are asked for"
+        )
     for closeout in closeouts:
         size = np.abs(closeout.means_um - closeout.means_um[0]).max()
         if closeout.verdict == "remeasure":

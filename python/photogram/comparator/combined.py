@@ -1,4 +1,4 @@
-"""All cases together: one set of comparator parameters, one pair of polynomials (NOAA TR NOS 57, equations 56 to 63)."""
+"""All cases together: one set of comparator parameters (NOAA TR NOS 57, equations 56 to 63)."""
 
 from __future__ import annotations
 
@@ -110,7 +110,8 @@ def combine_linear(
 ) -> CombinedLinear:
     """Form the generalised weighted mean of the linear parameters of the cases.
 
-    With P_j the inverse cofactors of case j: mean = (sum P)^-1 sum P x, and its sum of squares adds to those of the cases.
+    With P_j the inverse cofactors of case j: mean = (sum P)^-1 sum P x, and its sum of squares adds to those
+    of the cases.
     """
     values = np.array(
         [

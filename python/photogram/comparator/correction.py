@@ -1,4 +1,4 @@
-"""The correction that a calibration yields, for any measurements on the comparator (NOAA TR NOS 57, equations 34 and 63)."""
+"""The correction of any measurements on a calibrated comparator (NOAA TR NOS 57, equations 34 and 63)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def _no_covariance() -> Floats:
 class Correction:
     """Corrects readings of a comparator: first linearly, then by the polynomials.
 
-    x' = Sx x + Sy sin(alpha) y, y' = Sy cos(alpha) y (equation 34); corrected = x' + P_x(x', y'), y' + P_y(x', y') (equation 63).
+    x' = Sx x + Sy sin(alpha) y, y' = Sy cos(alpha) y (equation 34); corrected = x' + P_x(x', y'), y' +
+    P_y(x', y') (equation 63).
 
     Attributes
     ----------
@@ -41,7 +42,8 @@ class Correction:
     polynomial
         P_x and P_y; None without.
     covariance
-        (21, 21) of Sx, Sy, alpha (rad) and the coefficients (micrometres, in the frame of the polynomial), x then y.
+        (21, 21) of Sx, Sy, alpha (rad) and the coefficients (micrometres, in the frame of the polynomial), x
+        then y.
     """
 
     scale_x: float
@@ -72,7 +74,7 @@ class Correction:
         return corrected if self.polynomial is None else corrected + self.polynomial.evaluate(corrected)
 
     def invert(self, corrected_um: Floats) -> Floats:
-        """Return the readings (n, 2) that `apply` corrects to the given coordinates (n, 2), to the last digits.
+        """Return the readings (n, 2) that `apply` corrects to the given coordinates (n, 2).
 
         Raises
         ------
@@ -100,8 +102,8 @@ class Correction:
     def covariance_of(self, xy_um: Floats, measured_um2: Floats | None = None) -> Floats:
         """Return the covariance of corrected readings (n, 2, 2) in um^2.
 
-        It holds for the position relative to the centre of the frame of the polynomials: rotation and shift of corrected coordinates
-        are free.
+        It holds for the position relative to the centre of the frame of the polynomials: rotation and shift
+        of corrected coordinates are free.
 
         Parameters
         ----------
@@ -117,10 +119,12 @@ class Correction:
         return np.asarray(covariance)
 
     def _partials(self, xy_um: Floats) -> tuple[Floats, Floats]:
-        """Partials of corrected readings by the parameters (n, 2, 21) and by the readings (n, 2, 2)."""
+        """Return partials of corrected readings by parameters (n, 2, 21) and by readings (n, 2, 2)."""
         linear = self.linear(xy_um)
         frame = self.polynomial.frame if self.polynomial else Frame.metres()
-        inner = np.eye(2) + (self.polynomial.jacobian(linear) if self.polynomial else np.zeros((len(linear), 2, 2)))
+        inner = np.eye(2) + (
+            self.polynomial.jacobian(linear) if self.polynomial else np.zeros((len(linear), 2, 2))
+        )
         # Counted from the reading at the centre of the frame: a shift is not part of the correction.
         x, y = (xy_um - np.linalg.solve(self.matrix, frame.centre_um)).T
         s, c = math.sin(self.nonorthogonality_rad), math.cos(self.nonorthogonality_rad)
@@ -163,7 +167,8 @@ class Correction:
         """
         polynomial = None
         if (members := document["polynomial"]) is not None:
-            frame = Frame(tuple(map(float, members["centre_um"])), tuple(map(float, members["half_range_um"])))
+            (x, y), (half_x, half_y) = members["centre_um"], members["half_range_um"]
+            frame = Frame((float(x), float(y)), (float(half_x), float(half_y)))
             scaled = np.array([members["coefficients_x_um"], members["coefficients_y_um"]], dtype=float)
             polynomial = Polynomial(frame, scaled.reshape(2, 9), np.zeros((18, 18)))
         return cls(

@@ -1,5 +1,7 @@
-"""The general linear transformation taken apart into two scales, lack of orthogonality and rotation, exactly
-(NOAA TR NOS 57, equations 33 to 38, 46, 47 and 54)."""
+"""The general linear transformation taken apart into two scales, lack of orthogonality and rotation.
+
+Exactly, not to first order (NOAA TR NOS 57, equations 33 to 38, 46, 47 and 54).
+"""
 
 from __future__ import annotations
 
@@ -66,7 +68,7 @@ class Decomposition:
 
 
 def decomposition_jacobian(matrix: Floats) -> Floats:
-    """Return the partials of (scale x, scale y, lack of orthogonality, rotation) by (a, b, c, d) (equation 54), 4 x 4.
+    """Return the partials of scales, lack of orthogonality and rotation by a, b, c, d (equation 54), 4 x 4.
 
     In closed form: the listing divides by b and d, which vanish when the plate lies exactly along the axes.
     """

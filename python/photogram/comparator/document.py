@@ -6,7 +6,6 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import orjson
 
 from photogram import _photocore
@@ -22,19 +21,21 @@ if TYPE_CHECKING:
 __all__ = ["to_document", "to_json"]
 
 CONVENTIONS = {
-    "residuals_comparator_um": "grid transformed into the comparator system less measured: to be added to the measurement",
-    "residuals_grid_um": "measured transformed into the grid system less given: to be added to the grid; X and Y of the plate are"
-    " exchanged where left_handed is true",
-    "grid_corrections_um": "averages of residuals_grid_um after all corrections, X and Y exchanged where left_handed is true;"
-    " corrections_plate_um are the same in the axes of the plate",
+    "residuals_comparator_um": "grid transformed into the comparator system less measured: to be added to"
+    " the measurement",
+    "residuals_grid_um": "measured transformed into the grid system less given: to be added to the grid;"
+    " X and Y of the plate are exchanged where left_handed is true",
+    "grid_corrections_um": "averages of residuals_grid_um after all corrections, X and Y exchanged where"
+    " left_handed is true; corrections_plate_um are the same in the axes of the plate",
     "rotation_rad": "grid = [[cos, sin], [-sin, cos]] corrected + translation_um",
     "linear": "x' = scale_x x + scale_y sin(nonorthogonality) y, y' = scale_y cos(nonorthogonality) y",
-    "polynomial": "coefficients of x^4, y^4, x^3, y^3, x^2, y^2, x, y, 1; linearly corrected arguments and correction in metres",
+    "polynomial": "coefficients of x^4, y^4, x^3, y^3, x^2, y^2, x, y, 1; linearly corrected arguments and"
+    " correction in metres",
     "sigma0_um": "of each case alone; sigma0_combined_um: after the combined adjustments",
     "variance_components_um": "standard deviations",
-    "correlation_percent": "as the listing: 100 where one coordinate does not vary; correlation is null there",
-    "correction": "linear parameters and polynomials; covariance of scale_x, scale_y, nonorthogonality_rad, nine coefficients of x,"
-    " nine of y (micrometres, arguments (x - centre) / half range)",
+    "correlation_percent": "as the listing: 100 where one coordinate does not vary (correlation: null)",
+    "correction": "linear parameters and polynomials; covariance of scale_x, scale_y, nonorthogonality_rad,"
+    " nine coefficients of x, nine of y (micrometres, arguments (x - centre) / half range)",
 }
 
 
@@ -79,6 +80,7 @@ def to_document(calibration: Calibration) -> dict[str, Any]:
         "variance_analysis_um": _variance(calibration),
         "case_variances": asdict(calibration.case_test) if calibration.case_test else None,
         "joint": _joint(calibration.joint) if calibration.joint else None,
+        "joint_check_sd": calibration.joint_check,
         "correction": calibration.correction.document(),
     }
 
@@ -252,7 +254,7 @@ def _plate(calibration: Calibration, result: PlateResult) -> dict[str, Any]:
 
 
 def _variance(calibration: Calibration) -> dict[str, Any]:
-    """The lines of figure 30."""
+    """Return the lines of figure 30."""
     variance = calibration.variance
     lines = {
         "before": variance.before,
@@ -283,7 +285,7 @@ def _joint(joint: JointFit) -> dict[str, Any]:
                 "rotation_rad": case.rotation_rad,
                 "translation_um": case.translation_um.tolist(),
                 "residuals_comparator_um": case.residuals.comparator_um.tolist(),
-                "standardized": np.where(np.isfinite(case.standardized), case.standardized, None).tolist(),
+                "standardized": case.standardized.tolist(),
             }
             for case in joint.cases
         ],

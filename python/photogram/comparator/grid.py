@@ -61,7 +61,7 @@ class Grid:
     def square(
         cls, columns: int = 5, spacing_um: float = 50_000.0, number: int = 1, sigma_um: float | None = None
     ) -> Grid:
-        """Return a plate without errors: `columns` x `columns` points, numbered along +X, then +Y, centred."""
+        """Return a plate of `columns` x `columns` points, centred, numbered along +X, then +Y."""
         steps = (np.arange(columns) - (columns - 1) / 2) * spacing_um
         y, x = np.meshgrid(steps, steps, indexing="ij")
         return cls(

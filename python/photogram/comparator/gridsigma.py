@@ -1,4 +1,4 @@
-"""How accurate the grid is: its standard deviation from average residuals (NOAA TR NOS 57, equations 64 and 65)."""
+"""Standard deviation of the grid from average residuals (NOAA TR NOS 57, equations 64 and 65)."""
 
 from __future__ import annotations
 
@@ -44,13 +44,16 @@ class ListedGridSigma:
 def listed_grid_sigma(averages: PlateAverages) -> ListedGridSigma:
     """Compute the figures of the listing.
 
-    They divide by 2 N - 1, and pass over what the fitted parameters take: the grid sigma of 25 points comes out 5 percent small.
+    They divide by 2 N - 1, and pass over what the fitted parameters take: the grid sigma of 25 points comes
+    out 5 percent small.
     """
     points, cases = len(averages.points), len(averages.cases)
     squares = (averages.grid_um**2).sum(axis=0)
     mean = math.sqrt(float(squares.sum()) / (2 * points - 1))
     location = averages.location_um
-    of_locations = math.nan if location is None else math.sqrt(float((location**2).sum()) / (2 * len(location) - 1))
+    of_locations = (
+        math.nan if location is None else math.sqrt(float((location**2).sum()) / (2 * len(location) - 1))
+    )
     if cases < 2:
         return ListedGridSigma(of_locations, mean, (math.nan, math.nan), 0.0)
     within = np.maximum(0.0, averages.squares_um2 - cases * squares) / (points * cases * (cases - 1))
@@ -87,10 +90,10 @@ def unbiased_grid_sigma(
 ) -> tuple[dict[int, float], float]:
     """Compute grid and random standard deviations whose squares are unbiased.
 
-    The adjustment is linear in the errors to first order: residuals are W times (grid errors turned into the comparator + random errors).
-    The expectations of two sums of squares, of the average residuals and of all residuals, follow from W and are linear in the
-    variances; they are equated with what was found. Rigid, linear and polynomial parameters are thus accounted for, whatever
-    placements and points there are.
+    The adjustment is linear in the errors to first order: residuals are W times (grid errors turned into the
+    comparator + random errors). The expectations of two sums of squares, of the average residuals and of all
+    residuals, follow from W and are linear in the variances; they are equated with what was found. Rigid,
+    linear and polynomial parameters are thus accounted for, whatever placements and points there are.
 
     Parameters
     ----------
@@ -102,8 +105,8 @@ def unbiased_grid_sigma(
     Returns
     -------
     grid_um, random_um
-        Standard deviation of a grid coordinate of each plate, and of a measured coordinate; NaN where the cases do not separate
-        them, 0 where the estimate of a variance is negative.
+        Standard deviation of a grid coordinate of each plate, and of a measured coordinate; NaN where the
+        cases do not separate them, 0 where the estimate of a variance is negative.
     """
     plates = list(dict.fromkeys(case.case.plate for case in cases))
     reduce = _reduction(stage, with_polynomial=isinstance(stage, CombinedPolynomial))
@@ -138,7 +141,7 @@ def _grid_errors(
     cases: Sequence[PlacedCase],
     stage: CombinedLinear | CombinedPolynomial,
 ) -> Floats:
-    """Effect of errors of the grid coordinates of a plate on the comparator residuals: v = M^T e, one row a coordinate."""
+    """Return the effect of errors of the grid on the comparator residuals: v = M^T e, a row a coordinate."""
     own = [k for k, case in enumerate(cases) if case.case.plate == plate]
     points = np.unique(np.concatenate([grid_rows[k] for k in own]))
     blocks = []
@@ -157,18 +160,20 @@ def _grid_errors(
 
 
 def _averaging(spread: Floats) -> Floats:
-    """Average residuals of each point in the grid system from residuals in the comparator system, but for the sign."""
+    """Return what averages comparator residuals, turned into the grid system, by point (sign apart)."""
     return np.asarray(spread.T / (spread**2).sum(axis=0)[:, np.newaxis])
 
 
 def _reduction(stage: CombinedLinear | CombinedPolynomial, *, with_polynomial: bool) -> _Reduction:
-    """Return the function that takes errors of the readings to residuals, as the stages of the adjustment do."""
+    """Return what takes errors of readings to residuals, as the stages of the adjustment do."""
     places = [fit.residuals.xy_um for fit in stage.cases]
     everywhere = np.vstack(places)
     functions = design(Frame.of(everywhere), everywhere)
     zero = np.zeros_like(functions)
     # Rows alternate between x and y.
-    both = np.stack([np.hstack([functions, zero]), np.hstack([zero, functions])], axis=1).reshape(-1, 2 * COUNT)
+    both = np.stack([np.hstack([functions, zero]), np.hstack([zero, functions])], axis=1).reshape(
+        -1, 2 * COUNT
+    )
     rigid = np.zeros((len(both), 3 * len(places)))
     start = 0
     for k, own in enumerate(places):

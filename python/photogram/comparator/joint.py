@@ -1,8 +1,9 @@
-"""The rigorous adjustment: all cases, the comparator, its polynomials and the grid at once, with their covariances.
+"""The rigorous adjustment: cases, comparator, polynomials and grid at once, with their covariances.
 
-The engine underneath (`photocore::programs::comparator`) takes grid points as local unknowns, each weighted by the standard deviation of
-the grid, cases as kept ones, and the comparator as the border. Weights: the variance of a mean is that of the comparator, random, plus
-that of a pointing over their number; the random part, and the grid's where it is not known, are estimated from the residuals.
+The engine underneath (`photocore::programs::comparator`) takes grid points as local unknowns, each weighted
+by the standard deviation of the grid, cases as kept ones, and the comparator as the border. Weights: the
+variance of a mean is that of the comparator, random, plus that of a pointing over their number; the random
+part, and the grid's where it is not known, are estimated from the residuals.
 """
 
 from __future__ import annotations
@@ -73,7 +74,8 @@ class JointCase:
     residuals
         In both systems.
     standardized
-        (n, 2) residuals of measured coordinates over their standard deviations; NaN where nothing checks them.
+        (n, 2) residuals of measured coordinates over their standard deviations; NaN where nothing checks
+        them.
     """
 
     number: int
@@ -99,7 +101,8 @@ class JointPlate:
     sigma_um, estimated
         Standard deviation of a given coordinate, and whether it was estimated.
     variance_ratio
-        Variance of the corrections over the one assumed; near 1 when the latter is right. None for a fixed grid.
+        Variance of the corrections over the one assumed; near 1 when the latter is right. None for a fixed
+        grid.
     """
 
     points: Integers
@@ -119,7 +122,8 @@ class JointFit:
     correction
         Comparator and polynomials with the covariance of all of them.
     sigma0
-        Standard deviation of unit weight; dimensionless, 1 where weights are right. Covariances are scaled by its square.
+        Standard deviation of unit weight; dimensionless, 1 where weights are right. Covariances are scaled by
+        its square.
     degrees_of_freedom, iterations
         Of the last adjustment.
     random_um
@@ -209,7 +213,7 @@ def _initial_grid(sigma_um: float | None, random_um: float) -> float:
 def _arrays(
     cases: Sequence[PlacedCase], grids: Mapping[int, Grid], linear: CombinedLinear, polynomial: bool
 ) -> tuple[_Arrays, dict[int, Integers]]:
-    """Number the points of all plates through, and count placements from the middle of the measured range."""
+    """Return the problem: points numbered through, placements counted from the middle of the range."""
     plates = list(dict.fromkeys(case.case.plate for case in cases))
     points_of = {
         plate: np.unique(np.concatenate([case.points for case in cases if case.case.plate == plate]))
@@ -278,7 +282,7 @@ def _random(
     variance: Floats,
     pointing: tuple[float, float],
 ) -> float:
-    """Estimate the standard deviation of the comparator: weighted squares of residuals must equal their redundancy."""
+    """Estimate the comparator: weighted squares of residuals must equal their redundancy."""
     ratio = float((solution.residuals**2 / variance).sum() / solution.redundancy.sum())
     known = np.array(pointing) ** 2 / arrays.counts[:, np.newaxis]
     return math.sqrt(max(ratio * float(variance.mean()) - float(known.mean()), LEAST_UM**2))
@@ -324,7 +328,7 @@ def _result(
 
 
 def _correction(frame: Frame, solution: _photocore.ComparatorSolution, scale: float) -> Correction:
-    """Put the parameters of the engine among the 21 of a correction: terms of degree 1 and 0 are zero in this frame."""
+    """Put the parameters among the 21 of a correction: terms of degree 1 and 0 are zero in this frame."""
     place = np.concatenate([np.arange(3 + OWN_TERMS), 3 + COUNT + np.arange(OWN_TERMS)])
     values, covariance = np.zeros(PARAMETERS), np.zeros((PARAMETERS, PARAMETERS))
     values[place] = solution.comparator

@@ -18,7 +18,7 @@ __all__ = ["LegPoint", "intersect_legs", "reduce_legs"]
 
 LEGS = (1, 2, 3, 4)
 PARALLEL = 1e-3
-"""Sine of the angle under which lines no longer intersect usefully; those of a plate cross at right angles."""
+"""Sine of the angle below which lines do not intersect usefully; those of a plate cross at right angles."""
 
 
 @dataclass(frozen=True)

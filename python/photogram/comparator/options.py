@@ -10,24 +10,28 @@ __all__ = ["Options"]
 
 @dataclass(frozen=True)
 class Options:
-    """Choices; the defaults follow the text of the report where its listing departs from it, and mend what neither has right.
+    """Choices; the defaults follow the text of the report where its listing departs from it.
 
     Attributes
     ----------
     pointing_dof
-        Degrees of freedom of pointings pooled over cases: `text` (readings less means, unbiased) or `listing` (readings less points).
+        Degrees of freedom of pointings pooled over cases: `text` (readings less means, unbiased) or `listing`
+        (readings less points).
     grid_sigma
-        Standard deviation of the grid from average residuals: `unbiased` (expectations of the sums of squares with all fitted
-        parameters accounted for), `text` (equation 64) or `listing` (2 N - 1).
+        Standard deviation of the grid from average residuals: `unbiased` (expectations of the sums of squares
+        with all fitted parameters accounted for), `text` (equation 64) or `listing` (2 N - 1).
     variance_grid
-        Grid in the analysis of variance: `a priori` (as both text and listing; `computed` where a plate has none), or `computed`.
+        Grid in the analysis of variance: `a priori` (as both text and listing; `computed` where a plate has
+        none), or `computed`.
     case_polynomial_residuals
-        Grid residuals of the polynomials of one case: `consistent` (measured less given, as everywhere) or `listing` (the reverse).
+        Grid residuals of the polynomials of one case: `consistent` (measured less given, as everywhere) or
+        `listing` (the reverse).
     nanometres
-        Sigmas of the analysis of variance: `exact`, or `truncated` to whole nanometres as the listing stores them.
+        Sigmas of the analysis of variance: `exact`, or `truncated` to whole nanometres as the listing stores
+        them.
     free_residuals
-        Comparator residuals of rigid fits: `report` (turned with the scale of the similarity transformation, which changes them by 1e-5
-        of themselves) or `exact`.
+        Comparator residuals of rigid fits: `report` (turned with the scale of the similarity transformation,
+        which changes them by 1e-5 of themselves) or `exact`.
     order
         Points in the order `measured`, or in that of the listing's subroutine GROUP (`listing`).
     polynomial

@@ -1,4 +1,4 @@
-"""How the plate lies: which corner is nearest the comparator's zero, and on which side it is up (main program, COMPVS)."""
+"""How the plate lies: its corner nearest the comparator's zero, its upper side (main program, COMPVS)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Orientation", "detect_orientation", "exchanged", "locations"]
 
-# Quarter turns that bring a corner of the plate to the place of its first corner (least X and Y), with the listing's KROTC.
+# Quarter turns that bring a corner of the plate to the place of its first corner (least X and Y), with the
+# listing's KROTC.
 CORNERS = {1: (-1, -1), 4: (1, -1), 3: (1, 1), 2: (-1, 1)}
 TURNS = {1: 0, 4: -1, 3: 2, 2: 1}
 MATCH = 0.05
@@ -30,8 +31,8 @@ class Orientation:
     Attributes
     ----------
     corner
-        1 to 4, the listing's KROTC: the corner nearest the comparator's zero is that with least X and Y (1), least X
-        and greatest Y (2), greatest X and Y (3), greatest X and least Y (4).
+        1 to 4, the listing's KROTC: the corner nearest the comparator's zero is that with least X and Y (1),
+        least X and greatest Y (2), greatest X and Y (3), greatest X and least Y (4).
     nearest_point
         The point of the plate in that corner.
     left_handed
@@ -44,16 +45,17 @@ class Orientation:
 
 
 def exchanged(xy: Floats, left_handed: bool) -> Floats:
-    """Exchange X and Y where the comparator is left-handed (subroutine FLIPM): for the axes of plate and comparator alike."""
+    """Exchange X and Y where the comparator is left-handed (subroutine FLIPM)."""
     return xy[..., ::-1] if left_handed else xy
 
 
 def detect_orientation(grid: Grid, points: Integers, xy_um: Floats) -> Orientation:
     """Detect from the measurements how a plate lies.
 
-    The sign of the determinant of the affine transformation grid -> comparator is the handedness. The program compares sums of
-    distances of two points each from the comparator's zero (8 and 12 for point 1, and so on); here the places of these points follow
-    from the transformation, so that they need not be measured, nor be on the plate.
+    The sign of the determinant of the affine transformation grid -> comparator is the handedness. The program
+    compares sums of distances of two points each from the comparator's zero (8 and 12 for point 1, and so
+    on); here the places of these points follow from the transformation, so that they need not be measured,
+    nor be on the plate.
 
     Raises
     ------
@@ -73,7 +75,8 @@ def detect_orientation(grid: Grid, points: Integers, xy_um: Floats) -> Orientati
         return float(np.hypot(*place))
 
     sums = {
-        corner: distance((sign_x, 0.0)) + distance((0.0, sign_y)) for corner, (sign_x, sign_y) in CORNERS.items()
+        corner: distance((sign_x, 0.0)) + distance((0.0, sign_y))
+        for corner, (sign_x, sign_y) in CORNERS.items()
     }
     corner = min(sums, key=lambda key: sums[key])
     away = grid.xy_um - (middle + 2 * quarter * CORNERS[corner])

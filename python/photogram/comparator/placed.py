@@ -114,7 +114,7 @@ def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[Plac
 
 
 def _identical(case: Case, readings: list[PointReadings]) -> list[Message]:
-    """Remark on points whose readings do not vary at all: were they read, or copied?"""
+    """Remark on points whose readings do not vary at all, as if they had been copied."""
     points = [reading.point for reading in readings if reading.identical]
     if not points:
         return []

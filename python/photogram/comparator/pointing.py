@@ -1,4 +1,4 @@
-"""How well an operator points: statistics of repeated readings (NOAA TR NOS 57, equations 1 to 32, subroutine STAT)."""
+"""Pointing precision: statistics of repeated readings (NOAA TR NOS 57, equations 1 to 32; STAT)."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Precision:
 
     @property
     def listed_correlation_percent(self) -> float:
-        """Correlation as the listing has it: 100 where exactly one coordinate does not vary, 0 where neither does."""
+        """As the listing has it: 100 where exactly one coordinate does not vary, 0 where neither does."""
         x, y = self.variance_um2
         if x > 0 and y > 0:
             return 100 * self.correlation
@@ -218,8 +218,9 @@ def pool_points(
     cases
         The points of each case.
     as_listed
-        Divide as the listing does, where that departs from the text: the sums of a point by all its readings less
-        one (not less the number of its cases), those of all points by all readings less the number of points.
+        Divide as the listing does, where that departs from the text: the sums of a point by all its readings
+        less one (not less the number of its cases), those of all points by all readings less the number of
+        points.
 
     Returns
     -------

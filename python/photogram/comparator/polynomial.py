@@ -1,7 +1,8 @@
 """The correction polynomials of fourth degree without cross terms (NOAA TR NOS 57, equations 59 to 62).
 
-P = A x^4 + B y^4 + C x^3 + D y^3 + E x^2 + F y^2 + G x + H y + J, one for x and one for y. Inside, the arguments are shifted and
-scaled to -1 ... 1: the normal equations in metres have a condition of 8e9, QR on the scaled columns one of a few tens.
+P = A x^4 + B y^4 + C x^3 + D y^3 + E x^2 + F y^2 + G x + H y + J, one for x and one for y. Inside, the
+arguments are shifted and scaled to -1 ... 1: the normal equations in metres have a condition of 8e9, QR on
+the scaled columns one of a few tens.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class Frame:
 
     def arguments(self, xy_um: Floats) -> Floats:
         """Return scaled arguments (n, 2) of places (n, 2)."""
-        return (xy_um - np.array(self.centre_um)) / np.array(self.half_range_um)
+        return np.asarray((xy_um - np.array(self.centre_um)) / np.array(self.half_range_um))
 
     def to_metres(self) -> Floats:
         """Return the matrix (9, 9) from coefficients in this frame to those in metres (binomial theorem)."""
@@ -142,7 +143,9 @@ def fit_polynomial(xy_um: Floats, residuals_um: Floats) -> Polynomial:
     frame = Frame.of(xy_um)
     q, r = np.linalg.qr(design(frame, xy_um))
     if np.abs(np.diag(r)).min() < 1e-9 * np.abs(r).max():
-        raise AdjustmentError("the points have too few different coordinates for polynomials of fourth degree")
+        raise AdjustmentError(
+            "the points have too few different coordinates for polynomials of fourth degree"
+        )
     inverse = np.linalg.inv(r)
     cofactors = np.kron(np.eye(2), inverse @ inverse.T)
     return Polynomial(frame, np.asarray((inverse @ (q.T @ residuals_um)).T), cofactors)

@@ -52,7 +52,8 @@ class Reading:
     plate, case, operator
         Numbers; plate 0 stands for the only plate of the session.
     leg
-        0: on the intersection of the lines; 1 to 4: on a leg, numbered round the cross, so that 1 is opposite 3.
+        0: on the intersection of the lines; 1 to 4: on a leg, numbered round the cross, so that 1 is opposite
+        3.
     point
         Number of the grid point.
     xy_um
@@ -100,7 +101,7 @@ class Case:
         return self.places[0]
 
     def check(self, grid: Grid) -> None:
-        """Refuse points that the plate has not, and readings that are not where the others on their point are.
+        """Refuse points that the plate has not, and readings far from the others on their point.
 
         Raises
         ------
@@ -180,7 +181,8 @@ class Session:
         Raises
         ------
         InputError
-            No case, a case measured twice, an unknown plate or point, readings far from others on their point.
+            No case, a case measured twice, an unknown plate or point, readings far from others on their
+            point.
         """
         if not self.cases:
             raise InputError("there are no measurements", file=self.source)

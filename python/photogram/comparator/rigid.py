@@ -45,7 +45,8 @@ def fit_rigid(
 ) -> RigidFit:
     """Fit measured coordinates onto grid coordinates of the same handedness by rotation and translation.
 
-    The rotation is that of the least-squares similarity transformation, which is that of the rigid one as well.
+    The rotation is that of the least-squares similarity transformation, which is that of the rigid one as
+    well.
 
     Parameters
     ----------
@@ -56,8 +57,8 @@ def fit_rigid(
     lost
         Unknowns for each axis, for the standard errors.
     as_listed
-        Turn residuals back with the cosine and sine of the similarity transformation, without taking its scale out
-        (a relative difference of 1e-5 or so).
+        Turn residuals back with the cosine and sine of the similarity transformation, without taking its
+        scale out (a relative difference of 1e-5 or so).
     """
     middle, grid_middle = xy_um.mean(axis=0), grid_um.mean(axis=0)
     d, g = xy_um - middle, grid_um - grid_middle

@@ -1,6 +1,7 @@
-"""Tests: is a term of the polynomials significant, are the variances of the cases equal?
+"""Tests of significance: of the terms of the polynomials, of differences between the variances of the cases.
 
-Statistics are computed here; their probabilities need scipy (`pip install 'photogram[statistics]'`) and are None without it.
+Statistics are computed here; their probabilities need scipy (`pip install 'photogram[statistics]'`) and are
+None without it.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -73,7 +75,7 @@ class PolynomialTest:
 
 @dataclass(frozen=True)
 class CaseVarianceTest:
-    """Are the cases of one population? Hartley's F-max, as the report says, and two more tests where scipy is there.
+    """Tests of equal variances of the cases: Hartley's F-max, as the report says, and two more.
 
     Attributes
     ----------
@@ -169,7 +171,7 @@ def _fisher(ratio: float, first: int, second: int) -> float | None:
 
 
 def _bartlett(variances: Sequence[float], dof: Sequence[int]) -> float:
-    """Return the probability of Bartlett's statistic; here because scipy's takes samples, and residuals have lost unknowns."""
+    """Return the probability of Bartlett's statistic, from variances and degrees of freedom."""
     from scipy.stats import chi2
 
     own = np.array(dof, dtype=float)
@@ -183,16 +185,22 @@ def _bartlett(variances: Sequence[float], dof: Sequence[int]) -> float:
 def _f_max_tail(ratio: float, groups: int, dof: int) -> float:
     """Probability that the largest of `groups` variances is `ratio` times the smallest, or more.
 
-    1 - k times the integral over u = G(x) from 0 to 1 of [G(ratio x) - u]^(k-1), with G the distribution of chi squared: x is the
-    smallest. Gauss-Legendre nodes.
+    1 - k times the integral over u = G(x) from 0 to 1 of [G(ratio x) - u]^(k-1), with G the distribution of
+    chi squared: x is the smallest. Gauss-Legendre nodes.
     """
     from scipy.stats import chi2
 
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    u = (nodes + 1) / 2
+    u, weights = _unit_nodes()
     inside = chi2.cdf(ratio * chi2.ppf(u, dof), dof) - u
-    within = groups * float(weights / 2 @ inside ** (groups - 1))
+    within = groups * float(weights @ inside ** (groups - 1))
     return min(1.0, max(0.0, 1 - within))
+
+
+@cache
+def _unit_nodes() -> tuple[Floats, Floats]:
+    """Gauss-Legendre nodes and weights of the interval from 0 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return (nodes + 1) / 2, weights / 2
 
 
 def _f_max_limit(groups: int, dof: int) -> float:

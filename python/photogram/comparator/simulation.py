@@ -71,13 +71,15 @@ def simulate_calibration(
     correction
         What the readings would have to be corrected by.
     cases, rotation_rad, centre_um
-        Number of placements, rotation of the first, and corrected comparator coordinates of the middle of the plate.
+        Number of placements, rotation of the first, and corrected comparator coordinates of the middle of the
+        plate.
     left_handed
         Whether the comparator is left-handed against the plate.
     pointings, closing_pointings
         On each point, and on the first one again at the end.
     pointing_um, random_um, grid_um
-        Standard deviations of a single pointing, of the comparator (once for each point and case), and of the given grid coordinates.
+        Standard deviations of a single pointing, of the comparator (once for each point and case), and of the
+        given grid coordinates.
     grid_errors_um
         (l, 2) true less given grid coordinates, instead of random ones.
     least_count_um

@@ -50,7 +50,9 @@ def read_csv(
         grids=plates,
         comparator=max(table.integer_setting("comparator", 0) for table in tables),
         date=next((table.settings["date"] for table in tables if "date" in table.settings), ""),
-        left_handed=left_handed if left_handed is not None else next((s for s in said if s is not None), None),
+        left_handed=left_handed
+        if left_handed is not None
+        else next((s for s in said if s is not None), None),
         source=paths[0],
     )
     session.check()

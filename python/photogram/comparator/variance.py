@@ -68,7 +68,7 @@ class VarianceAnalysis:
 
     @property
     def components_um(self) -> dict[str, float]:
-        """Standard deviations by component: linear, nonlinear, grid, pointing, random, total (equation 66)."""
+        """Standard deviations by component (equation 66)."""
         return {
             "linear": self.linear,
             "nonlinear": self.nonlinear,
@@ -80,7 +80,7 @@ class VarianceAnalysis:
 
 
 def difference(total: float, *parts: float) -> tuple[float, bool]:
-    """Return the root of total^2 less the squares of the parts, and whether that was negative (the root is then 0)."""
+    """Return the root of total^2 less squares of the parts (0 if negative), and whether it was."""
     variance = total**2 - sum(part**2 for part in parts)
     return math.sqrt(max(0.0, variance)), variance < 0
 
