@@ -140,8 +140,8 @@ class Calibration:
     joint
         The rigorous adjustment; None where it was not asked for.
     joint_check
-        Largest difference between the report's weighted mean and a joint adjustment under its assumptions (grid
-        without error, equal weights, no polynomials), in standard deviations.
+        Largest difference between the report's weighted mean and a joint adjustment under its assumptions
+        (grid without error, equal weights, no polynomials), in standard deviations.
     messages
         Remarks.
     """

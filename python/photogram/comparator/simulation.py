@@ -17,6 +17,7 @@ from photogram.comparator.readings import Case, Place, Session
 if TYPE_CHECKING:
     from photogram.adjusted import Floats
     from photogram.comparator.grid import Grid
+    from photogram.comparator.readings import Integers
 
 __all__ = ["Simulation", "simulate_calibration"]
 
@@ -50,8 +51,7 @@ def simulate_calibration(
     rotation_rad: float = math.atan(0.2),
     centre_um: tuple[float, float] = (125_000.0, 130_000.0),
     left_handed: bool = False,
-    pointings: int = 5,
-    closing_pointings: int = 3,
+    sequence: Sequence[int] | None = None,
     pointing_um: float = 0.0,
     random_um: float = 0.0,
     grid_um: float = 0.0,
@@ -75,8 +75,9 @@ def simulate_calibration(
         plate.
     left_handed
         Whether the comparator is left-handed against the plate.
-    pointings, closing_pointings
-        On each point, and on the first one again at the end.
+    sequence
+        Points in the order of the pointings of a case; None for five on each, row by row, and three on the
+        first again.
     pointing_um, random_um, grid_um
         Standard deviations of a single pointing, of the comparator (once for each point and case), and of the
         given grid coordinates.
@@ -93,27 +94,28 @@ def simulate_calibration(
     drawn = grid_um * random.standard_normal((len(grid.points), 2))
     errors = drawn if grid_errors_um is None else np.asarray(grid_errors_um, dtype=float)
     plate = replace(grid, xy_um=grid.xy_um + errors)
+    points = _default_sequence(grid.points) if sequence is None else np.array(sequence, dtype=np.int64)
+    rows = grid.rows_of(points)
     measured = []
     for k in range(cases):
         exact = _readings(plate, correction, rotation_rad + k * math.pi / 2, centre_um, left_handed)
         exact = exact + random_um * random.standard_normal(exact.shape)
-        sequence = _sequence(len(grid.points), pointings, closing_pointings)
-        xy = exact[sequence] + pointing_um * random.standard_normal((len(sequence), 2))
+        xy = exact[rows] + pointing_um * random.standard_normal((len(rows), 2))
         if least_count_um > 0:
             xy = np.round(xy / least_count_um) * least_count_um
         operator = operators[min(k // 4, len(operators) - 1)]
-        legs = np.zeros(len(sequence), dtype=np.int64)
-        places = (Place(),) * len(sequence)
-        measured.append(Case(k + 1, operator, grid.number, grid.points[sequence], legs, xy, places))
+        legs = np.zeros(len(rows), dtype=np.int64)
+        places = (Place(),) * len(rows)
+        measured.append(Case(k + 1, operator, grid.number, grid.points[rows], legs, xy, places))
     session = Session(
         tuple(measured), {grid.number: grid}, comparator=comparator, date=date, left_handed=left_handed
     )
     return Simulation(session, correction, errors)
 
 
-def _sequence(points: int, pointings: int, closing: int) -> Floats:
-    """Rows of the points in the order measured: line by line, and the first again at the end."""
-    return np.concatenate([np.repeat(np.arange(points), pointings), np.zeros(closing, dtype=np.int64)])
+def _default_sequence(points: Integers) -> Integers:
+    """Return every point five times, and the first three times again."""
+    return np.concatenate([np.repeat(points, 5), np.repeat(points[:1], 3)])
 
 
 def _readings(

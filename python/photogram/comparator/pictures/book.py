@@ -49,6 +49,13 @@ def figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
     """
     if find_spec("matplotlib") is None:
         raise PhotogramError("pictures need matplotlib: pip install 'photogram[plots]'")
+    for name, figure in _figures(calibration):
+        # Panels of equal scales are laid out well only when their limits are known.
+        figure.draw_without_rendering()
+        yield name, figure
+
+
+def _figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
     yield "variance", variance_bars(calibration)
     yield "comparator-residuals", comparator_vectors(calibration)
     yield "grid-residuals", grid_vectors(calibration)

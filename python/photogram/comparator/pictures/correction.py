@@ -49,7 +49,7 @@ def correction_surface(calibration: Calibration, polynomial: Polynomial) -> Figu
         filled = panel.contourf(x, y, values[..., axis], levels=levels, cmap="RdBu_r")
         lines = panel.contour(x, y, values[..., axis], levels=levels, colors="k", linewidths=0.4)
         panel.clabel(lines, fontsize=7, fmt="%g")
-        panel.plot(*measured.T, ".", color="k", markersize=2.5, alpha=0.6)
+        panel.plot(*measured.T, ".", color="k", markersize=3, alpha=0.7, clip_on=False)
         panel.set_title(f"correction in {'xy'[axis]}", fontsize=10, loc="left")
         plain(panel, "x, mm", "y, mm")
         panel.margins(0.02)
@@ -77,8 +77,8 @@ def distorted_grid(polynomial: Polynomial) -> Figure:
             moved = places / MM + polynomial.evaluate(places) * scale
             axes.plot(*moved.T, color=MAIN, linewidth=1.3, zorder=2)
     plain(axes, "x, mm", "y, mm")
-    key(axes, scale, round_length(longest))
+    key([axes], scale, round_length(longest))
     axes.set_title(
-        f"Net displaced by the nonlinear correction, {scale * MM:,.0f} times magnified", fontsize=11, pad=18
+        f"Net displaced by the nonlinear correction, {scale * MM:,.0f} times magnified", fontsize=11
     )
     return figure

@@ -33,7 +33,7 @@ __all__ = ["pointing_ellipses", "residual_histogram", "variance_bars"]
 def pointing_ellipses(calibration: Calibration) -> Figure:
     """Draw the 39 percent ellipses of single pointings at the measured places of each case."""
     count = len(calibration.cases)
-    figure, axes = panels(count, across=4, side=3.4)
+    figure, axes = panels(count)
     largest = max(
         (
             readings.precision.ellipse.major_um
@@ -52,11 +52,11 @@ def pointing_ellipses(calibration: Calibration) -> Figure:
         none = [k for k, ellipse in enumerate(ellipses) if ellipse.major_um == 0.0]
         panel.plot(*places[none].T, "*", color=ACCENT, markersize=5)
         sd = case.placed.precision.sd_point_um
-        panel.set_title(f"case {case.number}, pooled {sd:.2f} µm", fontsize=9, loc="left", pad=16)
+        panel.set_title(f"case {case.number}, pooled {sd:.2f} µm", fontsize=9, loc="left")
         plain(panel, "x, mm", "y, mm")
     for panel in axes:
         panel.label_outer()
-        key(panel, scale, round_length(largest))
+    key(axes, scale, round_length(largest))
     figure.suptitle("Error ellipses of single pointings (39 percent; * no deviation)", fontsize=11)
     return figure
 
@@ -81,7 +81,7 @@ def _ellipses(axes: Axes, places: Floats, ellipses: list[Ellipse], scale: float)
 
 
 def residual_histogram(calibration: Calibration) -> Figure:
-    """Draw histograms of the final residuals in x and in y against the normal curve of their standard deviation."""
+    """Draw histograms of the final residuals against the normal curve of their standard deviation."""
     residuals = np.vstack([fit.residuals.comparator_um for fit in calibration.last_fits])
     figure = new_figure(10.0, 3.9)
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -92,14 +92,13 @@ def residual_histogram(calibration: Calibration) -> Figure:
         own = residuals[:, axis]
         sigma = math.sqrt(float((own**2).mean())) or 1.0
         panel.hist(own, bins=bins.tolist(), color=MAIN, alpha=0.35, edgecolor=MAIN, linewidth=0.8)
-        curve = (
-            len(own) * (bins[1] - bins[0]) * np.exp(-((x / sigma) ** 2) / 2) / sigma / math.sqrt(2 * math.pi)
-        )
+        height = len(own) * (bins[1] - bins[0]) / (sigma * math.sqrt(2 * math.pi))
+        curve = height * np.exp(-((x / sigma) ** 2) / 2)
         panel.plot(x, curve, color=ACCENT, linewidth=1.8)
         beyond = 100 * float((np.abs(own) > 2 * sigma).mean())
         panel.set_title(
-            f"{'xy'[axis]}: {len(own)} residuals, rms {sigma:.3f} µm, {beyond:.1f} % beyond twice that"
-            " (normal: 4.6 %)",
+            f"{'xy'[axis]}: {len(own)} residuals, rms {sigma:.3f} µm,"
+            f" {beyond:.1f} % beyond twice that (normal: 4.6 %)",
             fontsize=9,
             loc="left",
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,7 +49,7 @@ def plain(axes: Axes, xlabel: str, ylabel: str) -> None:
     axes.set_xlabel(xlabel, fontsize=8)
     axes.set_ylabel(ylabel, fontsize=8)
     axes.tick_params(labelsize=7, length=2, color=FAINT)
-    axes.margins(0.14)
+    axes.margins(0.08)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
@@ -64,7 +65,7 @@ def round_length(value: float) -> float:
 
 
 def magnification(places_mm: Floats, vectors_um: Floats) -> float:
-    """Return millimetres of the picture for a micrometre, so that the longest vector is a little shorter than the spacing."""
+    """Return millimetres of the picture a micrometre: the longest vector almost spans the spacing."""
     extent = float(np.ptp(places_mm, axis=0).max()) or 1.0
     spacing = extent / max(math.sqrt(len(places_mm)) - 1, 1)
     longest = float(np.hypot(*vectors_um.T).max(initial=0.0))
@@ -74,7 +75,7 @@ def magnification(places_mm: Floats, vectors_um: Floats) -> float:
 def arrows(axes: Axes, places_um: Floats, vectors_um: Floats, scale: float, colour: str = MAIN) -> None:
     """Draw vectors from places, `scale` millimetres of the picture for each micrometre."""
     places, vectors = places_um / MM, vectors_um * scale
-    axes.plot(*places.T, ".", color=FAINT, markersize=3, zorder=1)
+    axes.plot(*places.T, ".", color=FAINT, markersize=5, zorder=1)
     axes.quiver(
         *places.T,
         *vectors.T,
@@ -92,12 +93,13 @@ def arrows(axes: Axes, places_um: Floats, vectors_um: Floats, scale: float, colo
     axes.autoscale_view()
 
 
-def key(axes: Axes, scale: float, length_um: float) -> None:
-    """Draw the length of a round number of micrometres above the right corner of a panel."""
-    text = f"{length_um:g} µm"
-    right, top = 0.98, 1.02
-    low, high = axes.get_xlim()
-    part = length_um * scale / (high - low)
-    options: dict[str, Any] = {"transform": axes.transAxes, "clip_on": False}
-    axes.plot([right - part, right], [top, top], color=ACCENT, linewidth=2.5, **options)
-    axes.text(right - part - 0.02, top, text, ha="right", va="center", fontsize=8, color=ACCENT, **options)
+def key(panels: Sequence[Axes], scale: float, length_um: float) -> None:
+    """Draw a length of micrometres in the lower right corner of panels with common limits."""
+    low, high = panels[0].get_ylim()
+    panels[0].set_ylim(low - 0.06 * (high - low), high)
+    for axes in panels:
+        left, right = axes.get_xlim()
+        part = length_um * scale / (right - left)
+        options: dict[str, Any] = {"transform": axes.transAxes, "color": ACCENT}
+        axes.plot([0.98 - part, 0.98], [0.035, 0.035], linewidth=2.5, solid_capstyle="butt", **options)
+        axes.text(0.96 - part, 0.035, f"{length_um:g} µm", ha="right", va="center", fontsize=8, **options)

@@ -71,11 +71,11 @@ def _by_case(
     for panel, case, own, vector in zip(axes, calibration.cases, places, vectors, strict=True):
         arrows(panel, own, vector, scale)
         point = case.placed.orientation.nearest_point
-        panel.set_title(f"case {case.number}, point {point} nearest zero", fontsize=9, loc="left", pad=16)
+        panel.set_title(f"case {case.number}, point {point} nearest zero", fontsize=9, loc="left")
         plain(panel, *labels)
     for panel in axes:
         panel.label_outer()
-        key(panel, scale, length)
+    key(axes, scale, length)
     figure.suptitle(title, fontsize=11)
     return figure
 
@@ -87,7 +87,7 @@ def average_vectors(calibration: Calibration, plate: int) -> Figure:
     grid = calibration.session.grids[plate]
     own = grid.xy_um[grid.rows_of(averages.points)]
     located = averages.locations is not None and averages.location_um is not None
-    figure, axes = panels(2 if located else 1, side=4.4)
+    figure, axes = panels(2 if located else 1, side=4.2)
     corrections = averages.corrections_um
     together = corrections
     if averages.location_um is not None:
@@ -95,25 +95,24 @@ def average_vectors(calibration: Calibration, plate: int) -> Figure:
     scale = magnification(own / MM, together)
     length = round_length(float(np.hypot(*together.T).max()))
     arrows(axes[-1], own, corrections, scale, ACCENT)
-    axes[-1].set_title("by grid point: correction of the grid", fontsize=9, loc="left", pad=16)
+    axes[-1].set_title("by grid point: correction of the grid", fontsize=9, loc="left")
     plain(axes[-1], "X of the plate, mm", "Y of the plate, mm")
     if averages.locations is not None and averages.location_um is not None:
         # Locations are numbered like the points of a plate with corner 1 nearest the zero.
         places = exchanged(grid.xy_um[grid.rows_of(averages.locations)], averages.left_handed)
         arrows(axes[0], places, averages.location_um, scale)
-        axes[0].set_title("by comparator location", fontsize=9, loc="left", pad=16)
+        axes[0].set_title("by comparator location", fontsize=9, loc="left")
         plain(axes[0], "x about the middle, mm", "y about the middle, mm")
-    for panel in axes:
-        key(panel, scale, length)
+    key(axes, scale, length)
     figure.suptitle(f"Average residuals of {len(averages.cases)} cases, plate {plate}", fontsize=11)
     return figure
 
 
 def joint_grid(calibration: Calibration, plate: int) -> Figure:
-    """Draw the corrections of the grid by the joint adjustment, with ellipses of 95 percent."""
+    """Draw the corrections of the grid by the joint adjustment, with their standard ellipses."""
     from matplotlib.collections import EllipseCollection
 
-    from photogram.comparator.pointing import CONFIDENCE_FACTORS, Ellipse
+    from photogram.comparator.pointing import Ellipse
 
     joint = calibration.joint
     if joint is None:
@@ -123,9 +122,13 @@ def joint_grid(calibration: Calibration, plate: int) -> Figure:
     places = grid.xy_um[grid.rows_of(own.points)]
     figure = new_figure(6.2, 5.8)
     axes = figure.subplots()
-    scale = 0.8 * magnification(places / MM, own.corrections_um)
     ellipses = [Ellipse.of(c[0, 0], c[1, 1], c[0, 1]) for c in own.covariance_um2]
-    factor = 2 * CONFIDENCE_FACTORS[95] * scale
+    # Room for an arrow and the ellipse about its end.
+    longest = own.corrections_um * (
+        1 + max(ellipse.major_um for ellipse in ellipses) / np.abs(own.corrections_um).max()
+    )
+    scale = magnification(places / MM, longest)
+    factor = 2 * scale
     collection = EllipseCollection(
         [factor * ellipse.major_um for ellipse in ellipses],
         [factor * ellipse.minor_um for ellipse in ellipses],
@@ -133,11 +136,15 @@ def joint_grid(calibration: Calibration, plate: int) -> Figure:
         units="xy",
         offsets=places / MM + own.corrections_um * scale,
         transOffset=axes.transData,
-        facecolor=ACCENT,
-        edgecolor=ACCENT,
-        alpha=0.18,
+        facecolor="none",
+        edgecolor=FAINT,
+        linewidth=0.9,
     )
     axes.add_collection(collection)
+    # Collections do not count for the limits.
+    reach = scale * np.array([[ellipse.major_um] for ellipse in ellipses])
+    ends = places / MM + own.corrections_um * scale
+    axes.update_datalim(np.vstack([ends - reach, ends + reach]))
     arrows(axes, places, own.corrections_um, scale, ACCENT)
     for point, (x, y) in zip(own.points.tolist(), (places / MM).tolist(), strict=True):
         axes.annotate(
@@ -148,11 +155,9 @@ def joint_grid(calibration: Calibration, plate: int) -> Figure:
             ha="right",
             va="top",
             fontsize=7,
-            color=FAINT,
+            color="#5b6773",
         )
     plain(axes, "X of the plate, mm", "Y of the plate, mm")
-    key(axes, scale, round_length(float(np.hypot(*own.corrections_um.T).max())))
-    axes.set_title(
-        f"Corrections of grid {plate} by the joint adjustment, 95 percent ellipses", fontsize=11, pad=18
-    )
+    key([axes], scale, round_length(float(np.hypot(*own.corrections_um.T).max())))
+    axes.set_title(f"Corrections of grid {plate} by the joint adjustment, standard ellipses", fontsize=11)
     return figure
