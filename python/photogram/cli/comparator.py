@@ -213,7 +213,7 @@ def correct(
 ) -> None:
     """Correct measurements by a calibration.
 
-    Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (what the calibration itself contributes).
+    Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (what the calibration contributes).
     """
     with failures():
         from photogram.comparator.apply import correct_table

@@ -188,11 +188,10 @@ class Session:
             raise InputError("there are no measurements", file=self.source)
         first: dict[int, Case] = {}
         for case in self.cases:
-            earlier = first.setdefault(case.number, case)
-            if earlier is not case:
-                raise case.place.error(
-                    f"case {case.number} was measured twice: first {_where(earlier.place)}"
-                )
+            if case.number in first:
+                where = _where(first[case.number].place)
+                raise case.place.error(f"case {case.number} was measured twice: first {where}")
+            first[case.number] = case
             case.check(self.grid_of(case))
 
 
