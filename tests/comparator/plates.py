@@ -1,4 +1,4 @@
-"""What the tests of the comparator share: the figures of the report, the readings of its case 2, simulated calibrations."""
+"""What the tests of the comparator share: figures of the report, its case 2, simulated calibrations."""
 
 import csv
 import json
@@ -85,7 +85,7 @@ def printed_correction():
 
 
 def bent():
-    """Return a correction with polynomials of a few micrometres and no linear terms that scales would absorb."""
+    """Return a correction with polynomials of a few micrometres, without linear terms."""
     x = np.array([0.02, -0.01, -0.012, 0.008, 0.002, -0.001, 0.0, 0.0, 0.0])
     y = np.array([-0.006, 0.015, 0.003, -0.009, -0.0005, 0.0015, 0.0, 0.0, 0.0])
     return Correction(1 - 5e-6, 1 - 22e-6, 5e-5, Polynomial.from_metres(x, y))

@@ -10,7 +10,7 @@ from plates import ARCSEC, LINEAR, QUICK, STRAIGHT, bent, case_2, document, nois
 from photogram.comparator import Correction, Decomposition, Grid, Options, calibrate, simulate_calibration
 from photogram.comparator.affine import fit_affine
 from photogram.comparator.decomposition import decomposition_jacobian, rotation_matrix
-from photogram.comparator.orientation import exchanged, locations
+from photogram.comparator.orientation import locations
 from photogram.comparator.polynomial import Frame, Polynomial, design, fit_polynomial
 from photogram.comparator.rigid import fit_rigid
 
@@ -38,12 +38,14 @@ def test_feature_10_every_quarter_turn_is_detected(left_handed):
     assert nearest == ([1, 5, 25, 21] if left_handed else [1, 21, 25, 5])
     for case in calibration.cases:
         measured = np.hypot(*case.placed.means_um.T)
-        corners = {int(p): d for p, d in zip(case.placed.points, measured, strict=True) if p in (1, 5, 21, 25)}
+        corners = {
+            int(p): d for p, d in zip(case.placed.points, measured, strict=True) if p in (1, 5, 21, 25)
+        }
         assert case.placed.orientation.nearest_point == min(corners, key=corners.get)
 
 
 def test_feature_10_locations_are_a_group_of_permutations():
-    """The listing's formulas (COMPVS), and what they mean: after turning, location i is where point i would be."""
+    """The listing's formulas (COMPVS): after turning, location i is where point i would be."""
     grid = Grid.square()
     maps = {corner: locations(grid, corner) for corner in (1, 2, 3, 4)}
     i = np.arange(1, 26)
@@ -146,7 +148,9 @@ def test_feature_12_linear_adjustment_of_case_2():
 @pytest.mark.parametrize("quarter", range(4))
 def test_feature_12_a_plate_that_lies_exactly_along_the_axes(quarter):
     """The listing divides by b and d, which are zero here."""
-    session = simulate_calibration(Grid.square(), Correction(1.0, 1.0, 0.0), cases=1, rotation_rad=quarter * math.pi / 2)
+    session = simulate_calibration(
+        Grid.square(), Correction(1.0, 1.0, 0.0), cases=1, rotation_rad=quarter * math.pi / 2
+    )
     case = calibrate(session.session, LINEAR).cases[0]
     assert case.linear.parameters.scale_x == pytest.approx(1.0, abs=1e-13)
     assert np.isfinite(case.linear.cofactors).all()
@@ -266,7 +270,7 @@ def test_feature_15_cofactors_in_metres():
 
 
 def joint_least_squares(calibration):
-    """Gauss-Newton with numerical partials: scales, lack of orthogonality, and three unknowns for each case."""
+    """Gauss-Newton with numerical partials: three unknowns of the comparator, three of each case."""
     cases = [case.placed for case in calibration.cases]
 
     def residuals(values):
@@ -343,7 +347,8 @@ def test_feature_17_combined_polynomials_recover_the_correction():
         calibration = calibrate(session)
         inside = np.vstack([case.placed.means_um for case in calibration.cases])
         true = correction.apply(inside)
-        # Linear terms that go another way turn the arguments of the others by 1e-5: cross terms of a nanometre.
+        # Linear terms that go another way turn the arguments of the others by 1e-5: cross terms of a
+        # nanometre.
         for found in (calibration.correction, calibration.joint.correction):
             moved = fit_rigid(np.arange(len(inside)), found.apply(inside), true)
             assert np.abs(moved.residuals.grid_um).max() < 1e-3

@@ -59,7 +59,7 @@ def test_without_the_flip_the_plate_does_not_fit():
 
 
 def test_printed_signs_of_both_systems():
-    """V = -R v: the rotation of case 2 takes the printed comparator residuals to the printed grid residuals."""
+    """V = -R v: the rotation of case 2 takes printed comparator residuals to printed grid residuals."""
     c, s = math.cos(case_2().last_fits[0].rotation_rad), math.sin(case_2().last_fits[0].rotation_rad)
     for row in document("fig25_case2_final_residuals.json")["points_available"].values():
         turned = [-c * row["vx_meas"] - s * row["vy_meas"], s * row["vx_meas"] - c * row["vy_meas"]]
@@ -70,7 +70,12 @@ def test_printed_signs_of_both_systems():
 def figure_29():
     """Return the averages of figure 29, with the sums of squares that its random errors stand for."""
     rows, summary = table("fig29_partial_grid_calibration.csv"), document("fig29_summary.json")
-    columns = ("vx_meas_by_location_um", "vy_meas_by_location_um", "vx_grid_by_point_um", "vy_grid_by_point_um")
+    columns = (
+        "vx_meas_by_location_um",
+        "vy_meas_by_location_um",
+        "vx_grid_by_point_um",
+        "vy_grid_by_point_um",
+    )
     values = np.array([[float(row[column]) for column in columns] for row in rows])
     points = np.array([int(row["location_or_point"]) for row in rows])
     within = np.array([summary["random_errors_sigma"][axis] ** 2 for axis in "xy"]) * 25 * 4 * 3
@@ -86,7 +91,9 @@ def test_feature_20_identities_of_figure_29(figure_29):
     averages, summary = figure_29
     sums = [*(averages.location_um**2).sum(axis=0), *(averages.grid_um**2).sum(axis=0)]
     assert sums == pytest.approx(list(summary["sum_vv"].values()), abs=0.004)
-    assert [math.sqrt(value / 24) for value in sums] == pytest.approx(list(summary["sigma"].values()), abs=3e-4)
+    assert [math.sqrt(value / 24) for value in sums] == pytest.approx(
+        list(summary["sigma"].values()), abs=3e-4
+    )
     assert np.abs(averages.grid_um.sum(axis=0)).max() < 0.0025
     listed = listed_grid_sigma(averages)
     assert listed.mean_comparator_um == pytest.approx(summary["standard_deviation"]["meas"], abs=2e-4)
@@ -136,11 +143,12 @@ def test_figure_30_variances_have_the_structure_of_ours():
     varcov = linear["varcov"]
     assert math.sqrt(varcov["xx"]) == pytest.approx(linear["sigma_scaler_x"], rel=1e-7)
     assert math.sqrt(varcov["yy"]) == pytest.approx(linear["sigma_scaler_y"], rel=1e-7)
-    ours = case_2().linear.covariance / case_2().linear.sigma0_um**2
+    ours = case_2().linear.covariance / case_2().linear.sigma0_um ** 2
     ratio = varcov["xx"] / ours[0, 0]
     assert varcov["yy"] == pytest.approx(ratio * ours[1, 1], rel=1e-4)
     assert varcov["aa"]["value"] == pytest.approx(ratio * ours[2, 2], rel=1e-4)
-    # The covariances are of another size than their own product: X and Y of this plate are nearly uncorrelated.
+    # The covariances are of another size than their own product: X and Y of this plate are nearly
+    # uncorrelated.
     assert varcov["aa"]["value"] == pytest.approx(varcov["xx"] + varcov["yy"], rel=1e-4)
     ppm = 1e6 * (linear["scaler_x"]["value"] / linear["scaler_y"]["value"] - 1)
     assert ppm == pytest.approx(linear["sx_over_sy"]["um_per_m"], abs=0.011)

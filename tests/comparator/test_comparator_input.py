@@ -98,7 +98,9 @@ FORMATS = {
 def test_feature_01_all_formats_of_data_cards(tmp_path, name):
     comparator, flags, stage, make = FORMATS[name]
     cards = circuit(make)
-    session = read_cards(deck(tmp_path, header(comparator, flags=flags, stage=stage), *cards, ""), left_handed=True)[0]
+    session = read_cards(
+        deck(tmp_path, header(comparator, flags=flags, stage=stage), *cards, ""), left_handed=True
+    )[0]
     case = session.cases[0]
     grid = built_in_grid(1320)
     expected = (grid.xy_um[case.points - 1][:, ::-1] + 125_000).round()
@@ -144,7 +146,9 @@ def test_feature_01_tables_in_micrometres_and_millimetres(tmp_path):
 # 2: plates
 
 
-@pytest.mark.parametrize(("number", "sigma", "points"), [(773, 0.220, 24), (1320, 0.249, 25), (778, 0.405, 24)])
+@pytest.mark.parametrize(
+    ("number", "sigma", "points"), [(773, 0.220, 24), (1320, 0.249, 25), (778, 0.405, 24)]
+)
 def test_feature_02_built_in_grids(number, sigma, points):
     grid = built_in_grid(number)
     assert (grid.sigma_um, len(grid.points)) == (sigma, points)
@@ -279,7 +283,11 @@ def test_feature_05_close_out_of_case_2():
 
 @pytest.mark.parametrize(
     ("shift", "verdict", "words"),
-    [(1.9, "good", None), (2.5, "suspect", "did the plate shift"), (4.0, "remeasure", "measure the case again")],
+    [
+        (1.9, "good", None),
+        (2.5, "suspect", "did the plate shift"),
+        (4.0, "remeasure", "measure the case again"),
+    ],
 )
 def test_feature_05_the_rules_of_two_and_four_micrometres(shift, verdict, words):
     session = noisy(3, pointing_um=0.0, random_um=0.0)
@@ -299,7 +307,9 @@ def test_feature_05_cases_that_are_not_closed():
     closeouts, messages = close_out(open_case)
     assert closeouts[0].verdict == "none"
     assert "NO CLOSEOUT MEASUREMENTS ON INITIAL POINT 1 MADE" in str(messages[0])
-    few = replace(case, points=case.points[:9], legs=case.legs[:9], xy_um=case.xy_um[:9], places=case.places[:9])
+    few = replace(
+        case, points=case.points[:9], legs=case.legs[:9], xy_um=case.xy_um[:9], places=case.places[:9]
+    )
     with pytest.raises(InputError, match="INSUFFICIENT MEASUREMENTS MADE - STOP"):
         close_out(few)
 
@@ -454,7 +464,9 @@ def test_parallel_legs_and_doubly_measured_points_are_errors():
     with pytest.raises(InputError, match="case 1, point 13: NO INTERSECTION FOR PARALLEL LINES"):
         calibrate(session, QUICK)
     session, _ = legged(noisy(2), 1)
-    doubled = replace(session.cases[0], legs=np.where(np.arange(len(session.cases[0].legs)) < 1, 0, session.cases[0].legs))
+    doubled = replace(
+        session.cases[0], legs=np.where(np.arange(len(session.cases[0].legs)) < 1, 0, session.cases[0].legs)
+    )
     with pytest.raises(InputError, match="both on its intersection and on its legs"):
         reduce_legs(doubled)
 
@@ -462,7 +474,9 @@ def test_parallel_legs_and_doubly_measured_points_are_errors():
 def test_a_case_in_another_unit_is_an_error():
     session = noisy(4)
     other = replace(session.cases[0], xy_um=session.cases[0].xy_um / 1000)
-    with pytest.raises(InputError, match="case 1: the grid is 1000 times the measured size: are the units mixed"):
+    with pytest.raises(
+        InputError, match="case 1: the grid is 1000 times the measured size: are the units mixed"
+    ):
         calibrate(replace(session, cases=(other, *session.cases[1:])), QUICK)
 
 

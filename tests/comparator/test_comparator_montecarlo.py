@@ -1,4 +1,4 @@
-"""Hundreds of realisations of the errors: covariances and standard deviations are those of what they describe."""
+"""Hundreds of realisations of the errors: covariances and standard deviations are right."""
 
 import math
 
@@ -33,14 +33,12 @@ def deviations(parameters, covariance):
 
 
 def test_feature_13_covariances_of_one_case_are_unbiased(linear_runs):
-    """Deviations over standard deviations have variance 1 but for the spread of sigma0 itself: dof / (dof - 2)."""
+    """Deviations over standard deviations have variance dof / (dof - 2), as Student has it."""
     values = []
     for calibration in linear_runs:
         fit = calibration.cases[0].linear
         own = fit.parameters
-        values.append(
-            deviations([own.scale_x, own.scale_y, own.nonorthogonality_rad], fit.covariance)
-        )
+        values.append(deviations([own.scale_x, own.scale_y, own.nonorthogonality_rad], fit.covariance))
     squares = np.array(values) ** 2
     for parameter in range(3):
         assert excess(squares[:, parameter], 44 / 42) < 3.5
@@ -80,7 +78,8 @@ def test_feature_20_grid_sigma_is_unbiased(full_runs):
     squares = [calibration.plates[1].unbiased_um ** 2 for calibration in full_runs]
     assert excess(squares, 0.16) < 3.5
     listed = [calibration.plates[1].listed.grid_um ** 2 for calibration in full_runs]
-    # What the listing passes over: six of fifty degrees of freedom of the averages, and those of the residuals.
+    # What the listing passes over: six of fifty degrees of freedom of the averages, and those of the
+    # residuals.
     assert np.mean(listed) < np.mean(squares)
 
 
@@ -105,11 +104,13 @@ def test_joint_components_are_unbiased(full_runs):
 
 
 def test_joint_covariances_of_corrected_coordinates_and_grid(full_runs):
-    """Errors of corrected places, but for the rotation and shift that nothing determines, follow their covariance.
+    """Errors of corrected places follow their covariance, but for a rotation and a shift.
 
-    The distance between two corrected places is free of both.
+    Nothing determines these two; the distance between two corrected places is free of them.
     """
-    ends = np.array([[30_000.0, 40_000.0], [210_000.0, 220_000.0], [30_000.0, 220_000.0], [210_000.0, 40_000.0]])
+    ends = np.array(
+        [[30_000.0, 40_000.0], [210_000.0, 220_000.0], [30_000.0, 220_000.0], [210_000.0, 40_000.0]]
+    )
     true = bent().apply(ends)
     ratios = []
     for calibration in full_runs:
@@ -139,7 +140,7 @@ def test_joint_covariance_of_the_grid_errors():
 
 
 def test_even_grid_errors_show_and_odd_ones_hide():
-    """The average of four quarter turns shows even shapes of the grid; cubic ones go into the comparator, scale into scales."""
+    """Quarter turns show even shapes of the grid; cubic ones and scale go into the comparator."""
     grid = Grid.square()
     x, y = (grid.xy_um / 1e5).T
     even = np.column_stack([x**2 - (x**2).mean(), y**2 - (y**2).mean()])

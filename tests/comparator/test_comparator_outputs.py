@@ -1,4 +1,4 @@
-"""Averages, analysis of variance, tests of significance, joint adjustment, correction, listing, document, pictures."""
+"""Averages, analysis of variance, tests, joint adjustment, correction, listing, document, pictures."""
 
 import json
 import math
@@ -107,7 +107,9 @@ def test_feature_19_locations_show_what_belongs_to_the_comparator():
     for case in simulation.session.cases:
         bump = np.exp(-((np.hypot(*(case.xy_um - [75_000, 130_000]).T) / 30_000) ** 2))
         cases.append(replace(case, xy_um=case.xy_um + np.column_stack([3 * bump, 0 * bump])))
-    calibration = calibrate(replace(simulation.session, cases=tuple(cases)), Options(joint=False, polynomial=False))
+    calibration = calibrate(
+        replace(simulation.session, cases=tuple(cases)), Options(joint=False, polynomial=False)
+    )
     averages = calibration.plates[1].averages
     assert np.abs(averages.location_um).max() > 2.0
     assert np.abs(averages.location_um).max() > 2.5 * np.abs(averages.grid_um).max()
@@ -214,7 +216,10 @@ def test_feature_22_covariance_of_corrected_coordinates_by_complex_steps():
         return np.array([x + basis @ parameters[3:12], y + basis @ parameters[12:]])
 
     values = np.concatenate(
-        [[correction.scale_x, correction.scale_y, correction.nonorthogonality_rad], polynomial.scaled_um.ravel()]
+        [
+            [correction.scale_x, correction.scale_y, correction.nonorthogonality_rad],
+            polynomial.scaled_um.ravel(),
+        ]
     )
     for k in range(21):
         stepped = values.astype(complex)
@@ -272,7 +277,14 @@ def test_feature_22_the_document_has_the_members_that_were_promised(full):
     pointing = document["pointing"]
     assert (len(pointing["points"]), len(pointing["cases"]), len(pointing["operators"])) == (200, 8, 2)
     assert pointing["total"]["readings"] == 8 * 128
-    assert set(document["variance_components_um"]) == {"linear", "nonlinear", "grid", "pointing", "random", "total"}
+    assert set(document["variance_components_um"]) == {
+        "linear",
+        "nonlinear",
+        "grid",
+        "pointing",
+        "random",
+        "total",
+    }
     grid = np.array(document["grid_corrections_um"])
     assert grid == pytest.approx(full.plates[1].averages.grid_um)
     assert document["sigma_grid_um"] == full.sigma_grid_um(1)
@@ -421,7 +433,8 @@ def test_what_the_joint_adjustment_cannot_do_is_said(full, monkeypatch):
 def test_terms_are_significant_where_there_are_terms():
     pytest.importorskip("scipy")
     curved, straight = (
-        calibrate(noisy(9, correction=correction), QUICK).polynomial_tests for correction in (bent(), STRAIGHT)
+        calibrate(noisy(9, correction=correction), QUICK).polynomial_tests
+        for correction in (bent(), STRAIGHT)
     )
     assert curved.probability < 1e-6
     assert straight.probability > 0.01

@@ -81,7 +81,10 @@ def test_feature_08_pooling_over_operators_and_in_all():
 
 def test_feature_08_degrees_of_freedom_of_the_listing():
     session = noisy(1, cases=4)
-    text, listing = calibrate(session, QUICK), calibrate(session, Options(joint=False, pointing_dof="listing"))
+    text, listing = (
+        calibrate(session, QUICK),
+        calibrate(session, Options(joint=False, pointing_dof="listing")),
+    )
     total = 4 * 128
     ratio = listing.pointing.total.variance_um2[0] / text.pointing.total.variance_um2[0]
     assert ratio == pytest.approx((total - 100) / (total - 25))
@@ -90,7 +93,7 @@ def test_feature_08_degrees_of_freedom_of_the_listing():
 
 
 def test_feature_08_the_text_is_unbiased_and_the_listing_is_not():
-    """Sums of squares over readings less means estimate the variance; over readings less points they fall short."""
+    """Sums of squares over readings less means estimate the variance; over more they fall short."""
     rng = np.random.default_rng(8)
     text, listing = [], []
     for _ in range(300):

@@ -152,7 +152,7 @@ def _results(
     if pictures and find_spec("matplotlib") is None:
         pictures = False
         if not quiet:
-            errors.print("[yellow]remark:[/] no pictures: pip install 'photogram[plots]'")
+            errors.print("[yellow]remark:[/] " + escape("no pictures: pip install 'photogram[plots]'"))
     written: dict[Path, bytes] = {}
     for number, calibration in enumerate(calibrations, 1):
         place = folder if len(calibrations) == 1 else folder / str(number)
