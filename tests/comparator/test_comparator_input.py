@@ -486,6 +486,24 @@ def test_a_case_measured_twice_is_an_error_for_arrays_too():
         calibrate(replace(session, cases=(session.cases[0], session.cases[0])), QUICK)
 
 
+def test_arrays_are_checked():
+    session = noisy(4)
+    case = session.cases[0]
+    xy = case.xy_um.copy()
+    xy[7, 1] = np.nan
+    for wrong, words in (
+        (replace(case, xy_um=xy), "case 1, point 2: not a number"),
+        (replace(case, points=case.points[:-1]), "differ in number"),
+        (replace(case, plate=9), "case 1 is on plate 9; there is only 1"),
+    ):
+        with pytest.raises(InputError, match=words):
+            calibrate(replace(session, cases=(wrong, *session.cases[1:])), QUICK)
+    with pytest.raises(InputError, match="there are no measurements"):
+        calibrate(replace(session, cases=()), QUICK)
+    with pytest.raises(InputError, match="is no standard deviation"):
+        Grid.square(sigma_um=-1.0)
+
+
 def test_a_blunder_is_remarked_on():
     session = noisy(4)
     case = session.cases[2]

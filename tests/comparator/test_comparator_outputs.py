@@ -430,6 +430,17 @@ def test_what_the_joint_adjustment_cannot_do_is_said(full, monkeypatch):
     assert any("does not converge" in str(message) for message in calibration.messages)
 
 
+def test_measurements_without_any_error():
+    """No deviation, no residual: everything is still said, and nothing divides by zero."""
+    session = simulate_calibration(Grid.square(spacing_um=2.0**16), rotation_rad=0.0).session
+    exact = tuple(replace(case, xy_um=np.round(case.xy_um)) for case in session.cases)
+    calibration = calibrate(replace(session, cases=exact))
+    assert calibration.linear.sigma0_um < 1e-9
+    assert calibration.joint.random_um == pytest.approx(1e-3)
+    assert "CALIBRATION SUMMARY" in listing(calibration)
+    assert json.loads(to_json(calibration))["linear"]["scale_x"] == pytest.approx(1.0, abs=1e-14)
+
+
 def test_terms_are_significant_where_there_are_terms():
     pytest.importorskip("scipy")
     curved, straight = (

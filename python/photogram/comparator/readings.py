@@ -108,6 +108,12 @@ class Case:
         InputError
             The first reading at fault, with its place.
         """
+        if not len(self.points) == len(self.legs) == len(self.xy_um) == len(self.places):
+            raise InputError(f"case {self.number}: points, legs, coordinates and places differ in number")
+        finite = np.isfinite(self.xy_um).all(axis=1)
+        if not finite.all():
+            at = int(np.flatnonzero(~finite)[0])
+            raise self.places[at].error(f"case {self.number}, point {self.points[at]}: not a number")
         known = np.isin(self.points, grid.points)
         if not known.all():
             at = int(np.flatnonzero(~known)[0])

@@ -50,7 +50,7 @@ class TermTest:
     @property
     def ratio(self) -> float:
         """Coefficient over standard deviation (t)."""
-        return self.coefficient_um / self.sd_um
+        return self.coefficient_um / self.sd_um if self.sd_um > 0 else math.nan
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def polynomial_tests(linear: CombinedLinear, nonlinear: CombinedPolynomial) -> P
     dof = linear.degrees_of_freedom - 2 * OWN_TERMS
     before = sum(sum(fit.residuals.squares_um2[:2]) for fit in linear.cases)
     after = sum(sum(fit.residuals.squares_um2[:2]) for fit in nonlinear.cases)
-    ratio = (before - after) / (2 * OWN_TERMS) / (after / dof)
+    ratio = (before - after) / (2 * OWN_TERMS) / (after / dof) if after > 0 else math.nan
     sd = np.sqrt(after / dof * np.diag(polynomial.scaled_cofactors)).reshape(2, -1)
     terms = tuple(
         TermTest(
@@ -118,7 +118,7 @@ def polynomial_tests(linear: CombinedLinear, nonlinear: CombinedPolynomial) -> P
             TERMS[term],
             float(polynomial.scaled_um[row, term]),
             float(sd[row, term]),
-            _student(float(polynomial.scaled_um[row, term] / sd[row, term]), dof),
+            _student(float(polynomial.scaled_um[row, term]), float(sd[row, term]), dof),
         )
         for row, axis in enumerate("xy")
         for term in range(OWN_TERMS)
@@ -154,16 +154,16 @@ def compare_case_variances(residuals: Sequence[Floats], dof: Sequence[int]) -> C
     )
 
 
-def _student(ratio: float, dof: int) -> float | None:
-    if not _scipy():
+def _student(value: float, sd: float, dof: int) -> float | None:
+    if not _scipy() or sd == 0:
         return None
     from scipy.stats import t
 
-    return float(2 * t.sf(abs(ratio), dof))
+    return float(2 * t.sf(abs(value / sd), dof))
 
 
 def _fisher(ratio: float, first: int, second: int) -> float | None:
-    if not _scipy():
+    if not _scipy() or math.isnan(ratio):
         return None
     from scipy.stats import f
 

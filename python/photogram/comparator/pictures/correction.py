@@ -52,7 +52,7 @@ def correction_surface(calibration: Calibration, polynomial: Polynomial) -> Figu
         panel.plot(*measured.T, ".", color="k", markersize=3, alpha=0.7, clip_on=False)
         panel.set_title(f"correction in {'xy'[axis]}", fontsize=10, loc="left")
         plain(panel, "x, mm", "y, mm")
-        panel.margins(0.02)
+        panel.margins(0.0)
     bar = figure.colorbar(filled, ax=axes, shrink=0.9)
     bar.set_label("µm", fontsize=8)
     bar.ax.tick_params(labelsize=7)

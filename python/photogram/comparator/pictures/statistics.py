@@ -82,6 +82,8 @@ def _ellipses(axes: Axes, places: Floats, ellipses: list[Ellipse], scale: float)
 
 def residual_histogram(calibration: Calibration) -> Figure:
     """Draw histograms of the final residuals against the normal curve of their standard deviation."""
+    from matplotlib.ticker import MaxNLocator
+
     residuals = np.vstack([fit.residuals.comparator_um for fit in calibration.last_fits])
     figure = new_figure(10.0, 3.9)
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -106,6 +108,7 @@ def residual_histogram(calibration: Calibration) -> Figure:
         panel.tick_params(labelsize=7, color=FAINT)
         for side in ("top", "right"):
             panel.spines[side].set_visible(False)
+    axes[0].yaxis.set_major_locator(MaxNLocator(integer=True))
     axes[0].set_ylabel("number", fontsize=8)
     figure.suptitle("Final residuals in the comparator system and the normal curve", fontsize=11)
     return figure

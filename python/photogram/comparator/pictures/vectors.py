@@ -156,6 +156,7 @@ def joint_grid(calibration: Calibration, plate: int) -> Figure:
             va="top",
             fontsize=7,
             color="#5b6773",
+            zorder=3,
         )
     plain(axes, "X of the plate, mm", "Y of the plate, mm")
     key([axes], scale, round_length(float(np.hypot(*own.corrections_um.T).max())))
