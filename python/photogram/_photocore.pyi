@@ -515,3 +515,115 @@ class ResectionSolution:
     @property
     def outside_danger_cylinder(self) -> float | None:
         """Distance of the projection centre from the danger cylinder, negative inside, or None."""
+
+class ComparatorError(Exception):
+    """The calibration cannot be adjusted: (message, cases, points), both by their indices."""
+
+@final
+class ComparatorSolution:
+    """An adjusted calibration of a comparator. Cofactors are for a priori unit weight."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether no unknown changed by more than `limit` of its standard deviation in the last step."""
+
+    @property
+    def iterations(self) -> int:
+        """Number of iterations."""
+
+    @property
+    def comparator(self) -> list[float]:
+        """Scale x, scale y, lack of orthogonality (rad), coefficients of x, of y (unit of the grid)."""
+
+    @property
+    def comparator_cofactors(self) -> _Floats:
+        """(k, k) of all of them together."""
+
+    @property
+    def case_placements(self) -> _Floats:
+        """(q, 3) rotation (rad), and the grid coordinates of the centre of the polynomials."""
+
+    @property
+    def case_cofactors(self) -> _Floats:
+        """(q, 3, 3) of each case."""
+
+    @property
+    def grid_xy(self) -> _Floats:
+        """(l, 2) adjusted grid coordinates, in the axes of the plate."""
+
+    @property
+    def grid_cofactors(self) -> _Floats:
+        """(l, 2, 2) of each grid point."""
+
+    @property
+    def grid_redundancy(self) -> _Floats:
+        """(l, 2) redundancy numbers of given grid coordinates; zero for free and fixed ones."""
+
+    @property
+    def residuals(self) -> _Floats:
+        """(m, 2) observed minus computed readings."""
+
+    @property
+    def redundancy(self) -> _Floats:
+        """(m, 2) redundancy numbers of the readings."""
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Weighted sum of squares of readings and weighted grid coordinates."""
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Readings and weighted grid coordinates less unknowns."""
+
+def adjust_comparator(
+    grid_xy: _Floats,
+    grid_sd: _Floats,
+    case_placements: _Floats,
+    case_left_handed: list[bool],
+    measured_cases: _Indices,
+    measured_points: _Indices,
+    measured_xy: _Floats,
+    measured_sd: _Floats,
+    coefficients: tuple[list[float], list[float]],
+    coefficient_sd: tuple[list[float], list[float]],
+    *,
+    degree: int,
+    centre: tuple[float, float],
+    half_range: tuple[float, float],
+    limit: float,
+    max_iterations: int,
+) -> ComparatorSolution:
+    """Adjust a comparator, its polynomials, the placements of the plates and their grids together.
+
+    grid = M (x' + P(x') - centre) + t with x' = N S x: scales, lack of orthogonality, then polynomials, then
+    rotation. Polynomials are made of u^d, v^d, ... u^2, v^2; u and v are x' and y' less `centre` over
+    `half_range`.
+
+    Parameters
+    ----------
+    grid_xy, grid_sd
+        (l, 2) coordinates of the grid points in the axes of their plate, and their standard deviations:
+        infinite free, zero fixed.
+    case_placements
+        (q, 3) initial rotation (rad) and grid coordinates of `centre`.
+    case_left_handed
+        (q) whether X and Y of the grid are exchanged.
+    measured_cases, measured_points
+        (m,) indices of the case and the grid point of each reading.
+    measured_xy, measured_sd
+        (m, 2) readings and their standard deviations, in the unit of the grid.
+    coefficients, coefficient_sd
+        Initial coefficients in x and in y, in the unit of the grid, and their standard deviations: infinite
+        free, zero fixed.
+    degree, centre, half_range
+        Of the polynomials.
+    limit, max_iterations
+        Convergence: largest change in standard deviations.
+
+    Raises
+    ------
+    ComparatorError
+        The readings leave unknowns undetermined, or indices and lengths contradict each other.
+    ValueError
+        An argument of another shape; the message names it and its shape.
+    """

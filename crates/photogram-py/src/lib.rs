@@ -2,6 +2,7 @@
 
 mod arrays;
 mod block;
+mod comparator;
 mod geometry;
 mod resection;
 mod solution;
@@ -13,5 +14,6 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     geometry::register(module)?;
     block::register(module)?;
+    comparator::register(module)?;
     resection::register(module)
 }

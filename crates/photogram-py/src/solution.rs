@@ -211,7 +211,7 @@ impl BlockSolution {
     }
 }
 
-/// Matrices as an (n, N, N) array.
+/// Square matrices as an (n, N, N) array.
 pub fn squares<const N: usize>(
     py: Python<'_>,
     matrices: Vec<[[f64; N]; N]>,

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from photogram.cli import check, giant, perspective_center, plan, simulate
+from photogram.cli import check, comparator, giant, perspective_center, plan, simulate
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
 
@@ -29,10 +29,16 @@ app = typer.Typer(
 giant_app = typer.Typer(name="giant", cls=GroupWithMain, help="Adjust or check a GIANT project.")
 giant_app.command("adjust")(giant.giant)
 giant_app.command("check")(check.check)
+comparator_app = typer.Typer(
+    name="comparator", cls=GroupWithMain, help="Calibrate a comparator, or correct measurements."
+)
+comparator_app.command("calibrate")(comparator.comparator)
+comparator_app.command("correct")(comparator.correct)
 app.add_typer(giant_app)
-app.command()(simulate.simulate)
-app.command()(plan.plan)
+app.add_typer(comparator_app)
 app.command("perspective-center")(perspective_center.perspective_center)
+app.command()(plan.plan)
+app.command()(simulate.simulate)
 
 
 def main() -> None:

@@ -1,4 +1,5 @@
 //! The photogrammetric models.
 
 pub mod block;
+pub mod comparator;
 pub mod resection;

@@ -1,0 +1,98 @@
+"""Put the numbers of the packaged example into docs/comparator.md.
+
+    python docs/comparator_numbers.py
+
+Blocks between `<!-- numbers: NAME -->` and `<!-- end -->` are made anew from the calibration of the example.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import cache
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import numpy as np
+
+from photogram import comparator
+from photogram.comparator.listing.joint import tests_page
+from photogram.comparator.listing.parameters import combined_linear_page
+from photogram.comparator.listing.summary import variance_lines
+from photogram.comparator.rigid import fit_rigid
+
+PAGE = Path(__file__).with_name("comparator.md")
+BLOCK = re.compile(r"(<!-- numbers: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+@cache
+def calibration() -> comparator.Calibration:
+    """Calibrate the packaged example."""
+    with as_file(files("photogram") / "examples" / "comparator" / "comparator-3.txt") as path:
+        return comparator.calibrate(comparator.read([path])[0])
+
+
+def joint_lines() -> list[str]:
+    """Compare the parameters of the report's method with those of the joint adjustment."""
+    own, joint = calibration().correction, calibration().joint
+    if joint is None:
+        raise RuntimeError("the example has a joint adjustment")
+    plate = joint.plates[1320]
+    sd = joint.covariance.diagonal() ** 0.5
+    return [
+        f"{'':26}{'report':>12}{'joint':>12}{'sd':>10}",
+        f"{'scale x - 1, um/m':26}{1e6 * (own.scale_x - 1):12.3f}"
+        f"{1e6 * (joint.correction.scale_x - 1):12.3f}{1e6 * sd[0]:10.3f}",
+        f"{'scale y - 1, um/m':26}{1e6 * (own.scale_y - 1):12.3f}"
+        f"{1e6 * (joint.correction.scale_y - 1):12.3f}{1e6 * sd[1]:10.3f}",
+        f"{'random comparator, um':26}{calibration().variance.random:12.3f}{joint.random_um:12.3f}",
+        f"{'sigma of unit weight':26}{'':12}{joint.sigma0:12.4f}",
+        f"{'grid variance ratio':26}{'':12}{plate.variance_ratio:12.3f}",
+        f"corrected coordinates of both differ by {_difference(own, joint.correction):.2f} um"
+        " (rms, after a rigid fit)",
+        f"weighted mean and joint adjustment under the report's assumptions agree within {_check()} sd",
+    ]
+
+
+def _difference(first: comparator.Correction, second: comparator.Correction) -> float:
+    """Return the root mean square difference of corrected coordinates at all places measured."""
+    places = np.vstack([case.placed.means_um for case in calibration().cases])
+    fit = fit_rigid(np.arange(len(places)), first.apply(places), second.apply(places))
+    return float(np.sqrt((fit.residuals.grid_um**2).mean()))
+
+
+def _check() -> str:
+    """Return the next power of ten: the digits of a difference that small are chance."""
+    return f"{10.0 ** math.ceil(math.log10(calibration().joint_check or 1.0)):g}"
+
+
+def grid_lines() -> list[str]:
+    """Show the three estimates of the grid's standard deviation."""
+    result = calibration().plates[1320]
+    return [
+        f"listing      {result.listed.grid_um:.3f} um",
+        f"equation 64  {result.text_um:.3f} um",
+        f"unbiased     {result.unbiased_um:.3f} um",
+        f"a priori     {calibration().session.grids[1320].sigma_um:.3f} um",
+    ]
+
+
+def numbers(name: str) -> list[str]:
+    """Return the lines of a block."""
+    made = {
+        "variance": lambda: variance_lines(calibration()),
+        "linear": lambda: combined_linear_page(calibration())[2:],
+        "tests": lambda: tests_page(calibration())[2:],
+        "joint": joint_lines,
+        "grid": grid_lines,
+    }
+    return [line.rstrip() for line in made[name]()]
+
+
+def regenerated(page: str) -> str:
+    """Return the page with all blocks made anew."""
+    return BLOCK.sub(lambda m: "\n".join([f"{m[1]}```text", *numbers(m[2]), "```", m[3]]), page)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(regenerated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

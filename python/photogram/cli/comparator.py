@@ -1,0 +1,228 @@
+"""`photogram comparator`: calibrate a comparator from a grid plate, and correct measurements."""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack
+from enum import StrEnum
+from importlib.resources import as_file, files
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from photogram.cli.console import errors, failures, output
+
+if TYPE_CHECKING:
+    from photogram.comparator import Calibration, Options
+
+__all__ = ["comparator", "correct"]
+
+EXAMPLE = "comparator-3.txt"
+"""The packaged example, a deck of photogram.examples.comparator."""
+
+
+class Hand(StrEnum):
+    """Handedness of the comparator against the plate."""
+
+    FILE = "file"
+    LEFT = "left"
+    RIGHT = "right"
+
+
+def comparator(
+    paths: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="FILE...",
+            help="Tables (*.csv) of one calibration; or files of decks of cards, one calibration a deck.",
+            show_default=False,
+        ),
+    ] = None,
+    example: Annotated[
+        bool,
+        typer.Option("--example", help="Calibrate the packaged example instead: four cases on grid 1320."),
+    ] = False,
+    grid: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="GRID",
+            help="Grid plate: 773, 1320, 778 or a file (point, x_um, y_um); again for more plates."
+            " Default: as the files say.",
+            show_default=False,
+        ),
+    ] = None,
+    hand: Annotated[
+        Hand, typer.Option(help="Handedness of the comparator against the plate; the data must agree.")
+    ] = Hand.FILE,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OUT",
+            help="Directory for the results. Default: FILE-calibrated beside the first FILE.",
+            show_default=False,
+        ),
+    ] = None,
+    json: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write everything as one JSON document (a list of them for several decks).",
+            show_default=False,
+        ),
+    ] = None,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf instead of report.html.")] = False,
+    pictures: Annotated[
+        bool, typer.Option("--pictures/--no-pictures", help="Write the report with pictures.")
+    ] = True,
+    as_published: Annotated[
+        bool,
+        typer.Option(
+            "--as-published", help="Compute as the program of 1971 where it departs from its report."
+        ),
+    ] = False,
+    polynomial: Annotated[
+        bool, typer.Option("--polynomial/--linear-only", help="Fit correction polynomials of fourth degree.")
+    ] = True,
+    estimate_grid: Annotated[
+        bool,
+        typer.Option("--estimate-grid", help="Estimate the accuracy of the grid in the joint adjustment."),
+    ] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Remarks on the measurements are errors.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+) -> None:
+    """Calibrate a comparator from measurements of a grid plate.
+
+    Writes listing.txt, report.html (pictures), correction.json and the corrected grid of each plate.
+    """
+    if example == bool(paths):
+        raise typer.BadParameter("give files, or --example", param_hint="FILE")
+    with failures(), ExitStack() as resources:
+        from photogram.comparator import Options, calibrate, find_grid, read
+        from photogram.errors import InputError
+        from photogram.files import write_whole
+
+        if example:
+            packaged = files("photogram") / "examples" / "comparator" / EXAMPLE
+            paths = [resources.enter_context(as_file(packaged))]
+            out = out or Path("comparator-calibrated")
+        left_handed = None if hand is Hand.FILE else hand is Hand.LEFT
+        sessions = read(paths or [], [find_grid(name) for name in grid or []], left_handed=left_handed)
+        options = Options.as_published() if as_published else Options()
+        options = _with(options, polynomial, estimate_grid)
+        calibrations = [calibrate(session, options) for session in sessions]
+        if strict:
+            for message in (message for one in calibrations for message in one.messages):
+                raise InputError(
+                    message.text, file=message.file, record=message.record, text=message.record_text
+                )
+        folder = out or _beside((paths or [])[0])
+        written = _results(calibrations, folder, pdf=pdf, pictures=pictures, quiet=quiet)
+        if json is not None:
+            written[json] = _documents(calibrations)
+        write_whole(written)
+        if not quiet:
+            for calibration in calibrations:
+                _summarize(calibration)
+            output.print("written: " + escape(", ".join(str(path) for path in written)))
+
+
+def _with(options: Options, polynomial: bool, estimate_grid: bool) -> Options:
+    from dataclasses import replace
+
+    return replace(options, polynomial=polynomial, estimate_grid=estimate_grid)
+
+
+def _beside(path: Path) -> Path:
+    """Return the directory for the results: beside the input, or here where that is read-only."""
+    place = path.resolve()
+    parent = place.parent if os.access(place.parent, os.W_OK) else Path()
+    return parent / f"{place.stem}-calibrated"
+
+
+def _results(
+    calibrations: list[Calibration], folder: Path, *, pdf: bool, pictures: bool, quiet: bool
+) -> dict[Path, bytes]:
+    """Make everything that goes to the output directory, before anything is written."""
+    from photogram.comparator import listing
+    from photogram.comparator.gridfile import corrected_grid
+
+    if pictures and find_spec("matplotlib") is None:
+        pictures = False
+        if not quiet:
+            errors.print("[yellow]remark:[/] " + escape("no pictures: pip install 'photogram[plots]'"))
+    written: dict[Path, bytes] = {}
+    for number, calibration in enumerate(calibrations, 1):
+        place = folder if len(calibrations) == 1 else folder / str(number)
+        written[place / "listing.txt"] = listing(calibration).encode()
+        written[place / "correction.json"] = calibration.correction.to_json()
+        if calibration.joint:
+            written[place / "correction-joint.json"] = calibration.joint.correction.to_json()
+        for plate in calibration.plates:
+            written[place / f"grid-{plate}.csv"] = corrected_grid(calibration, plate).to_csv()
+        if pictures:
+            from photogram.comparator.pictures import html_report, pdf_report
+
+            name, make = ("report.pdf", pdf_report) if pdf else ("report.html", html_report)
+            written[place / name] = make(calibration)
+    return written
+
+
+def _documents(calibrations: list[Calibration]) -> bytes:
+    from photogram.comparator import to_json
+
+    documents = [to_json(calibration) for calibration in calibrations]
+    return documents[0] if len(documents) == 1 else b"[" + b",\n".join(documents) + b"]\n"
+
+
+def _summarize(calibration: Calibration) -> None:
+    """Print remarks, the analysis of variance and the linear parameters."""
+    from photogram.comparator.listing.summary import summary_page
+
+    session = calibration.session
+    output.print(f"[bold]Comparator {session.comparator}, {len(calibration.cases)} cases[/]")
+    for message in calibration.messages:
+        output.print(f"  [yellow]remark:[/] {escape(message.text)}")
+    for line in summary_page(calibration)[4:]:
+        output.print(escape(line))
+    if calibration.joint:
+        joint = calibration.joint
+        output.print(
+            f"  JOINT ADJUSTMENT: STANDARD ERROR OF UNIT WEIGHT {joint.sigma0:.4f},"
+            f" RANDOM COMPARATOR {joint.random_um:.3f} MICRONS"
+        )
+
+
+def correct(
+    correction: Annotated[
+        Path,
+        typer.Argument(metavar="CORRECTION", help="correction.json, or the JSON document of a calibration."),
+    ],
+    measurements: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Table with columns x_um, y_um (or x_mm, y_mm).")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="OUT", help="Table to write. Default: standard output.", show_default=False),
+    ] = None,
+    invert: Annotated[
+        bool, typer.Option("--invert", help="Turn corrected coordinates back into readings.")
+    ] = False,
+) -> None:
+    """Correct measurements by a calibration.
+
+    Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (what the calibration contributes).
+    """
+    with failures():
+        from photogram.comparator.apply import correct_table
+        from photogram.comparator.correction import Correction
+        from photogram.comparator.csvfile import read_table
+        from photogram.files import write_whole
+
+        made = correct_table(Correction.read(correction), read_table(measurements), invert=invert)
+        if out is None:
+            typer.echo(made.decode(), nl=False)
+        else:
+            write_whole({out: made})

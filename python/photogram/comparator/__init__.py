@@ -1,0 +1,51 @@
+"""Complete calibration of a measuring comparator from a grid plate (Fritz, NOAA TR NOS 57, 1973).
+
+session = comparator.read(["measurements.csv"])[0]
+calibration = comparator.calibrate(session)
+calibration.correction.apply(xy_um)
+"""
+
+from photogram.comparator.calibration import Calibration, CaseResult, PlateResult, Pointing, calibrate
+from photogram.comparator.cards import read_cards, to_cards
+from photogram.comparator.correction import Correction
+from photogram.comparator.decomposition import Decomposition
+from photogram.comparator.document import to_json
+from photogram.comparator.grid import Grid, built_in_grid, find_grid, read_grid
+from photogram.comparator.listing import listing
+from photogram.comparator.options import Options
+from photogram.comparator.polynomial import Frame, Polynomial
+from photogram.comparator.readings import Case, Place, Reading, Session, collect_cases
+from photogram.comparator.simulation import Simulation, simulate_calibration
+from photogram.comparator.source import read
+from photogram.comparator.tables import read_csv, to_csv
+
+__all__ = [
+    "Calibration",
+    "Case",
+    "CaseResult",
+    "Correction",
+    "Decomposition",
+    "Frame",
+    "Grid",
+    "Options",
+    "Place",
+    "PlateResult",
+    "Pointing",
+    "Polynomial",
+    "Reading",
+    "Session",
+    "Simulation",
+    "built_in_grid",
+    "calibrate",
+    "collect_cases",
+    "find_grid",
+    "listing",
+    "read",
+    "read_cards",
+    "read_csv",
+    "read_grid",
+    "simulate_calibration",
+    "to_cards",
+    "to_csv",
+    "to_json",
+]

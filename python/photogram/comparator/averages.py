@@ -1,0 +1,133 @@
+"""Average residuals by grid point and by comparator location (subroutine AVGRES)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.comparator.orientation import exchanged, locations
+
+if TYPE_CHECKING:
+    from photogram.adjusted import Floats
+    from photogram.comparator.grid import Grid
+    from photogram.comparator.placed import PlacedCase
+    from photogram.comparator.readings import Integers
+    from photogram.comparator.residuals import Residuals
+
+__all__ = ["PlateAverages", "average_residuals"]
+
+
+@dataclass(frozen=True, eq=False)
+class PlateAverages:
+    """Average residuals of the cases of one plate, in the axes of its first case.
+
+    X and Y are exchanged against the axes of the plate where that case is left-handed (`left_handed`), as the
+    report prints them.
+
+    Attributes
+    ----------
+    plate
+        Number of the plate.
+    left_handed
+        Whether X and Y are exchanged.
+    cases
+        Numbers of the cases.
+    points
+        (l,) points of the plate that were measured.
+    counts
+        (l,) in how many cases.
+    grid_um
+        (l, 2) averages of the grid residuals by point: the corrections of the grid.
+    squares_um2
+        (2,) sums of squares of all grid residuals in X and in Y.
+    locations, location_um
+        Numbers of the comparator locations, and averages of the comparator residuals there; None where the
+        pattern of the plate does not meet itself when the plate is turned.
+    xy_um
+        (l, 2) coordinates of the last case with corner 1 nearest the comparator's zero, else of the last
+        case; NaN where missing.
+    """
+
+    plate: int
+    left_handed: bool
+    cases: tuple[int, ...]
+    points: Integers
+    counts: Integers
+    grid_um: Floats
+    squares_um2: Floats
+    locations: Integers | None
+    location_um: Floats | None
+    xy_um: Floats
+
+    @property
+    def corrections_um(self) -> Floats:
+        """(l, 2) corrections of the grid in the axes of the plate: to be added to the given coordinates."""
+        return exchanged(self.grid_um, self.left_handed)
+
+
+def average_residuals(
+    grid: Grid, cases: Sequence[PlacedCase], residuals: Sequence[Residuals]
+) -> PlateAverages:
+    """Average the residuals of all cases of one plate.
+
+    Parameters
+    ----------
+    grid
+        The plate.
+    cases, residuals
+        Its cases, and the residuals of one stage of the adjustment.
+    """
+    left_handed = cases[0].orientation.left_handed
+    rows = [grid.rows_of(case.points) for case in cases]
+    values = [
+        exchanged(own.grid_um, case.orientation.left_handed != left_handed)
+        for case, own in zip(cases, residuals, strict=True)
+    ]
+    all_rows, all_values = np.concatenate(rows), np.vstack(values)
+    counts = np.bincount(all_rows, minlength=len(grid.points))
+    measured = np.flatnonzero(counts)
+    numbers, location_um = _by_location(grid, cases, residuals)
+    last = max(range(len(cases)), key=lambda k: (cases[k].orientation.corner == 1, k))
+    xy = np.full((len(grid.points), 2), np.nan)
+    xy[rows[last]] = residuals[last].xy_um
+    return PlateAverages(
+        plate=grid.number,
+        left_handed=left_handed,
+        cases=tuple(case.number for case in cases),
+        points=grid.points[measured],
+        counts=counts[measured],
+        grid_um=_means(all_rows, all_values, len(grid.points))[measured],
+        squares_um2=(all_values**2).sum(axis=0),
+        locations=numbers,
+        location_um=location_um,
+        xy_um=xy[measured],
+    )
+
+
+def _by_location(
+    grid: Grid, cases: Sequence[PlacedCase], residuals: Sequence[Residuals]
+) -> tuple[Integers | None, Floats | None]:
+    maps = {case.orientation.corner: locations(grid, case.orientation.corner) for case in cases}
+    rows, values = [], []
+    for case, own in zip(cases, residuals, strict=True):
+        numbers = maps[case.orientation.corner]
+        if numbers is None:
+            return None, None
+        rows.append(grid.rows_of(numbers[grid.rows_of(case.points)]))
+        values.append(own.comparator_um)
+    means = _means(np.concatenate(rows), np.vstack(values), len(grid.points))
+    measured = np.isfinite(means[:, 0])
+    return grid.points[measured], means[measured]
+
+
+def _means(rows: Integers, values: Floats, count: int) -> Floats:
+    """Average values by row; NaN where there are none."""
+    counts = np.bincount(rows, minlength=count)
+    sums = np.column_stack([np.bincount(rows, weights=values[:, axis], minlength=count) for axis in range(2)])
+    means: Floats = np.divide(
+        sums, counts[:, np.newaxis], out=np.full(sums.shape, np.nan), where=counts[:, None] > 0
+    )
+    return means

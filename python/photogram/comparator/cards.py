@@ -1,0 +1,341 @@
+"""The punched cards of the program CALIB: header, data and special grid cards (NOAA TR NOS 57, section II).
+
+A deck is a header card, data cards in the order measured, one blank card. Decks follow each other; a header
+with comparator number 0 (a blank card) ends the job. Blanks in numbers count as zeros, as on the CDC 6600.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid
+from photogram.comparator.readings import Place, Reading, Session, collect_cases
+from photogram.errors import InputError
+from photogram.giant.records import Record, Source
+from photogram.messages import Message
+
+__all__ = ["Header", "join_least_count", "read_cards", "to_cards"]
+
+SPECIAL_GRID = 3
+CASES = 20
+"""Cases that a header names operators for."""
+
+
+@dataclass(frozen=True)
+class Header:
+    """The header card, FORMAT (5I1,I2,A1,1X,20I3,2X,A8,I1).
+
+    Attributes
+    ----------
+    left_handed, sorted_input
+        Columns 1 and 2.
+    other_least_count
+        Column 3: the least count is not one micrometre (on comparator 11, unit digits are read apart).
+    skip_card
+        Column 4: one card is passed over before the data.
+    plot_each_case
+        Column 5, as the text has it (the listing does the reverse).
+    comparator
+        Columns 6-7; 0 ends the job.
+    secondary
+        Column 8 holds R: the right stage of a stereocomparator.
+    operators
+        Columns 10-69: operator of each case, 0 for none.
+    date
+        Columns 72-79.
+    master
+        Column 80: 0 grid 773, 1 grid 1320, 2 grid 778, 3 special coordinates follow.
+    """
+
+    left_handed: bool
+    sorted_input: bool
+    other_least_count: bool
+    skip_card: bool
+    plot_each_case: bool
+    comparator: int
+    secondary: bool
+    operators: tuple[int, ...]
+    date: str
+    master: int
+
+    @property
+    def special_grid_number(self) -> int:
+        """Number of a special grid: the operators of cases 19 and 20 hold it."""
+        return 1000 * self.operators[18] + self.operators[19]
+
+
+@dataclass(frozen=True)
+class _Format:
+    """Columns (first, last) of a data card; x and y are Fw.d with `decimals` in metres."""
+
+    plate_case: tuple[int, int]
+    leg: int
+    point: tuple[int, int]
+    x: tuple[int, int]
+    y: tuple[int, int]
+    decimals: int
+    plate: tuple[int, int] | None = None
+
+
+STANDARD = _Format((3, 7), 8, (9, 10), (12, 21), (22, 31), 8)
+"""Formats 122 and, with the centre of the range behind it, 143."""
+SECONDARY = _Format((3, 7), 8, (9, 10), (32, 41), (42, 51), 8)
+"""Format 146: right stage of the STK1."""
+PSK_LEFT = _Format((2, 3), 4, (5, 6), (20, 25), (30, 35), 6, plate=(8, 10))
+"""Format 123."""
+PSK_RIGHT = _Format((6, 7), 8, (9, 10), (40, 45), (50, 55), 6, plate=(2, 5))
+"""Format 124."""
+LEAST_COUNT = _Format((5, 7), 8, (9, 10), (11, 19), (20, 29), 6)
+"""Subroutine MICRON: unit digits read apart in columns 3 and 4."""
+
+
+def _integer(record: Record, first: int, last: int) -> int:
+    """Read an Iw field with blanks as zeros."""
+    digits = record.columns(first, last).ljust(last - first + 1).lstrip(" ").replace(" ", "0")
+    if digits and not (digits.isascii() and digits.isdigit()):
+        raise record.error(f"columns {first}-{last}: {record.columns(first, last)!r} is not a whole number")
+    return int(digits or 0)
+
+
+def _micrometres(record: Record, columns: tuple[int, int], decimals: int) -> float:
+    """Read an Fw.d field in metres, blanks as zeros, as micrometres."""
+    first, last = columns
+    text = record.columns(first, last).ljust(last - first + 1).lstrip(" ")
+    sign, digits = (-1, text[1:]) if text.startswith("-") else (1, text.removeprefix("+"))
+    whole, point, fraction = digits.partition(".")
+    figures = (whole + fraction).replace(" ", "0")
+    if figures and not (figures.isascii() and figures.isdigit()):
+        raise record.error(f"columns {first}-{last}: {record.columns(first, last)!r} is not a number")
+    places = len(fraction) if point else decimals
+    return sign * int(figures or 0) * 1e6 / float(10**places)
+
+
+def _header(record: Record) -> Header:
+
+    def flag(column: int) -> bool:
+        return _integer(record, column, column) != 0
+
+    header = Header(
+        left_handed=flag(1),
+        sorted_input=flag(2),
+        other_least_count=flag(3),
+        skip_card=flag(4),
+        plot_each_case=flag(5),
+        comparator=_integer(record, 6, 7),
+        secondary=record.columns(8, 8) == "R",
+        operators=tuple(_integer(record, 10 + 3 * case, 12 + 3 * case) for case in range(CASES)),
+        date=record.columns(72, 79).strip(" "),
+        master=_integer(record, 80, 80),
+    )
+    if header.comparator > 15:
+        raise record.error(f"columns 6-7: there is no comparator {header.comparator}")
+    if header.master > SPECIAL_GRID:
+        raise record.error(f"column 80: there is no master grid {header.master}")
+    return header
+
+
+def _format(header: Header) -> _Format:
+    """Return the format of the data cards (numbers of comparators: report, section II)."""
+    if header.secondary:
+        return SECONDARY
+    if header.comparator == 11 and header.other_least_count:
+        return LEAST_COUNT
+    return {12: PSK_LEFT, 13: PSK_RIGHT}.get(header.comparator, STANDARD)
+
+
+def join_least_count(coarse: int, unit: int) -> int:
+    """Join a coarse reading with its unit digit that was read apart (subroutine MICRON).
+
+    The digit decides; the coarse reading is moved by at most five units to agree with it.
+    """
+    tens, digit = divmod(coarse, 10)
+    if abs(digit - unit) <= 5:
+        return 10 * tens + unit
+    return 10 * tens + unit + (10 if unit < digit else -10)
+
+
+def _plate_case(record: Record, columns: tuple[int, int]) -> tuple[int, int]:
+    """Split KASE, 100 x plate + case.
+
+    It may stand to the left of its field; the program then read a zero behind it and printed 20020 for 2002.
+    """
+    first, last = columns
+    digits = record.columns(first, last).strip(" ")
+    if len(digits) == 5 and digits.endswith("0"):
+        digits = digits[:-1]
+    if not (digits.isascii() and digits.isdigit()):
+        raise record.error(
+            f"columns {first}-{last}: {record.columns(first, last)!r} is no plate and case number"
+        )
+    return int(digits[:-2] or 0), int(digits[-2:])
+
+
+class _Deck:
+    """The cards of one calibration, read from its header on."""
+
+    def __init__(self, cards: Iterator[Record], header: Header, first: Record, grids: Iterable[Grid]) -> None:
+        self.header = header
+        self.first = first
+        self.cards = cards
+        self.messages: list[Message] = []
+        given = list(grids)
+        own = self._special_grid() if header.master == SPECIAL_GRID else None
+        master = own or built_in_grid(BUILT_IN[min(header.master, 2)])
+        self.grids = {grid.number: grid for grid in (given or [master])}
+        if own is not None:
+            self.messages.append(_message(first, f"SPECIAL MASTER GRID NO. {own.number} COORDINATES USED"))
+
+    def _special_grid(self) -> Grid:
+        """Read the cards of a special grid; a mark in column 80 is on the last one."""
+        points, xy = [], []
+        for card in self.cards:
+            points.append(_integer(card, *STANDARD.point))
+            xy.append([_micrometres(card, columns, 8) for columns in (STANDARD.x, STANDARD.y)])
+            if not card.blank(80, 80):
+                return Grid(self.header.special_grid_number, np.array(points), np.array(xy))
+        raise self.first.error("the special grid has no last card: none is marked in column 80")
+
+    def session(self) -> Session:
+        if self.header.skip_card:
+            next(self.cards, None)
+        layout = _format(self.header)
+        readings: list[Reading] = []
+        for card in self.cards:
+            if card.blank(1, 80):
+                break
+            reading = self._reading(card, layout)
+            if reading.xy_um == (0.0, 0.0):
+                self.messages.append(
+                    _message(card, f"point {reading.point} is missing: both readings are zero")
+                )
+            else:
+                readings.append(reading)
+        session = Session(
+            cases=collect_cases(readings),
+            grids=self.grids,
+            comparator=self.header.comparator,
+            secondary=self.header.secondary,
+            date=self.header.date,
+            left_handed=self.header.left_handed,
+            sorted_input=self.header.sorted_input,
+            least_count_one_micrometre=not self.header.other_least_count,
+            plot_each_case=self.header.plot_each_case,
+            source=self.first.source.path,
+            messages=self.messages,
+        )
+        if not session.cases:
+            raise self.first.error("no measurements follow this header")
+        session.check()
+        return session
+
+    def _reading(self, card: Record, layout: _Format) -> Reading:
+        plate, case = _plate_case(card, layout.plate_case)
+        if layout.plate is not None:
+            plate = _integer(card, *layout.plate)
+        if not 1 <= case <= CASES:
+            raise card.error(f"case {case}: cases are numbered 1 to {CASES}")
+        leg = _integer(card, layout.leg, layout.leg)
+        if leg > 4:
+            raise card.error(f"leg {leg}: legs are numbered 1 to 4, and 0 is the intersection")
+        xy = [_micrometres(card, columns, layout.decimals) for columns in (layout.x, layout.y)]
+        if layout is LEAST_COUNT:
+            xy = [float(join_least_count(round(xy[k]), _integer(card, 3 + k, 3 + k))) for k in range(2)]
+        return Reading(
+            plate=self._plate(card, plate),
+            case=case,
+            operator=self.header.operators[case - 1],
+            leg=leg,
+            point=_integer(card, *layout.point),
+            xy_um=(xy[0], xy[1]),
+            place=_place(card),
+        )
+
+    def _plate(self, card: Record, digits: int) -> int:
+        """Return the number of the plate whose last digits a card holds; blank means the only one."""
+        if digits == 0 and len(self.grids) == 1:
+            return next(iter(self.grids))
+        found = [number for number in self.grids if digits in (number, number % 100)]
+        if len(found) != 1:
+            listed = ", ".join(str(number) for number in self.grids)
+            raise card.error(f"plate {digits:02d} is not that of the header ({listed})")
+        return found[0]
+
+
+def _place(record: Record) -> Place:
+    return Place(record.source.path, record.number, record.text)
+
+
+def _message(record: Record, text: str) -> Message:
+    return _place(record).message(text)
+
+
+def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | None = None) -> list[Session]:
+    """Read the decks of a file.
+
+    Parameters
+    ----------
+    path
+        The file: 80 columns a record.
+    grids
+        Plates, instead of the one that a header names.
+    left_handed
+        Whether the comparator is left-handed against the plate, instead of what the headers say.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or a card cannot be understood; the message names the record.
+    """
+    source = Source.read(path)
+    cards = (source.record(number) for number in range(1, len(source.lines) + 1))
+    sessions = []
+    for first in cards:
+        header = _header(first)
+        if header.comparator == 0:
+            break
+        session = _Deck(cards, header, first, list(grids)).session()
+        sessions.append(session if left_handed is None else replace(session, left_handed=left_handed))
+    if not sessions:
+        raise InputError("holds no deck: the first card is no header with a comparator number", file=path)
+    return sessions
+
+
+def to_cards(session: Session) -> bytes:
+    """Return a session as a deck in the standard format 122, with the blank card behind it.
+
+    Raises
+    ------
+    InputError
+        The session has another plate than one of the three master grids, or does not fit the columns.
+    """
+    number = next(iter(session.grids))
+    if len(session.grids) != 1 or number not in BUILT_IN:
+        raise InputError("a deck holds one of the master grids 773, 1320, 778")
+    operators = {case.number: case.operator for case in session.cases}
+    if not all(1 <= case <= CASES for case in operators):
+        raise InputError(f"a deck holds cases 1 to {CASES}")
+    flags = "".join(
+        str(int(bool(flag)))
+        for flag in (
+            session.left_handed,
+            session.sorted_input,
+            not session.least_count_one_micrometre,
+            False,
+            session.plot_each_case,
+        )
+    )
+    named = "".join(f"{operators.get(case, 0):3d}" for case in range(1, CASES + 1))
+    stage = "R" if session.secondary else " "
+    lines = [f"{flags}{session.comparator:2d}{stage} {named}  {session.date:8.8}{BUILT_IN.index(number)}"]
+    for case in session.cases:
+        kase = 100 * (number % 100) + case.number
+        rows = zip(case.legs.tolist(), case.points.tolist(), case.xy_um.tolist(), strict=True)
+        lines += [
+            f"  {kase:5d}{leg:1d}{point:2d} {round(x * 100):10d}{round(y * 100):10d}"
+            for leg, point, (x, y) in rows
+        ]
+    return ("\n".join([*lines, ""]) + "\n").encode()

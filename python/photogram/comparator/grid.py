@@ -1,0 +1,149 @@
+"""Grid plates: built in, from a file, or made square."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.comparator.csvfile import read_table
+from photogram.errors import InputError
+
+if TYPE_CHECKING:
+    from photogram.adjusted import Floats
+    from photogram.comparator.readings import Integers
+
+__all__ = ["BUILT_IN", "Grid", "built_in_grid", "find_grid", "read_grid"]
+
+BUILT_IN = (773, 1320, 778)
+"""The master grids of the program, in the order of its option MASTER (0, 1, 2)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A grid plate.
+
+    Attributes
+    ----------
+    number
+        Of the plate.
+    points
+        (l,) point numbers.
+    xy_um
+        (l, 2) calibrated coordinates in the axes of the plate, micrometres.
+    sigma_um
+        Standard deviation of a calibrated coordinate; None where it is not known.
+    adopted
+        Date of the calibration, as text.
+    """
+
+    number: int
+    points: Integers
+    xy_um: Floats
+    sigma_um: float | None = None
+    adopted: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse plates that cannot be."""
+        values, counts = np.unique(self.points, return_counts=True)
+        if (counts > 1).any():
+            raise InputError(f"plate {self.number} has point {values[counts > 1][0]} twice")
+        if self.xy_um.shape != (len(self.points), 2) or not np.isfinite(self.xy_um).all():
+            raise InputError(f"plate {self.number} needs two coordinates for each of its points")
+        if self.sigma_um is not None and not 0 <= self.sigma_um < np.inf:
+            raise InputError(f"plate {self.number}: {self.sigma_um} um is no standard deviation")
+
+    @classmethod
+    def square(
+        cls, columns: int = 5, spacing_um: float = 50_000.0, number: int = 1, sigma_um: float | None = None
+    ) -> Grid:
+        """Return a plate of `columns` x `columns` points, centred, numbered along +X, then +Y."""
+        steps = (np.arange(columns) - (columns - 1) / 2) * spacing_um
+        y, x = np.meshgrid(steps, steps, indexing="ij")
+        return cls(
+            number, np.arange(1, columns**2 + 1), np.column_stack([x.ravel(), y.ravel()]), sigma_um=sigma_um
+        )
+
+    def rows_of(self, points: Integers) -> Integers:
+        """Return the rows of points, which must all be on the plate."""
+        order = np.argsort(self.points)
+        rows: Integers = order[np.searchsorted(self.points, points, sorter=order)]
+        return rows
+
+    def to_csv(self) -> bytes:
+        """Return the plate as the file that :func:`read_grid` reads."""
+        lines = [f"# grid = {self.number}"]
+        lines += [f"# adopted = {self.adopted}"] if self.adopted else []
+        lines += [f"# sigma_um = {self.sigma_um:g}"] if self.sigma_um is not None else []
+        rows = zip(self.points.tolist(), self.xy_um.tolist(), strict=True)
+        lines += ["point,x_um,y_um", *(f"{point},{x!r},{y!r}" for point, (x, y) in rows)]
+        return ("\n".join(lines) + "\n").encode()
+
+
+def read_grid(path: Path) -> Grid:
+    """Read a plate: columns point, x_um, y_um (or x_mm, y_mm); `# grid = number`, `# sigma_um = ...` above.
+
+    Points with a blank coordinate are left out.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is not such a table.
+    """
+    table = read_table(path)
+    table.require("point")
+    points, xy = [], []
+    for row in table.rows:
+        coordinates = table.coordinates_um(row)
+        if coordinates is not None:
+            points.append(row.integer("point"))
+            xy.append(coordinates)
+    number = table.integer_setting("grid", 0)
+    sigma = table.settings.get("sigma_um")
+    try:
+        return Grid(
+            number,
+            np.array(points, dtype=np.int64),
+            np.array(xy, dtype=float).reshape(-1, 2),
+            None if sigma is None else float(sigma),
+            table.settings.get("adopted", ""),
+        )
+    except InputError as error:
+        raise InputError(error.message, file=path) from None
+    except ValueError:
+        raise InputError(f"sigma_um = {sigma!r} is not a number", file=path) from None
+
+
+@cache
+def built_in_grid(number: int) -> Grid:
+    """Return a master grid of the program: 773, 1320 or 778.
+
+    Point 11 of 773 and point 13 of 778 are missing: a digit or sign of them is not legible in the report.
+
+    Raises
+    ------
+    InputError
+        There is no such plate.
+    """
+    if number not in BUILT_IN:
+        listed = ", ".join(str(known) for known in BUILT_IN)
+        raise InputError(f"there is no built-in grid {number}; there are {listed}")
+    with as_file(files("photogram.comparator") / "grids" / f"{number}.csv") as path:
+        return read_grid(path)
+
+
+def find_grid(name: str) -> Grid:
+    """Return the plate that a word of the command line means: a built-in number, or a file.
+
+    Raises
+    ------
+    InputError
+        It is neither.
+    """
+    if name.isdigit() and not Path(name).exists():
+        return built_in_grid(int(name))
+    return read_grid(Path(name))

@@ -1,0 +1,80 @@
+"""The text listing, page by page as the program of 1971 printed it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photogram.comparator.listing.averages import averages_page
+from photogram.comparator.listing.correction import correction_table
+from photogram.comparator.listing.input import input_page, title_page
+from photogram.comparator.listing.joint import joint_page, tests_page
+from photogram.comparator.listing.parameters import (
+    case_linear_page,
+    case_polynomial_page,
+    combined_linear_page,
+    combined_polynomial_page,
+)
+from photogram.comparator.listing.pointing import pointing_pages
+from photogram.comparator.listing.residuals import residual_page
+from photogram.comparator.listing.summary import summary_page
+
+if TYPE_CHECKING:
+    from photogram.comparator.calibration import Calibration, CaseResult
+
+__all__ = ["listing"]
+
+STAGES = {
+    "case_linear": "AVERAGE RESIDUALS AFTER INDIVIDUAL LINEAR ADJUSTMENTS",
+    "case_nonlinear": "AVERAGE RESIDUALS AFTER INDIVIDUAL LINEAR AND NONLINEAR ADJUSTMENTS",
+    "linear": "AVERAGE RESIDUALS AFTER APPLICATION OF FINAL LINEAR CALIBRATION CORRECTIONS",
+    "nonlinear": "AVERAGE RESIDUALS AFTER APPLICATION OF ALL FINAL CALIBRATION CORRECTIONS",
+}
+
+
+def listing(calibration: Calibration) -> str:
+    """Return the listing of a calibration; pages begin with a form feed, but for the first."""
+    pages = [title_page(calibration)]
+    pages += [input_page(case) for case in calibration.cases]
+    pages += pointing_pages(calibration)
+    for case in calibration.cases:
+        pages += _case_pages(calibration, case)
+    pages += _averages(calibration, "case_linear", "case_nonlinear")
+    pages.append(combined_linear_page(calibration))
+    pages += [
+        residual_page(f"CASE NUMBER {case.number} WITH FINAL LINEAR CORRECTIONS", case, fit.residuals)
+        for case, fit in zip(calibration.cases, calibration.linear.cases, strict=True)
+    ]
+    if calibration.nonlinear:
+        pages += [combined_polynomial_page(calibration), correction_table(calibration)]
+        pages += [
+            residual_page(f"CASE NUMBER {case.number} WITH ALL FINAL CORRECTIONS", case, fit.residuals)
+            for case, fit in zip(calibration.cases, calibration.nonlinear.cases, strict=True)
+        ]
+    pages += _averages(calibration, "linear", "nonlinear")
+    pages += [summary_page(calibration), tests_page(calibration)]
+    if calibration.joint:
+        pages.append(joint_page(calibration, calibration.joint))
+    return "\f\n".join("\n".join(line.rstrip() for line in page) + "\n" for page in pages)
+
+
+def _case_pages(calibration: Calibration, case: CaseResult) -> list[list[str]]:
+    """Free, linear and polynomial adjustment of one case."""
+    pages = [
+        residual_page(
+            f"CASE NUMBER {case.number} FREE ADJUSTMENT (ROTATION AND TRANSLATION)", case, case.free.residuals
+        ),
+        case_linear_page(case),
+    ]
+    if case.polynomial:
+        pages.append(case_polynomial_page(case, case.polynomial))
+        if calibration.session.plot_each_case:
+            pages.append(correction_table(calibration, case))
+    return pages
+
+
+def _averages(calibration: Calibration, *stages: str) -> list[list[str]]:
+    return [
+        averages_page(STAGES[stage], result)
+        for stage in stages
+        for result in calibration.averages.get(stage, {}).values()
+    ]

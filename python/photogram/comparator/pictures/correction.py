@@ -1,0 +1,84 @@
+"""The correction over the range of the comparator: surfaces, and a grid distorted by it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, new_figure, plain, round_length
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from photogram.adjusted import Floats
+    from photogram.comparator.calibration import Calibration
+    from photogram.comparator.polynomial import Polynomial
+
+__all__ = ["correction_surface", "distorted_grid"]
+
+FINE = 121
+LINES = 9
+
+
+def _range(polynomial: Polynomial) -> tuple[Floats, Floats]:
+    """Return the least and greatest x and y of the measured range, micrometres."""
+    centre, half = np.array(polynomial.frame.centre_um), np.array(polynomial.frame.half_range_um)
+    return centre - half, centre + half
+
+
+def _mesh(polynomial: Polynomial, count: int) -> tuple[Floats, Floats]:
+    """Return places (count, count, 2) over the range and the corrections there."""
+    low, high = _range(polynomial)
+    x, y = np.meshgrid(np.linspace(low[0], high[0], count), np.linspace(low[1], high[1], count))
+    places = np.stack([x, y], axis=-1)
+    return places, polynomial.evaluate(places.reshape(-1, 2)).reshape(places.shape)
+
+
+def correction_surface(calibration: Calibration, polynomial: Polynomial) -> Figure:
+    """Draw the corrections in x and in y as contour maps on one scale, with the places measured."""
+    places, values = _mesh(polynomial, FINE)
+    measured = np.vstack([fit.residuals.xy_um for fit in calibration.last_fits]) / MM
+    largest = float(np.abs(values).max()) or 1.0
+    step = round_length(largest / 5)
+    levels = step * np.arange(-np.ceil(largest / step), np.ceil(largest / step) + 1)
+    figure = new_figure(10.5, 4.9)
+    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    for axis, panel in enumerate(axes):
+        x, y = places[..., 0] / MM, places[..., 1] / MM
+        filled = panel.contourf(x, y, values[..., axis], levels=levels, cmap="RdBu_r")
+        lines = panel.contour(x, y, values[..., axis], levels=levels, colors="k", linewidths=0.4)
+        panel.clabel(lines, fontsize=7, fmt="%g")
+        panel.plot(*measured.T, ".", color="k", markersize=3, alpha=0.7, clip_on=False)
+        panel.set_title(f"correction in {'xy'[axis]}", fontsize=10, loc="left")
+        plain(panel, "x, mm", "y, mm")
+        panel.margins(0.0)
+    bar = figure.colorbar(filled, ax=axes, shrink=0.9)
+    bar.set_label("µm", fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+    figure.suptitle("Nonlinear correction; dots are the places measured", fontsize=11)
+    return figure
+
+
+def distorted_grid(polynomial: Polynomial) -> Figure:
+    """Draw a square net and the same net displaced by the correction, greatly magnified."""
+    low, high = _range(polynomial)
+    figure = new_figure(6.2, 6.0)
+    axes = figure.subplots()
+    _, values = _mesh(polynomial, FINE)
+    longest = float(np.hypot(*values.reshape(-1, 2).T).max()) or 1.0
+    spacing = float((high - low).max()) / MM / (LINES - 1)
+    scale = 0.8 * spacing / longest
+    along = np.linspace(0.0, 1.0, FINE)
+    for part in np.linspace(0.0, 1.0, LINES):
+        for line in (np.column_stack([along, along * 0 + part]), np.column_stack([along * 0 + part, along])):
+            places = low + line * (high - low)
+            axes.plot(*(places / MM).T, color=FAINT, linewidth=0.7, linestyle=(0, (3, 2)), zorder=1)
+            moved = places / MM + polynomial.evaluate(places) * scale
+            axes.plot(*moved.T, color=MAIN, linewidth=1.3, zorder=2)
+    plain(axes, "x, mm", "y, mm")
+    key([axes], scale, round_length(longest))
+    axes.set_title(
+        f"Net displaced by the nonlinear correction, {scale * MM:,.0f} times magnified", fontsize=11
+    )
+    return figure

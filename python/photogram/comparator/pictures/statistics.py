@@ -1,0 +1,141 @@
+"""Ellipses of the pointings, distribution of the residuals, components of the error."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.comparator.pictures.style import (
+    ACCENT,
+    FAINT,
+    MAIN,
+    MM,
+    key,
+    new_figure,
+    panels,
+    plain,
+    round_length,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from photogram.adjusted import Floats
+    from photogram.comparator.calibration import Calibration
+    from photogram.comparator.pointing import Ellipse
+
+__all__ = ["pointing_ellipses", "residual_histogram", "variance_bars"]
+
+
+def pointing_ellipses(calibration: Calibration) -> Figure:
+    """Draw the 39 percent ellipses of single pointings at the measured places of each case."""
+    count = len(calibration.cases)
+    figure, axes = panels(count)
+    largest = max(
+        (
+            readings.precision.ellipse.major_um
+            for case in calibration.cases
+            for readings in case.placed.readings
+        ),
+        default=0.0,
+    )
+    extent = float(np.ptp(calibration.cases[0].placed.means_um, axis=0).max()) / MM
+    spacing = extent / max(math.sqrt(len(calibration.cases[0].placed.points)) - 1, 1)
+    scale = 0.5 * spacing / largest if largest > 0 else 1.0
+    for panel, case in zip(axes, calibration.cases, strict=True):
+        places = case.placed.means_um / MM
+        ellipses = [readings.precision.ellipse for readings in case.placed.readings]
+        _ellipses(panel, places, ellipses, scale)
+        none = [k for k, ellipse in enumerate(ellipses) if ellipse.major_um == 0.0]
+        panel.plot(*places[none].T, "*", color=ACCENT, markersize=5)
+        sd = case.placed.precision.sd_point_um
+        panel.set_title(f"case {case.number}, pooled {sd:.2f} µm", fontsize=9, loc="left")
+        plain(panel, "x, mm", "y, mm")
+    for panel in axes:
+        panel.label_outer()
+    key(axes, scale, round_length(largest))
+    figure.suptitle("Error ellipses of single pointings (39 percent; * no deviation)", fontsize=11)
+    return figure
+
+
+def _ellipses(axes: Axes, places: Floats, ellipses: list[Ellipse], scale: float) -> None:
+    from matplotlib.collections import EllipseCollection
+
+    axes.plot(*places.T, "+", color=FAINT, markersize=4)
+    axes.add_collection(
+        EllipseCollection(
+            [2 * scale * ellipse.major_um for ellipse in ellipses],
+            [2 * scale * ellipse.minor_um for ellipse in ellipses],
+            [math.degrees(ellipse.angle_rad) for ellipse in ellipses],
+            units="xy",
+            offsets=places,
+            transOffset=axes.transData,
+            facecolor="none",
+            edgecolor=MAIN,
+            linewidth=1.0,
+        )
+    )
+
+
+def residual_histogram(calibration: Calibration) -> Figure:
+    """Draw histograms of the final residuals against the normal curve of their standard deviation."""
+    from matplotlib.ticker import MaxNLocator
+
+    residuals = np.vstack([fit.residuals.comparator_um for fit in calibration.last_fits])
+    figure = new_figure(10.0, 3.9)
+    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    limit = float(np.abs(residuals).max()) * 1.1 or 1.0
+    bins = np.linspace(-limit, limit, _bins(len(residuals)) + 1)
+    x = np.linspace(-limit, limit, 301)
+    for axis, panel in enumerate(axes):
+        own = residuals[:, axis]
+        sigma = math.sqrt(float((own**2).mean())) or 1.0
+        panel.hist(own, bins=bins.tolist(), color=MAIN, alpha=0.35, edgecolor=MAIN, linewidth=0.8)
+        height = len(own) * (bins[1] - bins[0]) / (sigma * math.sqrt(2 * math.pi))
+        curve = height * np.exp(-((x / sigma) ** 2) / 2)
+        panel.plot(x, curve, color=ACCENT, linewidth=1.8)
+        beyond = 100 * float((np.abs(own) > 2 * sigma).mean())
+        panel.set_title(
+            f"{'xy'[axis]}: {len(own)} residuals, rms {sigma:.3f} µm,"
+            f" {beyond:.1f} % beyond twice that (normal: 4.6 %)",
+            fontsize=9,
+            loc="left",
+        )
+        panel.set_xlabel("residual, µm", fontsize=8)
+        panel.tick_params(labelsize=7, color=FAINT)
+        for side in ("top", "right"):
+            panel.spines[side].set_visible(False)
+    axes[0].yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes[0].set_ylabel("number", fontsize=8)
+    figure.suptitle("Final residuals in the comparator system and the normal curve", fontsize=11)
+    return figure
+
+
+def _bins(count: int) -> int:
+    """Return an odd number of bins (so that one is about zero), growing with the root of the count."""
+    return 2 * round(math.sqrt(count) * 0.75) + 1
+
+
+def variance_bars(calibration: Calibration) -> Figure:
+    """Draw the components of the error as bars of variance."""
+    components = calibration.variance.components_um
+    total = components["total"] ** 2
+    names = [name for name in components if name != "total"]
+    figure = new_figure(8.0, 2.9)
+    axes = figure.subplots()
+    values = [components[name] ** 2 for name in names]
+    bars = axes.barh(names[::-1], values[::-1], color=MAIN, alpha=0.75, height=0.6)
+    for bar, name in zip(bars, names[::-1], strict=True):
+        share = 100 * components[name] ** 2 / total if total else 0.0
+        text = f" {components[name]:.3f} µm   {share:.0f} %"
+        axes.text(bar.get_width(), bar.get_y() + bar.get_height() / 2, text, va="center", fontsize=8)
+    axes.set_xlim(0, 1.25 * (max(values) or 1.0))
+    axes.set_xlabel("variance, µm²", fontsize=8)
+    axes.tick_params(labelsize=8, color=FAINT)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    axes.set_title(f"Components of the error: {components['total']:.3f} µm before calibration", fontsize=11)
+    return figure

@@ -1,0 +1,105 @@
+"""What the pictures share: colours, panels, scales of vectors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from photogram.adjusted import Floats
+
+__all__ = ["ACCENT", "FAINT", "MAIN", "arrows", "key", "new_figure", "panels", "plain", "round_length"]
+
+MAIN = "#1f4e79"
+ACCENT = "#b5432a"
+FAINT = "#9aa5b1"
+MM = 1000.0
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return a figure that belongs to no window (inches)."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def panels(count: int, *, across: int = 4, side: float = 3.4) -> tuple[Figure, list[Axes]]:
+    """Return a figure of square panels, and its axes."""
+    columns = min(count, across)
+    rows = -(-count // columns)
+    figure = new_figure(max(side * columns, 5.0), side * rows + 0.6)
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel().tolist()
+    for unused in axes[count:]:
+        unused.set_visible(False)
+    return figure, axes[:count]
+
+
+def plain(axes: Axes, xlabel: str, ylabel: str) -> None:
+    """Give a map its labels and equal scales, and take away what distracts."""
+    axes.set_aspect("equal")
+    axes.set_xlabel(xlabel, fontsize=8)
+    axes.set_ylabel(ylabel, fontsize=8)
+    axes.tick_params(labelsize=7, length=2, color=FAINT)
+    axes.margins(0.08)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(FAINT)
+
+
+def round_length(value: float) -> float:
+    """Return the nearest of 1, 2, 5 times a power of ten below a value."""
+    if not value > 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9))
+
+
+def magnification(places_mm: Floats, vectors_um: Floats) -> float:
+    """Return millimetres of the picture a micrometre: the longest vector almost spans the spacing."""
+    extent = float(np.ptp(places_mm, axis=0).max()) or 1.0
+    spacing = extent / max(math.sqrt(len(places_mm)) - 1, 1)
+    longest = float(np.hypot(*vectors_um.T).max(initial=0.0))
+    return 0.9 * spacing / longest if longest > 0 else 1.0
+
+
+def arrows(axes: Axes, places_um: Floats, vectors_um: Floats, scale: float, colour: str = MAIN) -> None:
+    """Draw vectors from places, `scale` millimetres of the picture for each micrometre."""
+    places, vectors = places_um / MM, vectors_um * scale
+    axes.plot(*places.T, ".", color=FAINT, markersize=5, zorder=1)
+    axes.quiver(
+        *places.T,
+        *vectors.T,
+        angles="xy",
+        scale_units="xy",
+        scale=1,
+        color=colour,
+        width=0.006,
+        headwidth=3.5,
+        headlength=4.5,
+        zorder=2,
+    )
+    # Quiver does not count its heads when limits are set.
+    axes.update_datalim(places + vectors)
+    axes.autoscale_view()
+
+
+def key(panels: Sequence[Axes], scale: float, length_um: float) -> None:
+    """Draw a length of micrometres in the lower right corner of panels with common limits."""
+    low, high = panels[0].get_ylim()
+    panels[0].set_ylim(low - 0.06 * (high - low), high)
+    for axes in panels:
+        left, right = axes.get_xlim()
+        part = length_um * scale / (right - left)
+        options: dict[str, Any] = {"transform": axes.transAxes, "color": ACCENT}
+        axes.plot([0.98 - part, 0.98], [0.035, 0.035], linewidth=2.5, solid_capstyle="butt", **options)
+        axes.text(0.96 - part, 0.035, f"{length_um:g} µm", ha="right", va="center", fontsize=8, **options)

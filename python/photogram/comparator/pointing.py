@@ -1,0 +1,239 @@
+"""Pointing precision: statistics of repeated readings (NOAA TR NOS 57, equations 1 to 32; STAT)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from photogram.adjusted import Floats
+    from photogram.comparator.readings import Integers
+
+__all__ = [
+    "CONFIDENCE_FACTORS",
+    "Ellipse",
+    "PointReadings",
+    "Precision",
+    "pool",
+    "pool_points",
+    "read_points",
+]
+
+CONFIDENCE_FACTORS = {39: 1.00, 50: 1.18, 95: 2.45, 99: 3.03}
+"""Multiples of the semi-axes for an ellipse that holds so many percent (report; the program draws 39)."""
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """An error ellipse: semi-axes in micrometres, angle of the major axis from +x toward +y in radians."""
+
+    major_um: float
+    minor_um: float
+    angle_rad: float
+
+    @classmethod
+    def of(cls, variance_x: float, variance_y: float, covariance: float) -> Ellipse:
+        """Return the ellipse of a covariance matrix; where both variances are equal it lies at 45 degrees."""
+        width = math.hypot(variance_x - variance_y, 2 * covariance)
+        total = variance_x + variance_y
+        angle = (
+            math.copysign(math.pi / 4, covariance)
+            if variance_x == variance_y
+            else 0.5 * math.atan2(2 * covariance, variance_x - variance_y)
+        )
+        return cls(math.sqrt((total + width) / 2), math.sqrt(max(0.0, (total - width) / 2)), angle)
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Variances of single readings, pooled over one point or many.
+
+    Attributes
+    ----------
+    readings, points
+        How many went in.
+    degrees_of_freedom
+        Readings less means.
+    variance_um2
+        Of a single reading in x and in y; NaN without degrees of freedom.
+    covariance_um2
+        Of x and y of a single reading.
+    mean_variance_um2
+        Of the mean of a point, in x and in y (equations 4 and 22).
+    """
+
+    readings: int
+    points: int
+    degrees_of_freedom: int
+    variance_um2: tuple[float, float]
+    covariance_um2: float
+    mean_variance_um2: tuple[float, float]
+
+    @property
+    def sd_um(self) -> tuple[float, float]:
+        """Standard deviations of a single reading in x and in y."""
+        x, y = self.variance_um2
+        return math.sqrt(x), math.sqrt(y)
+
+    @property
+    def sd_point_um(self) -> float:
+        """Root mean square of both (equation 3)."""
+        return math.sqrt(sum(self.variance_um2) / 2)
+
+    @property
+    def mean_sd_um(self) -> tuple[float, float]:
+        """Standard deviations of a mean in x and in y."""
+        x, y = self.mean_variance_um2
+        return math.sqrt(x), math.sqrt(y)
+
+    @property
+    def mean_sd_point_um(self) -> float:
+        """Root mean square of both (equation 5)."""
+        return math.sqrt(sum(self.mean_variance_um2) / 2)
+
+    @property
+    def correlation(self) -> float:
+        """Correlation of x and y (equation 7); NaN where one of them does not vary."""
+        product = math.prod(self.sd_um)
+        return self.covariance_um2 / product if product > 0 else math.nan
+
+    @property
+    def listed_correlation_percent(self) -> float:
+        """As the listing has it: 100 where exactly one coordinate does not vary, 0 where neither does."""
+        x, y = self.variance_um2
+        if x > 0 and y > 0:
+            return 100 * self.correlation
+        return 100.0 if x > 0 or y > 0 else 0.0
+
+    @property
+    def ellipse(self) -> Ellipse:
+        """Error ellipse of a single reading (39 percent)."""
+        return Ellipse.of(*self.variance_um2, self.covariance_um2)
+
+
+@dataclass(frozen=True, eq=False)
+class PointReadings:
+    """The readings of one point in one case, summed up.
+
+    Attributes
+    ----------
+    point, count
+        Number of the point; of its readings.
+    mean_um
+        (2,) their mean (equation 1).
+    squares_um2
+        Sums of (x - mean)^2 and (y - mean)^2.
+    products_um2
+        Sum of (x - mean)(y - mean).
+    """
+
+    point: int
+    count: int
+    mean_um: Floats = field(repr=False)
+    squares_um2: tuple[float, float]
+    products_um2: float
+
+    @property
+    def identical(self) -> bool:
+        """Whether several readings are all the same, in both coordinates."""
+        return self.count > 1 and self.squares_um2 == (0.0, 0.0)
+
+    @property
+    def precision(self) -> Precision:
+        """Equations 2 to 7; zero for a single reading, as the listing has it."""
+        if self.count == 1:
+            return Precision(1, 1, 0, (0.0, 0.0), 0.0, (0.0, 0.0))
+        return pool([self])
+
+
+def read_points(points: Integers, xy_um: Floats) -> list[PointReadings]:
+    """Sum up readings, point by point in the order of their first reading.
+
+    Deviations are formed from the first reading of each point, so that large coordinates cost no digits and
+    identical readings give exactly zero.
+    """
+    result = []
+    for point in dict.fromkeys(points.tolist()):
+        own = xy_um[points == point]
+        offsets = own - own[0]
+        shift = offsets.mean(axis=0)
+        deviations = offsets - shift
+        squares = (deviations**2).sum(axis=0)
+        result.append(
+            PointReadings(
+                point,
+                len(own),
+                own[0] + shift,
+                (float(squares[0]), float(squares[1])),
+                float(deviations.prod(axis=1).sum()),
+            )
+        )
+    return result
+
+
+def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> Precision:
+    """Pool points of one or more cases (equations 13, 22, 23; 28, 30, 31).
+
+    Each variance is weighted by its degrees of freedom: sums of squares over readings less means.
+
+    Parameters
+    ----------
+    points
+        What to pool.
+    listed_dof
+        Degrees of freedom to divide by instead (see :func:`pool_points`).
+    """
+    readings = list(points)
+    total = sum(point.count for point in readings)
+    dof = total - len(readings) if listed_dof is None else listed_dof
+    squares = np.array([point.squares_um2 for point in readings]).reshape(-1, 2)
+    counts = np.array([point.count for point in readings])[:, np.newaxis]
+
+    def mean(values: Floats) -> tuple[float, float]:
+        x, y = values.sum(axis=0) / dof if dof > 0 else (math.nan, math.nan)
+        return float(x), float(y)
+
+    products = sum(point.products_um2 for point in readings)
+    return Precision(
+        readings=total,
+        points=len({point.point for point in readings}),
+        degrees_of_freedom=dof,
+        variance_um2=mean(squares),
+        covariance_um2=products / dof if dof > 0 else math.nan,
+        mean_variance_um2=mean(squares / counts),
+    )
+
+
+def pool_points(
+    cases: Sequence[Sequence[PointReadings]], *, as_listed: bool = False
+) -> tuple[dict[int, Precision], Precision]:
+    """Pool many cases: each point over its cases (equations 25 to 27), then everything (28 to 32).
+
+    Parameters
+    ----------
+    cases
+        The points of each case.
+    as_listed
+        Divide as the listing does, where that departs from the text: the sums of a point by all its readings
+        less one (not less the number of its cases), those of all points by all readings less the number of
+        points.
+
+    Returns
+    -------
+    by_point, total
+    """
+    by_number: dict[int, list[PointReadings]] = {}
+    for case in cases:
+        for point in case:
+            by_number.setdefault(point.point, []).append(point)
+
+    def dof(readings: list[PointReadings], means: int) -> int | None:
+        return sum(point.count for point in readings) - means if as_listed else None
+
+    by_point = {number: pool(own, listed_dof=dof(own, 1)) for number, own in by_number.items()}
+    everything = [point for own in by_number.values() for point in own]
+    return by_point, pool(everything, listed_dof=dof(everything, len(by_number)))

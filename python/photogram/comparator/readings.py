@@ -1,0 +1,244 @@
+"""Readings of a comparator as they were recorded, and the cases and the session that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.messages import Message
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photogram.adjusted import Floats
+    from photogram.comparator.grid import Grid
+
+    Integers = NDArray[np.int64]
+
+__all__ = ["Case", "Place", "Reading", "Session", "collect_cases"]
+
+FURTHEST_UM = 1000.0
+"""A reading this far from the others on its point was taken on another point, or is in another unit."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something was read: file, record number (from 1) and record, as far as they are known."""
+
+    file: Path | None = None
+    record: int | None = None
+    text: str | None = None
+
+    def error(self, message: str) -> InputError:
+        """Return an error that names the place."""
+        return InputError(message, file=self.file, record=self.record, text=self.text)
+
+    def message(self, message: str) -> Message:
+        """Return a remark that names the place."""
+        return Message(message, self.file, self.record, self.text)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One pointing.
+
+    Attributes
+    ----------
+    plate, case, operator
+        Numbers; plate 0 stands for the only plate of the session.
+    leg
+        0: on the intersection of the lines; 1 to 4: on a leg, numbered round the cross, so that 1 is opposite
+        3.
+    point
+        Number of the grid point.
+    xy_um
+        Coordinates in micrometres.
+    place
+        Where it was read.
+    """
+
+    plate: int
+    case: int
+    operator: int
+    leg: int
+    point: int
+    xy_um: tuple[float, float]
+    place: Place
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """All pointings of one operator on a plate in one placement, in the order in which they were made.
+
+    Attributes
+    ----------
+    number, operator, plate
+        Numbers.
+    points, legs
+        (n,) point and leg (0: intersection) of each pointing.
+    xy_um
+        (n, 2) comparator coordinates in micrometres.
+    places
+        Where each pointing was read.
+    """
+
+    number: int
+    operator: int
+    plate: int
+    points: Integers
+    legs: Integers
+    xy_um: Floats
+    places: tuple[Place, ...]
+
+    @property
+    def place(self) -> Place:
+        """Where its first pointing was read."""
+        return self.places[0]
+
+    def check(self, grid: Grid) -> None:
+        """Refuse points that the plate has not, and readings far from the others on their point.
+
+        Raises
+        ------
+        InputError
+            The first reading at fault, with its place.
+        """
+        if not len(self.points) == len(self.legs) == len(self.xy_um) == len(self.places):
+            raise InputError(f"case {self.number}: points, legs, coordinates and places differ in number")
+        finite = np.isfinite(self.xy_um).all(axis=1)
+        if not finite.all():
+            at = int(np.flatnonzero(~finite)[0])
+            raise self.places[at].error(f"case {self.number}, point {self.points[at]}: not a number")
+        known = np.isin(self.points, grid.points)
+        if not known.all():
+            at = int(np.flatnonzero(~known)[0])
+            raise self.places[at].error(f"point {self.points[at]} is unknown: plate {grid.number} has it not")
+        for point in np.unique(self.points):
+            own = np.flatnonzero((self.points == point) & (self.legs == 0))
+            if not len(own):
+                continue
+            away = np.abs(self.xy_um[own] - np.median(self.xy_um[own], axis=0)).max(axis=1)
+            if away.max() > FURTHEST_UM:
+                place = self.places[own[int(away.argmax())]]
+                raise place.error(
+                    f"case {self.number}, point {point}: a reading is {away.max():.0f} um from the others: "
+                    "another point, or another unit?"
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """Everything measured for one calibration of one comparator.
+
+    Attributes
+    ----------
+    cases
+        The cases, in the order measured.
+    grids
+        The plates by their numbers.
+    comparator
+        Number of the comparator; `secondary` for the right stage of a stereocomparator.
+    date
+        Date of measurement, as text.
+    left_handed
+        Whether the comparator is left-handed against the plate; None where nothing is said. The measurements
+        decide; what they contradict is an error.
+    sorted_input, least_count_one_micrometre, plot_each_case
+        Options of the header that the title page repeats.
+    source
+        File of the first record.
+    messages
+        Remarks made while reading.
+    """
+
+    cases: tuple[Case, ...]
+    grids: Mapping[int, Grid]
+    comparator: int = 0
+    secondary: bool = False
+    date: str = ""
+    left_handed: bool | None = None
+    sorted_input: bool = False
+    least_count_one_micrometre: bool = True
+    plot_each_case: bool = False
+    source: Path | None = None
+    messages: list[Message] = field(default_factory=list)
+
+    def grid_of(self, case: Case) -> Grid:
+        """Return the plate that a case was measured on.
+
+        Raises
+        ------
+        InputError
+            No plate with that number was given.
+        """
+        if case.plate not in self.grids:
+            listed = ", ".join(str(number) for number in self.grids)
+            raise case.place.error(f"case {case.number} is on plate {case.plate}; there is only {listed}")
+        return self.grids[case.plate]
+
+    def check(self) -> None:
+        """Refuse a session that contradicts itself.
+
+        Raises
+        ------
+        InputError
+            No case, a case measured twice, an unknown plate or point, readings far from others on their
+            point.
+        """
+        if not self.cases:
+            raise InputError("there are no measurements", file=self.source)
+        first: dict[int, Case] = {}
+        for case in self.cases:
+            if case.number in first:
+                where = _where(first[case.number].place)
+                raise case.place.error(f"case {case.number} was measured twice: first {where}")
+            first[case.number] = case
+            case.check(self.grid_of(case))
+
+
+def _where(place: Place) -> str:
+    if place.record is None:
+        return "earlier"
+    return f"in record {place.record}" + (f" of {place.file}" if place.file else "")
+
+
+def collect_cases(readings: Iterable[Reading]) -> tuple[Case, ...]:
+    """Put readings that follow each other with one case number together.
+
+    Raises
+    ------
+    InputError
+        A case that comes back after another one (it was measured twice), or that changes its plate or its
+        operator on the way.
+    """
+    runs: dict[int, list[Reading]] = {}
+    last: int | None = None
+    for reading in readings:
+        if reading.case != last and reading.case in runs:
+            raise reading.place.error(
+                f"case {reading.case} was measured twice: first {_where(runs[reading.case][0].place)}"
+            )
+        last = reading.case
+        run = runs.setdefault(reading.case, [])
+        if run and (run[0].plate, run[0].operator) != (reading.plate, reading.operator):
+            what = "plate" if run[0].plate != reading.plate else "operator"
+            raise reading.place.error(f"case {reading.case} changes its {what} on the way")
+        run.append(reading)
+    return tuple(_case(run) for run in runs.values())
+
+
+def _case(run: list[Reading]) -> Case:
+    return Case(
+        number=run[0].case,
+        operator=run[0].operator,
+        plate=run[0].plate,
+        points=np.array([reading.point for reading in run]),
+        legs=np.array([reading.leg for reading in run]),
+        xy_um=np.array([reading.xy_um for reading in run]),
+        places=tuple(reading.place for reading in run),
+    )

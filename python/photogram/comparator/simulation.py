@@ -1,0 +1,127 @@
+"""Simulated calibrations, with the truth behind them: for tests, for planning, for the packaged example."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.comparator.correction import Correction
+from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.orientation import exchanged
+from photogram.comparator.readings import Case, Place, Session
+
+if TYPE_CHECKING:
+    from photogram.adjusted import Floats
+    from photogram.comparator.grid import Grid
+    from photogram.comparator.readings import Integers
+
+__all__ = ["Simulation", "simulate_calibration"]
+
+IDEAL = Correction(1.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A simulated session and what is true in it.
+
+    Attributes
+    ----------
+    session
+        What would have been measured.
+    correction
+        The true correction.
+    grid_errors_um
+        (l, 2) true less given grid coordinates, in the axes of the plate.
+    """
+
+    session: Session
+    correction: Correction
+    grid_errors_um: Floats
+
+
+def simulate_calibration(
+    grid: Grid,
+    correction: Correction = IDEAL,
+    *,
+    cases: int = 4,
+    rotation_rad: float = math.atan(0.2),
+    centre_um: tuple[float, float] = (125_000.0, 130_000.0),
+    left_handed: bool = False,
+    sequence: Sequence[int] | None = None,
+    pointing_um: float = 0.0,
+    random_um: float = 0.0,
+    grid_um: float = 0.0,
+    grid_errors_um: Floats | None = None,
+    least_count_um: float = 0.0,
+    operators: Sequence[int] = (1,),
+    comparator: int = 1,
+    date: str = "",
+    seed: int = 0,
+) -> Simulation:
+    """Simulate the measurement of a plate in several placements, a quarter turn from each other.
+
+    Parameters
+    ----------
+    grid
+        The plate as it is given.
+    correction
+        What the readings would have to be corrected by.
+    cases, rotation_rad, centre_um
+        Number of placements, rotation of the first, and corrected comparator coordinates of the middle of the
+        plate.
+    left_handed
+        Whether the comparator is left-handed against the plate.
+    sequence
+        Points in the order of the pointings of a case; None for five on each, row by row, and three on the
+        first again.
+    pointing_um, random_um, grid_um
+        Standard deviations of a single pointing, of the comparator (once for each point and case), and of the
+        given grid coordinates.
+    grid_errors_um
+        (l, 2) true less given grid coordinates, instead of random ones.
+    least_count_um
+        Readings are rounded to multiples of this; 0 does not round.
+    operators
+        One for each four cases.
+    comparator, date, seed
+        Number, date, and seed of the random numbers.
+    """
+    random = np.random.default_rng(seed)
+    drawn = grid_um * random.standard_normal((len(grid.points), 2))
+    errors = drawn if grid_errors_um is None else np.asarray(grid_errors_um, dtype=float)
+    plate = replace(grid, xy_um=grid.xy_um + errors)
+    points = _default_sequence(grid.points) if sequence is None else np.array(sequence, dtype=np.int64)
+    rows = grid.rows_of(points)
+    measured = []
+    for k in range(cases):
+        exact = _readings(plate, correction, rotation_rad + k * math.pi / 2, centre_um, left_handed)
+        exact = exact + random_um * random.standard_normal(exact.shape)
+        xy = exact[rows] + pointing_um * random.standard_normal((len(rows), 2))
+        if least_count_um > 0:
+            xy = np.round(xy / least_count_um) * least_count_um
+        operator = operators[min(k // 4, len(operators) - 1)]
+        legs = np.zeros(len(rows), dtype=np.int64)
+        places = (Place(),) * len(rows)
+        measured.append(Case(k + 1, operator, grid.number, grid.points[rows], legs, xy, places))
+    session = Session(
+        tuple(measured), {grid.number: grid}, comparator=comparator, date=date, left_handed=left_handed
+    )
+    return Simulation(session, correction, errors)
+
+
+def _default_sequence(points: Integers) -> Integers:
+    """Return every point five times, and the first three times again."""
+    return np.concatenate([np.repeat(points, 5), np.repeat(points[:1], 3)])
+
+
+def _readings(
+    plate: Grid, correction: Correction, rotation: float, centre: tuple[float, float], left_handed: bool
+) -> Floats:
+    """Read every point without error."""
+    own = exchanged(plate.xy_um, left_handed)
+    middle = (own.min(axis=0) + own.max(axis=0)) / 2
+    return correction.invert((own - middle) @ rotation_matrix(rotation) + centre)

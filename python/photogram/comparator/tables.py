@@ -1,0 +1,108 @@
+"""Measurements as plain tables: columns case, point, x_um, y_um and, where need be, plate, leg, operator."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from photogram.comparator.csvfile import Row, Table, read_table
+from photogram.comparator.grid import Grid, find_grid
+from photogram.comparator.readings import Case, Reading, Session, collect_cases
+from photogram.errors import InputError
+
+__all__ = ["read_csv", "to_csv"]
+
+
+def read_csv(
+    paths: Sequence[Path], grids: Iterable[Grid] = (), *, left_handed: bool | None = None
+) -> Session:
+    """Read the tables of one calibration.
+
+    Each has the columns `case`, `point` and `x_um`, `y_um` (or `x_mm`, `y_mm`), and may have `plate` (number
+    of the grid), `leg` (1 to 4; 0 or blank: intersection) and `operator`. Rows stand in the order measured;
+    those with blank coordinates are missing. Lines above the table may set `# grid = 1320` (a built-in grid,
+    or a file beside the table), `# comparator = 3`, `# date = 7/17/72`, `# left_handed = yes`.
+
+    Parameters
+    ----------
+    paths
+        The files.
+    grids
+        Plates, instead of those that the tables name.
+    left_handed
+        Whether the comparator is left-handed against the plate, instead of what the tables say.
+
+    Raises
+    ------
+    InputError
+        A file that is no such table, no plate, a case measured twice.
+    """
+    tables = [read_table(path) for path in paths]
+    plates = {grid.number: grid for grid in grids}
+    if not plates:
+        plates = {grid.number: grid for table in tables for grid in _named_grids(table)}
+    if not plates:
+        raise InputError("names no grid plate: '# grid = 1320', or --grid", file=paths[0])
+    cases = collect_cases(reading for table in tables for reading in _readings(table, plates))
+    said = [table.switch("left_handed") for table in tables]
+    session = Session(
+        cases=cases,
+        grids=plates,
+        comparator=max(table.integer_setting("comparator", 0) for table in tables),
+        date=next((table.settings["date"] for table in tables if "date" in table.settings), ""),
+        left_handed=left_handed
+        if left_handed is not None
+        else next((s for s in said if s is not None), None),
+        source=paths[0],
+    )
+    session.check()
+    return session
+
+
+def _named_grids(table: Table) -> list[Grid]:
+    """Return the plates that a table names: built in, or files beside it."""
+    names = [name.strip() for name in table.settings.get("grid", "").split(",") if name.strip()]
+    return [find_grid(name if name.isdigit() else str(table.path.parent / name)) for name in names]
+
+
+def _readings(table: Table, plates: dict[int, Grid]) -> list[Reading]:
+    table.require("case", "point")
+    return [
+        _reading(row, xy, next(iter(plates)) if len(plates) == 1 else 0)
+        for row in table.rows
+        if (xy := table.coordinates_um(row)) is not None
+    ]
+
+
+def _reading(row: Row, xy_um: tuple[float, float], only_plate: int) -> Reading:
+    leg = row.integer("leg", 0)
+    if leg > 4:
+        raise row.place.error(f"leg {leg}: legs are numbered 1 to 4, and 0 is the intersection")
+    return Reading(
+        plate=row.integer("plate", only_plate),
+        case=row.integer("case"),
+        operator=row.integer("operator", 0),
+        leg=leg,
+        point=row.integer("point"),
+        xy_um=xy_um,
+        place=row.place,
+    )
+
+
+def to_csv(session: Session) -> bytes:
+    """Return the measurements of a session as a table that :func:`read_csv` reads, in micrometres."""
+    lines = [f"# comparator = {session.comparator}"]
+    lines += [f"# grid = {', '.join(str(number) for number in session.grids)}"]
+    lines += [f"# date = {session.date}"] if session.date else []
+    if session.left_handed is not None:
+        lines.append(f"# left_handed = {'yes' if session.left_handed else 'no'}")
+    lines.append("plate,case,operator,leg,point,x_um,y_um")
+    for case in session.cases:
+        lines += _lines(case)
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _lines(case: Case) -> list[str]:
+    rows = zip(case.legs.tolist(), case.points.tolist(), case.xy_um.tolist(), strict=True)
+    head = f"{case.plate},{case.number},{case.operator}"
+    return [f"{head},{leg},{point},{x:.3f},{y:.3f}" for leg, point, (x, y) in rows]

@@ -1,0 +1,186 @@
+"""`photogram comparator`: what is written, what is not, exit codes; packaged example and documentation."""
+
+import importlib.util
+import json
+import runpy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plates import case_2_session, noisy
+from typer.testing import CliRunner
+
+from photogram.cli import app
+from photogram.comparator import Correction, read, read_grid, to_cards, to_csv
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "python" / "photogram" / "examples" / "comparator" / "comparator-3.txt"
+TEXTS = {"listing.txt", "correction.json", "correction-joint.json"}
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run the command line in an empty directory."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("NO_COLOR", "1")
+    runner = CliRunner()
+    return lambda *arguments: runner.invoke(app, ["comparator", *[str(argument) for argument in arguments]])
+
+
+@pytest.fixture
+def tables(tmp_path):
+    """Write a session as two tables and its plate."""
+    session = noisy(1)
+    (tmp_path / "plate.csv").write_bytes(session.grids[1].to_csv())
+    head, *rows = [line for line in to_csv(session).decode().splitlines() if not line.startswith("# grid")]
+    column = next(k for k, line in enumerate(rows) if line.startswith("plate,"))
+    top, body = [head, *rows[: column + 1]], rows[column + 1 :]
+    half = [line for line in body if int(line.split(",")[1]) <= 2]
+    for name, lines in (("first.csv", half), ("second.csv", body[len(half) :])):
+        (tmp_path / name).write_text("\n".join([*top, *lines]) + "\n")
+    return [tmp_path / "first.csv", tmp_path / "second.csv", "--grid", tmp_path / "plate.csv"]
+
+
+def names(directory):
+    return {path.name for path in Path(directory).iterdir()}
+
+
+def test_the_packaged_example_runs_in_one_command(run):
+    pytest.importorskip("matplotlib")
+    result = run("--example", "--json", "result.json")
+    assert result.exit_code == 0, result.output
+    assert names("comparator-calibrated") == TEXTS | {"report.html", "grid-1320.csv"}
+    assert "SYSTEMATIC COMPARATOR, LINEAR" in result.output
+    document = json.loads(Path("result.json").read_bytes())
+    printed = {"scale_x": 0.99999522, "scale_y": 0.99997765}
+    for name, value in printed.items():
+        sd = document["linear"]["covariance"][0][0] ** 0.5
+        assert abs(document["linear"][name] - value) < 4 * sd
+    assert document["comparator"] == 3
+    assert document["left_handed"] is True
+    assert [case["nearest_point"] for case in document["cases"]] == [5, 25, 21, 1]
+
+
+def test_case_2_of_the_example_is_that_of_the_report():
+    session = read([EXAMPLE])[0]
+    case = case_2_session().cases[0]
+    assert (session.cases[1].xy_um == case.xy_um).all()
+    assert (session.cases[1].points == case.points).all()
+
+
+def test_the_example_is_what_its_script_makes(tmp_path, monkeypatch):
+    script = runpy.run_path(str(ROOT / "examples" / "make_comparator.py"))
+    monkeypatch.setitem(script["main"].__globals__, "EXAMPLE", tmp_path)
+    script["main"]()
+    assert (tmp_path / EXAMPLE.name).read_bytes() == EXAMPLE.read_bytes()
+
+
+def test_tables_make_one_calibration(run, tables, tmp_path):
+    result = run(*tables, "--no-pictures", "--json", "result.json", "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+    assert names(tmp_path / "first-calibrated") == TEXTS | {"grid-1.csv"}
+    document = json.loads(Path("result.json").read_bytes())
+    assert [case["case"] for case in document["cases"]] == [1, 2, 3, 4]
+    corrected = read_grid(tmp_path / "first-calibrated" / "grid-1.csv")
+    given = read_grid(tmp_path / "plate.csv")
+    corrections = np.array(document["plates"][0]["corrections_plate_um"])
+    assert corrected.xy_um - given.xy_um == pytest.approx(corrections, abs=1e-4)
+
+
+def test_batches_of_decks(run, tmp_path):
+    card = to_cards(case_2_session()).decode()
+    (tmp_path / "batch.txt").write_text(card + card + "\n")
+    result = run("batch.txt", "--no-pictures", "--json", "all.json")
+    assert result.exit_code == 0, result.output
+    assert names("batch-calibrated") == {"1", "2"}
+    assert names("batch-calibrated/2") == TEXTS | {"grid-1320.csv"}
+    documents = json.loads(Path("all.json").read_bytes())
+    assert len(documents) == 2
+    assert documents[0]["linear"] == documents[1]["linear"]
+    assert documents[0]["cases"][0]["sigma0_um"]["linear"] == pytest.approx(1.264141260949165, rel=1e-6)
+
+
+def test_pdf_and_other_choices(run, tables):
+    pytest.importorskip("matplotlib")
+    result = run(*tables, "--out", "out", "--pdf", "--as-published", "--linear-only", "--estimate-grid")
+    assert result.exit_code == 0, result.output
+    assert names("out") == TEXTS | {"report.pdf", "grid-1.csv"}
+    assert "NONLINEAR PARAMETERS" not in Path("out/listing.txt").read_text()
+
+
+def test_without_matplotlib_there_are_no_pictures(run, tables, monkeypatch):
+    real = importlib.util.find_spec
+    without = lambda name, *rest: None if name == "matplotlib" else real(name, *rest)  # noqa: E731
+    for module in ("photogram.cli.comparator", "photogram.comparator.pictures.book"):
+        if module in sys.modules:
+            monkeypatch.setattr(sys.modules[module], "find_spec", without)
+    result = run(*tables, "--out", "out")
+    assert result.exit_code == 0
+    assert "pip install 'photogram[plots]'" in result.stderr
+    assert "report.html" not in names("out")
+
+
+def test_bad_input_writes_nothing(run, tables, tmp_path):
+    before = names(tmp_path)
+    text = tables[1].read_text().splitlines()
+    tables[1].write_text("\n".join([*text[:8], text[8].replace(",0,", ",0,9", 1), *text[9:]]) + "\n")
+    result = run(*tables, "--json", "result.json")
+    assert result.exit_code == 1
+    assert f"{tables[1]}, record 9: point 9" in result.stderr
+    assert f"|{text[8].replace(',0,', ',0,9', 1)}|" in result.stderr
+    assert "Traceback" not in result.output
+    assert names(tmp_path) == before
+
+
+def test_usage(run):
+    for arguments in ([], ["a.csv", "--example"], ["--example", "--hand", "up"]):
+        assert run(*arguments).exit_code == 2
+
+
+def test_handedness_must_agree(run, tables):
+    result = run(*tables, "--hand", "left")
+    assert result.exit_code == 1
+    assert "right-handed system, but the input says left-handed" in result.stderr
+
+
+def test_strict_turns_remarks_into_errors(run, tables):
+    lines = tables[0].read_text().splitlines()
+    tables[0].write_text("\n".join(line for line in lines if not line.startswith("1,1,1,0,25,")) + "\n")
+    lenient = run(*tables, "--no-pictures")
+    assert lenient.exit_code == 0
+    assert "remark: case 1: 1 of 25 points of plate 1 are missing" in lenient.output
+    strict = run(*tables, "--no-pictures", "--strict", "--out", "strict")
+    assert strict.exit_code == 1
+    assert not Path("strict").exists()
+
+
+def test_correct_applies_and_inverts(run, tables, tmp_path):
+    assert run(*tables, "--no-pictures", "--out", "out", "--quiet").exit_code == 0
+    Path("points.csv").write_text("name,x_mm,y_mm\na,50.0001,60\nb,200,12.5\n")
+    result = run("correct", "out/correction-joint.json", "points.csv", "--out", "corrected.csv")
+    assert result.exit_code == 0, result.output
+    head, *rows = Path("corrected.csv").read_text().splitlines()
+    assert head == "name,x_mm,y_mm,corrected_x_um,corrected_y_um,sd_x_um,sd_y_um"
+    correction = Correction.read(Path("out/correction-joint.json"))
+    expected = correction.apply(np.array([[50_000.1, 60_000.0], [200_000.0, 12_500.0]]))
+    found = np.array([[float(cell) for cell in row.split(",")[3:5]] for row in rows])
+    assert found == pytest.approx(expected, abs=1e-4)
+    assert all(0 < float(row.split(",")[5]) < 2 for row in rows)
+    Path("back.csv").write_text(
+        "x_um,y_um\n" + "\n".join(",".join(row.split(",")[3:5]) for row in rows) + "\n"
+    )
+    result = run("correct", "out/correction-joint.json", "back.csv", "--invert")
+    assert result.output.splitlines()[0] == "x_um,y_um,reading_x_um,reading_y_um"
+    assert float(result.output.splitlines()[1].split(",")[2]) == pytest.approx(50_000.1, abs=2e-4)
+    Path("blank.csv").write_text("x_um,y_um\n,\n1,2\n3,\n")
+    result = run("correct", "out/correction.json", "blank.csv")
+    assert result.exit_code == 1
+    assert "record 4" in result.stderr or "coordinates are blank" in result.stderr
+
+
+def test_the_numbers_of_the_page_are_those_of_the_command():
+    script = runpy.run_path(str(ROOT / "docs" / "comparator_numbers.py"))
+    page = (ROOT / "docs" / "comparator.md").read_text(encoding="utf-8")
+    assert script["regenerated"](page) == page
