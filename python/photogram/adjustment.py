@@ -13,7 +13,7 @@ from photogram.adjusted import Iteration
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, listed
-from photogram.refraction import check_cameras, remarks
+from photogram.refracted import check_cameras, remarks
 from photogram.result import Result
 
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]

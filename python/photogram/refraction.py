@@ -1,4 +1,4 @@
-"""Refraction in air and water: which models bend the rays of a block, and where they do not hold."""
+"""Refraction in air and water: which models bend the rays of a block."""
 
 from __future__ import annotations
 
@@ -6,15 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
-import numpy as np
-from numpy.typing import NDArray
-
 from photogram.errors import InputError
-from photogram.messages import Message, listed
 
 if TYPE_CHECKING:
     from photogram._photocore import RefractionRow
-    from photogram.block import Block
 
 __all__ = ["METRES_PER_UNIT", "Air", "Refraction", "Water", "metres_per_unit"]
 
@@ -23,8 +18,6 @@ Water = Literal["giant", "snell"]
 
 METRES_PER_UNIT = {"m": 1.0, "ft": 0.3048}
 """Linear units whose length is known."""
-HIGHEST_GIANT = 9000.0
-"""Metres: the flying height up to which Appendix F of the GIANT guide holds."""
 
 _AIR_NAMES = {"giant": "GIANT guide, Appendix F", "standard": "standard atmosphere"}
 _WATER_NAMES = {"giant": "GIANT guide, Appendix G", "snell": "Snell's law"}
@@ -103,52 +96,3 @@ def metres_per_unit(linear_unit: str) -> float:
         units = " or ".join(METRES_PER_UNIT)
         raise InputError(f"refraction needs a linear unit of known length, {units}, not {linear_unit!r}")
     return METRES_PER_UNIT[linear_unit]
-
-
-def check_cameras(block: Block) -> None:
-    """Refuse photos taken from below the water.
-
-    Raises
-    ------
-    InputError
-        A photo whose initial position is at the water level or below.
-    """
-    refraction = block.refraction
-    if refraction is None or refraction.water is None:
-        return
-    sunk = np.flatnonzero(block.photo_positions[:, 2] <= refraction.water_level)
-    if sunk.size:
-        photo = int(sunk[0])
-        height, unit = block.photo_positions[photo, 2], block.linear_unit
-        raise InputError(
-            f"photo {block.photo_ids[photo]} is not above the water: its height is {height:.3f} {unit},"
-            f" the water level {refraction.water_level:.3f} {unit}"
-        )
-
-
-def remarks(block: Block, photo_positions: NDArray[np.float64]) -> list[Message]:
-    """Say where the models in force do not quite hold.
-
-    Parameters
-    ----------
-    block
-        The block.
-    photo_positions
-        (P, 3) its adjusted stations.
-    """
-    refraction = block.refraction
-    if refraction is None or (refraction.air is None and refraction.water is None):
-        return []
-    messages = []
-    heights = metres_per_unit(block.linear_unit) * photo_positions[:, 2]
-    high = [block.photo_ids[photo] for photo in np.flatnonzero(heights > HIGHEST_GIANT)]
-    if refraction.air == "giant" and high:
-        messages.append(
-            Message(
-                f"the air refraction of GIANT holds up to {HIGHEST_GIANT:g} m, below the photos"
-                f' {listed(high)}: the model "standard" has no such limit'
-            )
-        )
-    if not block.geographic:
-        messages.append(Message("refraction in rectangular space takes Z as the height and the vertical"))
-    return messages

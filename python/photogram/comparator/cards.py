@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid
-from photogram.comparator.readings import Place, Reading, Session, collect_cases
+from photogram.comparator.readings import Reading, Session, collect_cases
 from photogram.errors import InputError
 from photogram.giant.records import Record, Source
 from photogram.messages import Message
+from photogram.places import Place
 
 __all__ = ["Header", "join_least_count", "read_cards", "to_cards"]
 

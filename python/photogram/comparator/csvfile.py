@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from photogram.comparator.readings import Place
 from photogram.errors import InputError
+from photogram.places import Place
 
 __all__ = ["Row", "Table", "read_table"]
 

@@ -14,8 +14,9 @@ from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from photogram.adjusted import Floats
-    from photogram.comparator.readings import Integers
 
 __all__ = ["BUILT_IN", "Grid", "built_in_grid", "find_grid", "read_grid"]
 
@@ -42,7 +43,7 @@ class Grid:
     """
 
     number: int
-    points: Integers
+    points: NDArray[np.int64]
     xy_um: Floats
     sigma_um: float | None = None
     adopted: str = ""
@@ -68,10 +69,10 @@ class Grid:
             number, np.arange(1, columns**2 + 1), np.column_stack([x.ravel(), y.ravel()]), sigma_um=sigma_um
         )
 
-    def rows_of(self, points: Integers) -> Integers:
+    def rows_of(self, points: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the rows of points, which must all be on the plate."""
         order = np.argsort(self.points)
-        rows: Integers = order[np.searchsorted(self.points, points, sorter=order)]
+        rows: NDArray[np.int64] = order[np.searchsorted(self.points, points, sorter=order)]
         return rows
 
     def to_csv(self) -> bytes:

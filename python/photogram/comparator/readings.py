@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.messages import Message
+from photogram.places import Place
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,27 +21,10 @@ if TYPE_CHECKING:
 
     Integers = NDArray[np.int64]
 
-__all__ = ["Case", "Place", "Reading", "Session", "collect_cases"]
+__all__ = ["Case", "Reading", "Session", "collect_cases"]
 
 FURTHEST_UM = 1000.0
 """A reading this far from the others on its point was taken on another point, or is in another unit."""
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where something was read: file, record number (from 1) and record, as far as they are known."""
-
-    file: Path | None = None
-    record: int | None = None
-    text: str | None = None
-
-    def error(self, message: str) -> InputError:
-        """Return an error that names the place."""
-        return InputError(message, file=self.file, record=self.record, text=self.text)
-
-    def message(self, message: str) -> Message:
-        """Return a remark that names the place."""
-        return Message(message, self.file, self.record, self.text)
 
 
 @dataclass(frozen=True)

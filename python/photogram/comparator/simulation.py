@@ -12,7 +12,8 @@ import numpy as np
 from photogram.comparator.correction import Correction
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.orientation import exchanged
-from photogram.comparator.readings import Case, Place, Session
+from photogram.comparator.readings import Case, Session
+from photogram.places import Place
 
 if TYPE_CHECKING:
     from photogram.adjusted import Floats

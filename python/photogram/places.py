@@ -1,0 +1,28 @@
+"""Places in files, so that errors and remarks can name them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from photogram.errors import InputError
+from photogram.messages import Message
+
+__all__ = ["Place"]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something was read: file, record number (from 1) and record, as far as they are known."""
+
+    file: Path | None = None
+    record: int | None = None
+    text: str | None = None
+
+    def error(self, message: str) -> InputError:
+        """Return an error that names the place."""
+        return InputError(message, file=self.file, record=self.record, text=self.text)
+
+    def message(self, message: str) -> Message:
+        """Return a remark that names the place."""
+        return Message(message, self.file, self.record, self.text)
