@@ -283,7 +283,8 @@ def test_the_options_of_simulate_are_the_arguments_of_the_function():
         assert options[name].default == arguments[name].default
 
 
-def test_simulate_writes_a_project_and_its_truth(run, tmp_path):
+@pytest.mark.giant("1", "fictitious data generator: simulated projects")
+def test_section_1_simulate_writes_a_project_and_its_truth(run, tmp_path):
     result = run("simulate", "block", *SMALL, "--blunders", "3", "--seed", "7")
     assert result.exit_code == 0
     assert "8 photographs" in result.output

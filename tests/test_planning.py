@@ -137,11 +137,11 @@ def test_standard_deviations_scale_with_those_of_the_observations():
 RUNS = 1000
 
 
-@pytest.mark.giant("1", "accuracy predicted before any photograph is taken: Monte Carlo")
+@pytest.mark.giant("1", "accuracy is predicted before any photograph is taken")
 @pytest.mark.parametrize(
     "kind", [RECTANGULAR, {**GEOGRAPHIC, "position_sd": 0.2, "control": "none"}], ids=["control", "GNSS"]
 )
-def test_errors_of_adjustments_scatter_as_predicted(kind):
+def test_section_1_errors_of_adjustments_scatter_as_predicted(kind):
     truth = network(photos_per_strip=3, points_per_photo=12, control_sd=0.1, **{"control": "corners", **kind})
     predicted = predict(truth)
     random = np.random.default_rng(2024)
@@ -300,7 +300,6 @@ def group(made: Plan, pattern: int, name: str):
     return next(quality for quality in made.patterns[pattern].points if quality.group == name)
 
 
-@pytest.mark.giant("1", "different configurations of control planned")
 def test_what_textbooks_say_of_blocks(two_patterns):
     perimeter, corners = 0, 1
     for pattern in (perimeter, corners):
@@ -564,8 +563,8 @@ def test_what_plan_refuses(run, tmp_path):
     assert "no control: the observations leave 7 combinations" in result.stderr
 
 
-@pytest.mark.giant("1", "fictitious data generator outside the program: a project of simulated images")
-def test_projects_are_planned_where_their_images_put_them(run, tmp_path):
+@pytest.mark.giant("1", "fictitious data generator: simulated projects")
+def test_section_1_projects_are_planned_where_their_images_put_them(run, tmp_path):
     assert run("simulate", "a/block", *SMALL).exit_code == 0
     assert run("simulate", "b/block", *SMALL, "--control", "corners").exit_code == 0
     result = run("plan", "a/block", "b/block", "--json", "files.json")

@@ -353,7 +353,8 @@ def test_fixed_unknowns_stay_and_have_no_covariance(block):
         np.testing.assert_array_equal(redundancy, 0.0)
 
 
-def test_weights_lead_from_free_to_fixed(block):
+@pytest.mark.giant("1", "all unknowns are weighted, from known to free")
+def test_section_1_weights_lead_from_free_to_fixed(block):
     fixed, free = with_weights(block, 0.0), with_weights(block, math.inf)
     np.testing.assert_allclose(free.photo_positions, adjust(block).photo_positions, rtol=0, atol=1e-5)
     for limit, sd in ((fixed, 1e-6), (free, 1e6)):
@@ -467,8 +468,9 @@ def test_turning_the_earth_changes_nothing(turn):
 # Coarse starts
 
 
+@pytest.mark.giant("1", "gross initial values are tolerated")
 @pytest.mark.parametrize("seed", range(8))
-def test_starts_fifteen_degrees_off_converge(seed):
+def test_section_1_starts_fifteen_degrees_off_converge(seed):
     start = {"attitude_error": math.radians(15), "position_error": 200.0}
     simulation = simulate(strips=2, photos_per_strip=4, points_per_photo=30, seed=seed, **start)
     result = adjust(simulation.block)

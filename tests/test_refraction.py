@@ -42,7 +42,8 @@ def microradians(air: Any, camera: float, point: float) -> float:
 # The models
 
 
-@pytest.mark.giant("12", "air refraction: figures of the example")
+@pytest.mark.giant("12", "air: K_a, 47.97 microradians at 4.5 km")
+@pytest.mark.giant("12", "correction of the height by (K_a + K_w)(dX^2 + dY^2 + dZ0^2)/dZ0")
 def test_section_12_air_refraction_gives_the_figures_of_the_example():
     air = GOLDEN["refraction_examples"]["air"]
     camera, point = 1e3 * air["H_km"], 1e3 * air["h_km"]
@@ -52,7 +53,8 @@ def test_section_12_air_refraction_gives_the_figures_of_the_example():
     assert lift(Refraction("giant"), camera, across, point) == pytest.approx(air["dZ_at_45deg_m"], abs=5e-6)
 
 
-@pytest.mark.giant("12", "dZ = (K_a + K_w) (dX^2 + dY^2 + dZ0^2) / dZ0")
+@pytest.mark.giant("12", "correction of the height by (K_a + K_w)(dX^2 + dY^2 + dZ0^2)/dZ0")
+@pytest.mark.giant("12", "water: K_w for points below the water level")
 def test_section_12_constants_of_air_and_water_add():
     both = lift(Refraction("giant", "giant", 2.0), 900.0, 700.0, -8.0)
     parts = (
@@ -65,7 +67,8 @@ def test_section_12_constants_of_air_and_water_add():
     )
 
 
-@pytest.mark.giant("12", "water refraction: dZ = (Hc + d) (d - d') / (Hc + d'), exact d - d'")
+@pytest.mark.giant("12", "water: K_w for points below the water level")
+@pytest.mark.giant("12", "water: rigorous two-media ray")
 @pytest.mark.parametrize(("camera", "across", "depth"), [(50.0, 40.0, 3.0), (1500.0, 1e3, 20.0)])
 def test_section_12_water_refraction_against_the_exact_lift(camera, across, depth):
     exact = lift(Refraction(None, "snell", 7.0, 1.33), 7.0 + camera, across, 7.0 - depth)
@@ -106,7 +109,8 @@ def test_the_standard_model_is_the_ray_through_thin_layers(camera, angle):
     assert (angle - straight) == pytest.approx(seen - straight, rel=1e-3)
 
 
-def test_rays_through_water_obey_snell():
+@pytest.mark.giant("12", "water: rigorous two-media ray")
+def test_section_12_rays_through_water_obey_snell():
     camera, across, depth, index = 120.0, 150.0, 6.0, 1.34
     seen = depth - lift(Refraction(None, "snell", 0.0, index), camera, across, -depth)
     surface = across * camera / (camera + seen)
@@ -121,7 +125,8 @@ def test_rays_through_water_obey_snell():
     assert abs(places[ways.argmin()] - surface) < 1.1e-3
 
 
-def test_feet_are_converted():
+@pytest.mark.giant("14", "18 heights of the refraction model in metres, also in feet jobs")
+def test_section_14_feet_are_converted():
     for refraction in (Refraction("giant", "giant", 10.0), Refraction("standard", "snell", 10.0)):
         metres = lift(refraction, 3000.0, 2000.0, 4.0)
         in_feet = Refraction(refraction.air, refraction.water, 10.0 / 0.3048)
@@ -187,6 +192,7 @@ def simulated(refraction: Refraction | None, space: dict[str, Any], **options: A
     return simulate(refraction=refraction, **{**arguments, **options}, **space)
 
 
+@pytest.mark.giant("12", "applied in every iteration, for every point")
 @SPACES
 @pytest.mark.parametrize(
     ("refraction", "delay"),
@@ -198,7 +204,7 @@ def simulated(refraction: Refraction | None, space: dict[str, Any], **options: A
     ],
     ids=["air", "giant, all in water", "rigorous, all in water", "rigorous, with a shore"],
 )
-def test_a_block_is_recovered_as_fast_as_without_refraction(space, refraction, delay):
+def test_section_12_a_block_is_recovered_as_fast_as_without_refraction(space, refraction, delay):
     plain = adjust(simulated(None, space).block)
     simulation = simulated(refraction, space)
     result = adjust(simulation.block)
@@ -211,10 +217,11 @@ def test_a_block_is_recovered_as_fast_as_without_refraction(space, refraction, d
     assert np.sqrt((error**2).mean()) == pytest.approx(1, abs=0.3)
 
 
+@pytest.mark.giant("12", "applied in every iteration, for every point")
 @SPACES
 @pytest.mark.parametrize("air", AIRS)
 @pytest.mark.parametrize("water", WATERS)
-def test_without_refraction_heights_are_wrong_by_the_lift(space, air, water):
+def test_section_12_without_refraction_heights_are_wrong_by_the_lift(space, air, water):
     refraction = Refraction(air, water, LEVEL)
     truth = simulated(refraction, space).truth
     fixed = truth.replace(
@@ -290,7 +297,7 @@ def test_a_linear_unit_must_have_a_length(dry):
     dry.replace(linear_unit="chain")
 
 
-@pytest.mark.giant("12", "warning above 9,000 m")
+@pytest.mark.giant("12", "air: warning above 9 km")
 def test_section_12_cameras_above_9000_m_are_named():
     block = simulated(
         Refraction("giant"), GEOGRAPHIC, flying_height=9200.0, photos_per_strip=2, strips=1
@@ -325,7 +332,9 @@ def test_report_and_document_name_the_model(dry):
 # GIANT files and the command line
 
 
-@pytest.mark.giant("2.2", "COMMON columns 16, 17, 31-40: refraction, water level")
+@pytest.mark.giant("2.2", "column 16: air refraction")
+@pytest.mark.giant("2.2", "column 17: water refraction")
+@pytest.mark.giant("2.2", "columns 31-40: water level")
 @pytest.mark.parametrize(
     ("switches", "expected"),
     [
@@ -340,7 +349,8 @@ def test_section_2_2_switches_of_common(switches, expected):
     assert job_refraction(common) == expected
 
 
-@pytest.mark.giant("14", "open point 18: jobs in feet")
+@pytest.mark.giant("14", "18 heights of the refraction model in metres, also in feet jobs")
+@pytest.mark.giant("2.2", "columns 31-40: water level")
 def test_section_14_the_water_level_of_jobs_in_feet_is_in_metres():
     feet = {"semi_major": 20925832.16, "semi_minor": 20854892.02, "geographic": True}
     refraction = job_refraction(Common(water_refraction=True, water_level=3.048, **feet))
@@ -349,7 +359,9 @@ def test_section_14_the_water_level_of_jobs_in_feet_is_in_metres():
     assert refraction.refractive_index == 1.340
 
 
-@pytest.mark.giant("2.2", "refraction is written back")
+@pytest.mark.giant("2.2", "column 16: air refraction")
+@pytest.mark.giant("2.2", "column 17: water refraction")
+@pytest.mark.giant("2.2", "columns 31-40: water level")
 @pytest.mark.parametrize("refraction", [None, Refraction("giant"), Refraction("giant", "giant", 12.345)])
 def test_section_2_2_refraction_comes_back_from_files(dry, tmp_path, refraction):
     project = Project.from_block(
@@ -387,7 +399,9 @@ def run(monkeypatch, tmp_path):
 SMALL = ["--strips", "1", "--photos-per-strip", "4", "--points-per-photo", "30", "--spheroid", "wgs84"]
 
 
-def test_the_command_line_applies_what_common_and_options_say(run):
+@pytest.mark.giant("14", "1 columns 16 and 17: 1 applies refraction")
+@pytest.mark.giant("14", "17 refractive index of water: parameter")
+def test_section_14_the_command_line_applies_what_common_and_options_say(run):
     made = run("simulate", "block", *SMALL, "--air-refraction", "giant", "--water-refraction", "giant")
     assert made.exit_code == 0, made.output
     common = read_project("block").common

@@ -158,25 +158,44 @@ def test_section_4_heights_are_used_as_given(directory, tmp_path):
     np.testing.assert_allclose(heights, adjust(block).photo_positions[:, 2], rtol=0, atol=0.0001)
 
 
+UTM = {"origin": (500_000.0, 3_260_000.0, 0.0)}
+
+
 @pytest.mark.giant("4", "rectangular: a map projection works, with a warning about curvature")
-def test_section_4_map_projections_are_remarked_on(tmp_path):
-    moved = simulate(**SIZE, origin=(500_000.0, 3_260_000.0, 0.0), seed=5).block
-    write_project(Project.from_block(moved), tmp_path / "map")
+@pytest.mark.parametrize(
+    ("flight", "micrometres"),
+    [({}, (25, 45)), ({"flying_height": 500.0, "image_sd": 0.002}, (3, 5))],
+    ids=["high", "low, precise images"],
+)
+def test_section_4_map_projections_are_remarked_on(tmp_path, flight, micrometres):
+    write_project(Project.from_block(simulate(**SIZE, **UTM, **flight, seed=5).block), tmp_path / "map")
     read = read_project(tmp_path / "map")
     assert adjust(read.to_block()).converged
     (message,) = read.messages
-    reach = np.hypot(*(moved.photo_positions - moved.photo_positions.mean(axis=0))[:, :2].T).max()
-    assert f"not modelled, which falls {reach**2 / 2 / 6.37e6:.2g} m" in message.text
-    # Local coordinates, geocentric ones, and blocks too small to matter.
-    local = simulate(**SIZE, seed=5).block
-    far = moved.photo_positions * [1, 1, 0] + [0, 0, 5.4e6]
-    near = moved.photo_positions.mean(axis=0) + 0.01 * (
-        moved.photo_positions - moved.photo_positions.mean(axis=0)
+    assert "look like those of a map projection" in message.text
+    # H r^3 / 2 R c^2 with c = 152.74 mm, at a radius of 120 to 140 mm.
+    low, high = micrometres
+    assert low <= int(message.text.partition("by up to ")[2].split()[0]) <= high
+
+
+@pytest.mark.parametrize(
+    "space",
+    [{}, GEOGRAPHIC, {**UTM, "flying_height": 500.0}],
+    ids=["local", "geographic", "a map, from too low for curvature to matter"],
+)
+def test_other_coordinates_are_not_remarked_on(space):
+    local = Project.from_block(simulate(**SIZE, **space, seed=5).block)
+    local.to_block()
+    assert local.messages == []
+
+
+def test_geocentric_coordinates_are_not_remarked_on():
+    block = simulate(**SIZE, **UTM, seed=5).block
+    geocentric = Project.from_block(
+        block.replace(photo_positions=block.photo_positions * [1, 1, 0] + [0, 0, 5.4e6])
     )
-    for block in (local, moved.replace(photo_positions=far), moved.replace(photo_positions=near)):
-        project_ = Project.from_block(block)
-        project_.to_block()
-        assert project_.messages == []
+    geocentric.to_block()
+    assert geocentric.messages == []
 
 
 @pytest.mark.giant("4", "local vertical frame at each camera station")

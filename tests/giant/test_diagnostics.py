@@ -77,9 +77,8 @@ def test_section_11_duplicate_control_points(tmp_path):
     assert project.ground[0].position == (110, 210, 10)
 
 
-@pytest.mark.giant("3", "limits N1 to N6")
 @pytest.mark.parametrize("value", [0, -3, 2.5, "4"])
-def test_section_3_limits_are_positive_whole_numbers(value):
+def test_limits_are_positive_whole_numbers(value):
     with pytest.raises(InputError, match="the limit of stations must be a positive whole number"):
         Limits(stations=value)
 
@@ -98,7 +97,7 @@ def refused(directory, limits, **changes):
     return caught.value
 
 
-@pytest.mark.giant("3", "limits N1 to N6")
+@pytest.mark.giant("3", "limits are options, unlimited by default")
 def test_section_3_limits_are_none_by_default_and_read_by_their_names(tmp_path):
     assert Limits.parse("N1=300, n4=8") == Limits(stations=300, photos_per_point=8)
     assert Limits.parse("N2=1,N3=2,N5=3,N6=4") == Limits(points=1, control=2, cameras=3, bandwidth=4)
@@ -112,6 +111,7 @@ def test_section_3_limits_are_none_by_default_and_read_by_their_names(tmp_path):
 
 
 @pytest.mark.giant("11", "**CAMERA STATIONS EXCEEDED n")
+@pytest.mark.giant("3", "N1: stations")
 def test_section_11_camera_stations_exceeded(tmp_path):
     error = refused(tmp_path, Limits(stations=1))
     assert error.message == "**CAMERA STATIONS EXCEEDED 1: there are 2"
@@ -119,6 +119,8 @@ def test_section_11_camera_stations_exceeded(tmp_path):
 
 
 @pytest.mark.giant("11", "**IMAGE POINTS EXCEEDED n")
+@pytest.mark.giant("3", "N2: ground points")
+@pytest.mark.giant("14", "31 N2 counts unique points")
 def test_section_11_image_points_exceeded_counts_different_points(tmp_path):
     error = refused(tmp_path, Limits(points=2))
     assert error.message == "**IMAGE POINTS EXCEEDED 2: there are 3"
@@ -128,6 +130,7 @@ def test_section_11_image_points_exceeded_counts_different_points(tmp_path):
 
 
 @pytest.mark.giant("11", "**GROUND CONTROL EXCEEDED n")
+@pytest.mark.giant("3", "N3: control points")
 def test_section_11_ground_control_exceeded_counts_records(tmp_path):
     error = refused(tmp_path, Limits(control=2))
     assert error.message == "**GROUND CONTROL EXCEEDED 2: there are 3"
@@ -136,13 +139,16 @@ def test_section_11_ground_control_exceeded_counts_records(tmp_path):
     assert error.message == "**GROUND CONTROL EXCEEDED 3: there are 4"
 
 
-@pytest.mark.giant("3", "camera systems, N5")
+@pytest.mark.giant("3", "N5: camera systems")
 def test_section_3_camera_systems_exceeded(tmp_path):
     error = refused(tmp_path, Limits(cameras=1), CAMERAS=["F1982        -152740", "F1983        -152740"])
     assert error.message == "**CAMERA SYSTEMS EXCEEDED 1: there are 2"
 
 
 @pytest.mark.giant("11", "PASS POINTS APPEARING ON MORE THAN n PHOTOGRAPHS")
+@pytest.mark.giant("3", "N4: frames on which one point may appear")
+@pytest.mark.giant("6", "points on more than N4 photographs keep the first N4 images")
+@pytest.mark.giant("14", "23 first N4 images in the order of the frames")
 def test_section_11_the_first_images_in_the_order_of_frames_are_kept(tmp_path):
     # FRAMES lists B before A, though IMAGES has A first.
     frames = [*FRAMES[2:], *FRAMES[:2]]
@@ -176,6 +182,7 @@ def band_files():
 
 
 @pytest.mark.giant("11", "**ERROR IN SUBROUTINE MODID")
+@pytest.mark.giant("3", "N6: bandwidth")
 def test_section_11_the_bandwidth_is_exceeded(tmp_path):
     with_limits(tmp_path, Limits(bandwidth=7), **band_files())
     error = refused(tmp_path, Limits(bandwidth=6), **band_files())
@@ -196,7 +203,10 @@ def test_section_11_five_stations_stand_on_a_line(tmp_path):
     assert error.message.splitlines()[1:3] == ["ADDING VARIABLE 6", "VARIABLES    1    2    3    4    5"]
 
 
-@pytest.mark.giant("11", "**ERROR IN SUBROUTINE MODID: triangulation mode only")
+@pytest.mark.giant("11", "**ERROR IN SUBROUTINE MODID")
+@pytest.mark.giant(
+    "6", "intersection only: no bandwidth error, the point that would break the limit is named"
+)
 def test_section_11_intersection_names_the_point_that_would_break_the_limit(tmp_path):
     intersection = replaced(COMMON, 2, COMMON[1][:9] + "1" + COMMON[1][10:])
     project, block = with_limits(tmp_path, Limits(bandwidth=6), **band_files(), COMMON=intersection)
@@ -233,7 +243,6 @@ def test_of_control_that_stands_there_twice_by_hand_the_first_counts(tmp_path):
 # Not in the guide, but needed
 
 
-@pytest.mark.giant("11", "needed beside the guide: fatal")
 @pytest.mark.parametrize(
     ("changes", "place", "why"),
     [
@@ -242,24 +251,43 @@ def test_of_control_that_stands_there_twice_by_hand_the_first_counts(tmp_path):
             ("FRAMES", 5),
             "the frame 'C' has no images",
             id="frame without images",
+            marks=pytest.mark.giant("11", "frame without images"),
         ),
         pytest.param(
             {"IMAGES": replaced(IMAGES, 6, f"{'B':40}F1983")},
             ("IMAGES", 6),
             "its camera 'F1983' is not in CAMERAS",
             id="unknown camera",
+            marks=pytest.mark.giant("11", "unknown camera"),
         ),
-        pytest.param({"IMAGES": IMAGES[:-1]}, ("IMAGES", 9), "has no terminator", id="missing terminator"),
+        pytest.param(
+            {"IMAGES": IMAGES[:-1]},
+            ("IMAGES", 9),
+            "has no terminator",
+            id="missing terminator",
+            marks=pytest.mark.giant("11", "missing terminator"),
+        ),
         pytest.param(
             {"FRAMES": [*FRAMES, *FRAMES[:2]]},
             ("FRAMES", 5),
             "the frame 'A' is already listed in record 1",
             id="frame listed twice",
+            marks=pytest.mark.giant("11", "frame listed twice"),
         ),
         pytest.param(
-            {"COMMON": ["T", f"{'':17}-1"]}, ("COMMON", 2), "convergence criterion is negative", id="E"
+            {"COMMON": ["T", f"{'':17}-1"]},
+            ("COMMON", 2),
+            "convergence criterion is negative",
+            id="E",
+            marks=pytest.mark.giant("11", "E or iterations out of range"),
         ),
-        pytest.param({"COMMON": ["T", f"{'':13}-"]}, ("COMMON", 2), "column", id="iterations"),
+        pytest.param(
+            {"COMMON": ["T", f"{'':13}-"]},
+            ("COMMON", 2),
+            "column",
+            id="iterations",
+            marks=pytest.mark.giant("11", "E or iterations out of range"),
+        ),
     ],
 )
 def test_section_11_needed_beside_the_guide(tmp_path, changes, place, why):
@@ -269,7 +297,7 @@ def test_section_11_needed_beside_the_guide(tmp_path, changes, place, why):
     assert why in error.message
 
 
-@pytest.mark.giant("11", "needed beside the guide: duplicate image in a frame")
+@pytest.mark.giant("11", "duplicate image in a frame")
 def test_section_11_a_duplicate_image_is_left_out(tmp_path):
     project, block = with_limits(tmp_path, None, IMAGES=with_images(a=["1"]))
     assert [message.record for message in project.messages] == [5]
@@ -277,7 +305,7 @@ def test_section_11_a_duplicate_image_is_left_out(tmp_path):
     assert len(block.image_xy) == 6
 
 
-@pytest.mark.giant("11", "needed beside the guide: station without enough rays")
+@pytest.mark.giant("11", "station without enough rays")
 def test_section_11_a_station_without_enough_rays(tmp_path):
     few = [*IMAGES[:3], *IMAGES[4:]]
     project, _ = with_limits(tmp_path, None, IMAGES=few, GROUND=[])
@@ -295,7 +323,7 @@ def test_section_11_a_station_without_enough_rays(tmp_path):
     assert not any("control tie" in message.text for message in project.messages)
 
 
-@pytest.mark.giant("11", "needed beside the guide: singular point")
+@pytest.mark.giant("11", "singular point")
 def test_section_11_a_singular_point_is_named(small_block):
     # Two photos from one station see the point; rays from one centre do not say how far it is.
     block = small_block

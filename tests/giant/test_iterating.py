@@ -1,4 +1,4 @@
-"""Iteration, intersection, degrees of freedom and covariances: specification, sections 6, 7, 9 and 14."""
+"""Iteration, intersection, degrees of freedom and covariances: specification, sections 6, 7, 9, 13 and 14."""
 
 import math
 import re
@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from test_adjusting import GEOGRAPHIC, SIZE, changed, run, solution, with_files
+from test_adjusting import GEOGRAPHIC, SIZE, changed, differences, run, solution, with_files
 
 from photogram import AsPublished, adjust, simulate
 from photogram.giant import Common, ImageFrame, Project, read_project, write_project
@@ -155,6 +155,7 @@ def test_section_6_intersection_is_point_by_point(directory, tmp_path):
     assert np.nanmax(np.abs(differences)) < 1e-4
 
 
+@pytest.mark.giant("13", "5 error propagation in the last run")
 @pytest.mark.giant("6", "intersection only: later points from saved stations")
 def test_section_6_later_points_from_saved_stations(directory, tmp_path):
     run(directory, "--out", tmp_path / "out")
@@ -167,6 +168,27 @@ def test_section_6_later_points_from_saved_stations(directory, tmp_path):
     assert np.nanmax(np.abs(differences)) < 0.01
     run(saved, "--out", tmp_path / "later")
     assert (tmp_path / "later" / "FRAMES").read_bytes() == (tmp_path / "out" / "FRAMES").read_bytes()
+
+
+@pytest.mark.giant("13", "3 clean-up")
+@pytest.mark.giant("13", "4 fit the control: bootstrap")
+def test_section_13_clean_up_without_control_then_fit_the_control(directory, tmp_path):
+    # Loose stations, no control: the block hangs together, wherever it is.
+    read = read_project(directory)
+    write_project(Project(read.common, read.cameras, read.frames, read.images, []), tmp_path / "loose")
+    run(tmp_path / "loose", "--out", tmp_path / "clean")
+    direct = solution(directory)
+    loose = solution(tmp_path / "loose")
+    assert loose.sums_of_squares.ground == 0
+    assert loose.sums_of_squares.plates < direct.sums_of_squares.plates
+    assert np.abs(loose.photo_positions - direct.photo_positions)[:, 2].max() > 1
+    # Its stations are the start of the run that has the control; their standard deviations are the old ones.
+    fit = with_files(directory, tmp_path / "fit", FRAMES=tmp_path / "clean" / "FRAMES")
+    for before, after in zip(read.frames, read_project(fit).frames, strict=True):
+        assert (before.position_sd, before.attitude_sd) == (after.position_sd, after.attitude_sd)
+    fitted = solution(fit)
+    assert fitted.initial_weighted_sum_of_squares < 0.1 * direct.initial_weighted_sum_of_squares
+    assert max(differences(direct, fitted)) < 1e-4
 
 
 # Degrees of freedom and covariances, sections 7 and 9
@@ -267,6 +289,7 @@ def test_section_2_6_unheld_components_are_checks(directory, tmp_path):
     assert printed == pytest.approx(np.sqrt(np.nanmean(differences**2, axis=0)) * scale, abs=1e-5)
 
 
+@pytest.mark.giant("13", "10 weights as a diagnostic tool")
 @pytest.mark.giant("2.6", "held components are held only to the extent of their weight")
 def test_section_2_6_control_yields_to_its_weight():
     block = simulate(**SIZE, seed=6).block

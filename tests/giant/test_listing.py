@@ -96,6 +96,7 @@ def kinds(text):
 # Numbers
 
 
+@pytest.mark.giant("10", "triangulated camera stations")
 def test_section_10_numbers_are_those_of_fortran():
     cases = {
         3.77e-14: " 0.377E-13",
@@ -116,6 +117,8 @@ def test_section_10_numbers_are_those_of_fortran():
     assert fixed(-1234567.5, 8, 3) == "-1234567.500"
 
 
+@pytest.mark.giant("10", "triangulated camera stations")
+@pytest.mark.giant("14", "27 kappa 0 to 360, omega and phi -180 to 180 degrees")
 def test_section_10_angles_are_rounded_as_a_whole_and_have_their_ranges():
     second = np.radians(1 / 3600)
     assert dms(-second * (95 * 3600 + 5 * 60 + 59.99996)) == "- 95  6  0.0000"
@@ -191,7 +194,7 @@ def test_section_10_option_lines_that_are_left_out(switches, word):
 # Page breaks
 
 
-@pytest.mark.giant("10", "page lengths")
+@pytest.mark.giant("10", "page lengths: 10 control points, 13 stations, 52 points or 13 with covariances")
 @pytest.mark.parametrize(("count", "expected"), [(0, [0]), (52, [52]), (53, [52, 1]), (105, [52, 52, 1])])
 def test_section_10_pages_break_after_52_lines(count, expected):
     pages = paginate(["HEAD", ""], ([str(number)] for number in range(count)))
@@ -199,7 +202,7 @@ def test_section_10_pages_break_after_52_lines(count, expected):
     assert all(page[:2] == ["HEAD", ""] for page in pages)
 
 
-def test_section_10_what_closes_a_listing_stands_together():
+def test_what_closes_a_listing_stands_together():
     entries = [[str(number)] for number in range(50)]
     assert len(paginate([], entries, closing=["A", "B"])) == 1
     assert paginate([], entries, closing=["A", "B", "C"])[1] == ["A", "B", "C"]
@@ -213,7 +216,7 @@ def plain_frame(points, **switches):
     return frame_pages(RECTANGULAR, False, station, frame, **switches)
 
 
-@pytest.mark.giant("10", "one page per frame")
+@pytest.mark.giant("10", "page of a frame")
 def test_section_10_a_frame_with_many_points_goes_on_overleaf():
     first, second = plain_frame(200)
     assert len(first) == len(plain_frame(1000)[1]) == 7 + 52
@@ -223,7 +226,9 @@ def test_section_10_a_frame_with_many_points_goes_on_overleaf():
     assert "ST. D. OF X =    0.0060     ST. D. OF Y =    0.0100" in first[3]
 
 
-@pytest.mark.giant("2.2", "columns 3 and 4: list input stations, plate coordinates")
+@pytest.mark.giant("10", "page of a frame")
+@pytest.mark.giant("2.2", "column 3: list input camera stations")
+@pytest.mark.giant("2.2", "column 4: list input plate coordinates")
 def test_section_10_a_frame_without_its_station_or_without_its_points():
     (plates,) = plain_frame(5, parameters=False)
     assert not any("OMEGA" in line for line in plates)
@@ -233,7 +238,7 @@ def test_section_10_a_frame_without_its_station_or_without_its_points():
     assert not any("P L A T E" in line or "P4" in line for line in parameters)
 
 
-def test_section_10_long_names_are_printed_whole():
+def test_long_names_are_printed_whole():
     name = "A-NAME-OF-NO-8-CHARACTERS"
     ones, square = np.ones((1, 3)), np.ones((1, 6, 6))
     held = np.ones((1, 3), dtype=bool)
@@ -249,7 +254,8 @@ def test_section_10_long_names_are_printed_whole():
         assert name in "\n".join(pages[0])
 
 
-@pytest.mark.giant("10", "ERROR WARNINGS")
+@pytest.mark.giant("10", "error warnings")
+@pytest.mark.giant("11", "names are printed four to a line")
 def test_section_10_warnings_have_four_names_on_a_line():
     names = [f"N{number}" for number in range(9)]
     (page,) = warning_pages([ErrorWarning("FIRST", names), ErrorWarning("SECOND", ["A"], general=True)])
@@ -266,7 +272,7 @@ def test_section_10_warnings_have_four_names_on_a_line():
     assert len(warning_pages([ErrorWarning("MANY", [f"N{number}" for number in range(400)])])) == 2
 
 
-@pytest.mark.giant("10", "TRIANGULATED POINTS RESIDUALS")
+@pytest.mark.giant("10", "triangulated points residuals")
 def test_section_10_residuals_of_a_point_on_many_frames():
     frames = [f"F{number}" for number in range(25)]
     point = PointResiduals("P", frames, np.full((25, 2), [0.0016, -0.0004]))
@@ -279,6 +285,8 @@ def test_section_10_residuals_of_a_point_on_many_frames():
     assert lines[2] == ["0"] * 10
 
 
+@pytest.mark.giant("10", "triangulated points residuals")
+@pytest.mark.giant("7", "degrees of freedom not positive: reported, undefined, scale 1")
 def test_section_10_without_degrees_of_freedom_the_estimates_are_undefined():
     from photogram.adjusted import SumsOfSquares
 
@@ -295,11 +303,11 @@ def stable(text):
     return pattern.sub(lambda match: f"{match[1]}{round(float(match[2]), 4) + 0.0:.4f}", text)
 
 
-def test_section_10_the_listing_of_the_example_is_the_snapshot(example, adjusted):
+def test_the_listing_of_the_example_is_the_snapshot(example, adjusted):
     assert stable(listing(example, *adjusted)) == stable(SNAPSHOT.read_text())
 
 
-def test_section_10_rounding_errors_do_not_change_the_snapshot(example):
+def test_rounding_errors_do_not_change_the_snapshot(example):
     generator = np.random.default_rng(5)
     expected = stable(SNAPSHOT.read_text())
     block = example.to_block()
@@ -313,6 +321,7 @@ def test_section_10_rounding_errors_do_not_change_the_snapshot(example):
 
 
 @pytest.mark.giant("10", "order of the pages")
+@pytest.mark.giant("10", "every page: carriage control, banner, title, number from 0")
 def test_section_10_the_example_has_all_kinds_of_pages_in_their_order(example, adjusted):
     text = listing(example, *adjusted)
     assert kinds(text) == list(TITLES)
@@ -326,7 +335,11 @@ def test_section_10_the_example_has_all_kinds_of_pages_in_their_order(example, a
     assert re.findall(r"COUNT = +(\d+)", text) == ["132", "132", "134"]
 
 
-@pytest.mark.giant("2.2", "columns 3-6, 8: what is listed")
+@pytest.mark.giant("2.2", "column 3: list input camera stations")
+@pytest.mark.giant("2.2", "column 4: list input plate coordinates")
+@pytest.mark.giant("2.2", "column 5: list input ground control")
+@pytest.mark.giant("2.2", "column 6: list triangulated ground points")
+@pytest.mark.giant("2.2", "column 8: list adjusted camera stations")
 @pytest.mark.parametrize(
     ("switches", "missing"),
     [
@@ -340,7 +353,7 @@ def test_section_10_the_example_has_all_kinds_of_pages_in_their_order(example, a
     ],
     ids=str,
 )
-def test_section_10_switches_of_pages(example, adjusted, switches, missing):
+def test_section_2_2_switches_of_pages(example, adjusted, switches, missing):
     text = printed(changed(example, **switches), adjusted[1])
     assert set(TITLES) - set(kinds(text)) == missing
     assert (spaced("CAMERA STATION PARAMETERS") in text) == switches.get("list_input_stations", True)
@@ -348,7 +361,8 @@ def test_section_10_switches_of_pages(example, adjusted, switches, missing):
 
 
 @pytest.mark.giant("2.2", "column 11: error propagation")
-def test_section_10_without_error_propagation_there_are_no_covariances(example, adjusted):
+@pytest.mark.giant("13", "5 error propagation in the last run")
+def test_section_2_2_without_error_propagation_there_are_no_covariances(example, adjusted):
     text = printed(changed(example, error_propagation=False), adjusted[1])
     assert "COVARIANCE" not in text
     assert "RMS FOR STANDARD DEVIATIONS" not in text
@@ -356,6 +370,25 @@ def test_section_10_without_error_propagation_there_are_no_covariances(example, 
     assert [sum("LAT" in line for line in page) for page in points] == [52, 52, 40]
 
 
+@pytest.mark.giant("9", "summary: count and rms of standard deviations, unheld components only")
+@pytest.mark.giant("14", "20 rms and counts of unheld components only")
+def test_section_9_rms_of_the_standard_deviations_of_what_is_not_held(example, adjusted):
+    block, result = adjusted
+    found = re.findall(r"COUNT = +(\d+) .*=(.*)", listing(example, block, result))
+    arcsec = np.degrees(1) * 3600
+    for axis, (count, printed_rms) in enumerate(found):
+        unheld = ~np.isfinite(block.point_sd[:, axis])
+        rms, all_of_them = (
+            np.sqrt(np.mean(sd**2)) for sd in (result.point_sd[unheld, axis], result.point_sd[:, axis])
+        )
+        unit = 1.0 if axis == 2 else arcsec
+        assert int(count) == unheld.sum()
+        assert float(printed_rms.split()[-1]) == pytest.approx(rms * unit, abs=5.1e-5)
+        assert all_of_them * unit < rms * unit - 1e-4
+    assert len(found) == 3
+
+
+@pytest.mark.giant("10", "triangulated points residuals")
 @pytest.mark.giant("2.2", "columns 41-50: residual listing limit")
 @pytest.mark.parametrize("limit", [0.0, 0.010, 0.030, -1.0])
 def test_section_10_residual_limit(example, adjusted, limit):
@@ -370,7 +403,9 @@ def test_section_10_residual_limit(example, adjusted, limit):
     assert sum("DEGREES OF FREEDOM" in line for line in body) == 1
 
 
+@pytest.mark.giant("10", "sort: ascending, right-justified names")
 @pytest.mark.giant("2.2", "column 13: sort ground points")
+@pytest.mark.giant("14", "12 sorting of names")
 def test_section_10_points_in_processing_order_or_sorted(example, adjusted):
     block, result = adjusted
     order = {}
@@ -383,8 +418,9 @@ def test_section_10_points_in_processing_order_or_sorted(example, adjusted):
     assert order[True] != order[False]
 
 
-@pytest.mark.giant("2", "unit 9: adjusted GROUND is sorted as the printout is")
-def test_section_10_adjusted_ground_is_sorted_too(example, adjusted):
+@pytest.mark.giant("2.2", "column 13: sort ground points")
+@pytest.mark.giant("14", "12 sorting of names")
+def test_section_2_2_adjusted_ground_is_sorted_too(example, adjusted):
     from photogram.giant.export import adjusted_ground
 
     block, result = adjusted
@@ -394,7 +430,8 @@ def test_section_10_adjusted_ground_is_sorted_too(example, adjusted):
         assert names == (sorted(names, key=lambda name: name.rjust(8)) if sort else block.point_ids)
 
 
-@pytest.mark.giant("14", "28: every iteration has its page; corrections in radians and linear units")
+@pytest.mark.giant("10", "camera stations corrections")
+@pytest.mark.giant("14", "28 pages of the iterations")
 def test_section_10_corrections_of_stations_lead_to_the_adjusted_values(example, adjusted):
     block, result = adjusted
     listed = [
@@ -416,6 +453,7 @@ def test_section_10_corrections_of_stations_lead_to_the_adjusted_values(example,
     )
 
 
+@pytest.mark.giant("10", "triangulated points residuals")
 @pytest.mark.giant("2.2", "column 12: unit variance")
 @pytest.mark.parametrize(("basis", "row"), [("free", 0), ("constrained", 1), ("unity", 0)])
 def test_section_10_unit_variance_and_its_degrees_of_freedom(example, basis, row):
@@ -446,7 +484,8 @@ def control_block(text):
     return page, found
 
 
-@pytest.mark.giant("14", "7: corrections of unheld components, as a check and as published")
+@pytest.mark.giant("10", "corrections applied to ground control")
+@pytest.mark.giant("14", "7 unheld components: adjusted minus supplied, own rms, only where supplied")
 def test_section_10_corrections_of_unheld_components(example, adjusted):
     block, result = adjusted
     page, cells = control_block(listing(example, block, result))
@@ -477,7 +516,10 @@ def rectangular():
     return project, block, adjust(block)
 
 
-@pytest.mark.giant("10", "rectangular jobs")
+@pytest.mark.giant("10", "triangulated camera stations")
+@pytest.mark.giant("10", "triangulated ground points")
+@pytest.mark.giant("10", "corrections applied to ground control")
+@pytest.mark.giant("2.2", "column 1: object space")
 def test_section_10_rectangular_jobs_have_lengths(rectangular):
     project, block, result = rectangular
     text = listing(project, block, result)
@@ -495,6 +537,9 @@ def test_section_10_rectangular_jobs_have_lengths(rectangular):
     assert f"{check:<10}*7*" in text
 
 
+@pytest.mark.giant("10", "page 0: options")
+@pytest.mark.giant("2.2", "the axes fix the linear unit of the job")
+@pytest.mark.giant("14", "8 units of the corrections are printed")
 def test_section_10_jobs_in_feet_print_feet(example, adjusted):
     foot = 0.3048
     common = dataclasses.replace(
@@ -521,8 +566,9 @@ def test_section_10_jobs_in_feet_print_feet(example, adjusted):
     assert f"ELV ={height:15.4f}" in text
 
 
-@pytest.mark.giant("10", "intersection only")
-def test_section_10_intersection_only_lists_residuals_and_points(example):
+@pytest.mark.giant("6", "intersection only: residuals and ground coordinates are printed")
+@pytest.mark.giant("14", "30 degrees of freedom of intersection")
+def test_section_6_intersection_only_lists_residuals_and_points(example):
     project = changed(example, intersection_only=True)
     block = project.to_block()
     result = adjust(block, fix_photos=True, unit_variance="free")
@@ -534,8 +580,7 @@ def test_section_10_intersection_only_lists_residuals_and_points(example):
     assert f"DEGREES OF FREEDOM...................... ={2 * 483 + 34 - 3 * 144:>12}" in text
 
 
-@pytest.mark.giant("14", "5: not converged")
-def test_section_10_what_there_is_of_an_adjustment_that_failed_is_printed_and_says_so(example):
+def test_what_there_is_of_an_adjustment_that_failed_is_printed_and_says_so(example):
     block = example.to_block()
     result = adjust(block, as_published=AsPublished(max_iterations=1))
     assert result.status == "not converged"
@@ -591,14 +636,15 @@ def run(monkeypatch, tmp_path):
     return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
-def test_section_10_the_command_writes_the_listing(run, tmp_path):
+@pytest.mark.giant("2", "unit 6: printout")
+def test_section_2_the_command_writes_the_listing(run, tmp_path):
     result = run("giant", "--example", "--quiet", "--listing", "print/unit6.txt")
     assert (result.exit_code, result.output) == (0, "")
     text = (tmp_path / "print" / "unit6.txt").read_text()
     assert stable(text) == stable(SNAPSHOT.read_text())
 
 
-def test_section_10_the_listing_of_the_command_is_written_without_convergence(run, rectangular, tmp_path):
+def test_the_listing_of_the_command_is_written_without_convergence(run, rectangular, tmp_path):
     from photogram.giant import write_project
 
     project = changed(rectangular[0], max_iterations=1)
@@ -610,7 +656,7 @@ def test_section_10_the_listing_of_the_command_is_written_without_convergence(ru
     assert "THE CHANGE OF THE LAST ITERATION" in text
 
 
-def test_section_10_documents_go_over_no_other_file(run, rectangular, tmp_path):
+def test_documents_go_over_no_other_file(run, rectangular, tmp_path):
     from photogram.giant import write_project
 
     write_project(rectangular[0], tmp_path / "block")

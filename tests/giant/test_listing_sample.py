@@ -67,7 +67,8 @@ def contains(pages, *expected):
 # Banner and page 0
 
 
-def test_the_banner_of_a_page_begins_with_carriage_control_and_ends_with_the_number():
+@pytest.mark.giant("10", "every page: carriage control, banner, title, number from 0")
+def test_section_10_the_banner_of_a_page_begins_with_carriage_control_and_ends_with_the_number():
     text = printout(SUMMARY["title_lines"]["case1"], [[], ["A LINE"]])
     first, second, line = text.splitlines()
     assert first.startswith(
@@ -98,7 +99,7 @@ def test_section_10_options_of_the_second_case():
 # Pages 1, 21, 24
 
 
-@pytest.mark.giant("10", "one page per frame")
+@pytest.mark.giant("10", "page of a frame")
 def test_section_10_page_of_a_frame():
     values = {row["parameter"]: float(row["value"]) for row in rows("stations_initial.csv")[:6]}
     given = [values[name] for name in ("lon", "lat", "elev", "omega", "phi", "kappa")]
@@ -132,7 +133,8 @@ def test_section_10_page_of_a_frame():
     )
 
 
-@pytest.mark.giant("10", "GROUND CONTROL DATA")
+@pytest.mark.giant("10", "ground control data")
+@pytest.mark.giant("10", "page lengths: 10 control points, 13 stations, 52 points or 13 with covariances")
 def test_section_10_ground_control_data():
     ground = [
         GroundPoint(
@@ -153,7 +155,7 @@ def test_section_10_ground_control_data():
     )
 
 
-@pytest.mark.giant("10", "ERROR WARNINGS")
+@pytest.mark.giant("10", "error warnings")
 def test_section_10_error_warnings():
     warning = ErrorWarning("POINTS NOT PHOTOGRAPHED", SUMMARY["points_not_photographed"], general=True)
     pages = warning_pages([warning])
@@ -163,7 +165,8 @@ def test_section_10_error_warnings():
 # Pages 25 to 29
 
 
-@pytest.mark.giant("10", "CAMERA STATIONS CORRECTIONS, ITERATION k")
+@pytest.mark.giant("10", "camera stations corrections")
+@pytest.mark.giant("14", "8 units of the corrections are printed")
 def test_section_10_camera_stations_corrections():
     listed = rows("iteration_corrections.csv")
     columns = ("pos1", "pos2", "pos3", "omega_rad", "phi_rad", "kappa_rad")
@@ -183,7 +186,7 @@ def test_section_10_camera_stations_corrections():
     assert contains(pages, "PROVISIONAL WEIGHTED SUM OF SQUARES = 273.446")
 
 
-@pytest.mark.giant("10", "TRIANGULATED POINTS RESIDUALS")
+@pytest.mark.giant("10", "triangulated points residuals")
 def test_section_10_residuals():
     listed = [row for row in rows("plate_residuals.csv") if row["point"] == "SH954201"]
     micrometres = np.array([[float(row["vx_um"]), float(row["vy_um"])] for row in listed])
@@ -227,7 +230,8 @@ def sample_stations():
     return names, position, attitude, covariances
 
 
-@pytest.mark.giant("10", "TRIANGULATED CAMERA STATIONS")
+@pytest.mark.giant("10", "triangulated camera stations")
+@pytest.mark.giant("10", "page lengths: 10 control points, 13 stations, 52 points or 13 with covariances")
 def test_section_10_camera_stations():
     names, position, attitude, _ = sample_stations()
     pages = station_pages(GEOGRAPHIC, True, names, position, attitude, None)
@@ -251,7 +255,7 @@ def test_section_10_camera_stations():
     assert [sum("LAT" in line for line in page) for page in twice] == [13, 7]
 
 
-@pytest.mark.giant("10", "TRIANGULATED CAMERA STATIONS with COVARIANCE MATRIX")
+@pytest.mark.giant("10", "triangulated camera stations")
 def test_section_10_camera_stations_with_covariances():
     pages = station_pages(GEOGRAPHIC, True, *sample_stations())
     assert contains(
@@ -280,7 +284,8 @@ def sample_points():
     return [row["point"] for row in listed], marks, np.array(position)
 
 
-@pytest.mark.giant("10", "TRIANGULATED GROUND POINTS")
+@pytest.mark.giant("10", "triangulated ground points")
+@pytest.mark.giant("10", "page lengths: 10 control points, 13 stations, 52 points or 13 with covariances")
 def test_section_10_ground_points():
     names, marks, position = sample_points()
     pages = point_pages(GEOGRAPHIC, names, marks, position)
@@ -294,7 +299,8 @@ def test_section_10_ground_points():
     assert [sum("LAT" in line for line in page) for page in pages] == [52, 52, 40]
 
 
-@pytest.mark.giant("10", "sorting: right-justified, ascending")
+@pytest.mark.giant("10", "sort: ascending, right-justified names")
+@pytest.mark.giant("14", "12 sorting of names")
 def test_section_10_points_are_sorted_as_right_justified_names():
     names = [row["point"] for row in rows("ground_adjusted.csv")]
     # The one page of the sample that shows the order; names of two and three characters stood before it.
@@ -315,7 +321,9 @@ def sample_covariances():
     return np.array(covariances)
 
 
-@pytest.mark.giant("10", "TRIANGULATED GROUND POINTS with COVARIANCE MATRIX and STANDARD DEV")
+@pytest.mark.giant("10", "triangulated ground points")
+@pytest.mark.giant("10", "page lengths: 10 control points, 13 stations, 52 points or 13 with covariances")
+@pytest.mark.giant("9", "summary: count and rms of standard deviations, unheld components only")
 def test_section_10_ground_points_with_covariances():
     names, marks, positions = sample_points()
     listed = rows("ground_covariances.csv")
@@ -354,7 +362,7 @@ def test_section_10_ground_points_with_covariances():
 # Page 35
 
 
-@pytest.mark.giant("10", "CORRECTIONS APPLIED TO GROUND CONTROL")
+@pytest.mark.giant("10", "corrections applied to ground control")
 def test_section_10_corrections_of_control():
     listed = rows("control_corrections.csv")
     columns = ("dlon_arcsec", "dlat_arcsec", "delev_m")
