@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, get_args
 
 import numpy as np
@@ -20,6 +21,10 @@ __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
 
 UnitVariance = Literal["free", "constrained", "unity"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
+
+
+NOTABLE_RISE = 1e-3
+"""Percent; less is rounding."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +157,10 @@ def adjust(
         )
     except _photocore.BlockError as error:
         raise _named(block, *error.args) from None
-    return Result.from_solution(block, solution, unit_variance, _messages(block, solution))
+    messages = _messages(block, solution)
+    if as_published:
+        messages += _rises([Iteration(*row) for row in solution.iterations])
+    return Result.from_solution(block, solution, unit_variance, messages)
 
 
 def _teller(
@@ -200,6 +208,20 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
             0, Message("there is no control: the datum of the block rests on the weights of its photos")
         )
     return messages + remarks(block, solution.photo_positions)
+
+
+def _rises(iterations: list[Iteration]) -> list[Message]:
+    """Remark on iterations after which the sum of squares was larger than before, rounding apart."""
+    messages = []
+    for before, after in pairwise(iterations):
+        percent = 100 * (after.weighted_sum_of_squares / before.weighted_sum_of_squares - 1)
+        if percent > NOTABLE_RISE:
+            messages.append(
+                Message(
+                    f"the weighted sum of squares rose by {percent:.2g} percent in iteration {after.number}"
+                )
+            )
+    return messages
 
 
 def _named(
