@@ -1,4 +1,4 @@
-"""What several test files need: blocks of test data that are not part of the repository, small blocks."""
+"""What several test files need: the Strasbourg block, small blocks, the command line."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import copy
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from photogram import Block, simulate
+from photogram.cli import app
 
 STRASBOURG = Path(__file__).parents[2] / "shared" / "data" / "strasbourg"
 
@@ -32,3 +34,13 @@ def small_block() -> Block:
 def bad_block(small_block: Block) -> dict[str, object]:
     """Return the arrays of the small block as keywords of Block, to be spoilt by a test."""
     return copy.deepcopy({name: getattr(small_block, name) for name in Block.__dataclass_fields__})
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run the command line in an empty directory."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("NO_COLOR", "1")
+    runner = CliRunner()
+    return lambda *arguments: runner.invoke(app, [str(argument) for argument in arguments])

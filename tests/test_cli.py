@@ -9,10 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import photogram
-from photogram.cli import app
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.giant import read_project
 from photogram.simulation import simulate as simulate_function
@@ -20,16 +18,6 @@ from photogram.simulation import simulate as simulate_function
 STRASBOURG = Path(__file__).parents[2] / "shared" / "data" / "strasbourg" / "giant"
 SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]
 OUTPUTS = {"FRAMES", "GROUND", "RESTART", "report.txt"}
-
-
-@pytest.fixture
-def run(monkeypatch, tmp_path):
-    """Run the command line in an empty directory."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setenv("NO_COLOR", "1")
-    runner = CliRunner()
-    return lambda *arguments: runner.invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import stats
-from typer.testing import CliRunner
 
 from photogram import (
     AdjustmentError,
@@ -29,7 +28,6 @@ from photogram import (
     predict,
     simulate,
 )
-from photogram.cli import app
 from photogram.cli.plan import plan as plan_command
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.planning.locations import locations
@@ -49,16 +47,6 @@ def network(**arguments: Any) -> Block:
     """Simulate a network: two strips of four photos unless told otherwise, no check points."""
     defaults: dict[str, Any] = {"strips": 2, "photos_per_strip": 4, "points_per_photo": 30, "check_points": 0}
     return simulate(**{**defaults, **arguments}).truth
-
-
-@pytest.fixture
-def run(monkeypatch, tmp_path):
-    """Run the command line in an empty directory."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setenv("NO_COLOR", "1")
-    runner = CliRunner()
-    return lambda *arguments: runner.invoke(app, [str(argument) for argument in arguments])
 
 
 # Prediction

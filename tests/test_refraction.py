@@ -11,10 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from photogram import Block, InputError, Refraction, Simulation, Spheroid, adjust, geometry, simulate
-from photogram.cli import app
 from photogram.giant import Common, Project, read_project, write_project
 from photogram.giant.assembly import job_refraction
 
@@ -385,15 +383,6 @@ def test_what_files_cannot_say_is_remarked_on(dry):
     block = simulated(Refraction("giant"), RECTANGULAR, strips=1, photos_per_strip=3).block
     (message,) = Project.from_block(block.replace(linear_unit="ft")).messages
     assert "read in metres" in message.text
-
-
-@pytest.fixture
-def run(monkeypatch, tmp_path):
-    """Run the command line in an empty directory."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setenv("NO_COLOR", "1")
-    return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 SMALL = ["--strips", "1", "--photos-per-strip", "4", "--points-per-photo", "30", "--spheroid", "wgs84"]

@@ -9,9 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plates import case_2_session, noisy
-from typer.testing import CliRunner
 
-from photogram.cli import app
 from photogram.comparator import Correction, read, read_grid, to_cards, to_csv
 
 ROOT = Path(__file__).parents[2]
@@ -20,13 +18,9 @@ TEXTS = {"listing.txt", "correction.json", "correction-joint.json"}
 
 
 @pytest.fixture
-def run(monkeypatch, tmp_path):
-    """Run the command line in an empty directory."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setenv("NO_COLOR", "1")
-    runner = CliRunner()
-    return lambda *arguments: runner.invoke(app, ["comparator", *[str(argument) for argument in arguments]])
+def run(run):
+    """Run the command in an empty directory."""
+    return lambda *arguments: run("comparator", *arguments)
 
 
 @pytest.fixture

@@ -13,10 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from photogram import AsPublished, Block, Refraction, Result, adjust, simulate
-from photogram.cli import app
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame, Project, listing, read_project
 from photogram.giant.listing.control import control_pages
 from photogram.giant.listing.corrections import correction_pages
@@ -628,12 +626,6 @@ def test_corrections_lead_from_the_initial_to_the_adjusted_values(rectangular, a
 
 
 # The command
-
-
-@pytest.fixture
-def run(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.mark.giant("2", "unit 6: printout")

@@ -10,9 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from photogram.cli import app
 from photogram.perspective_center import read_deck, run_deck
 from photogram.perspective_center.document import to_json
 from photogram.perspective_center.listing import listing
@@ -27,13 +25,9 @@ POINT = {"id", "readings", "mean", "residual", "radial_distortion", "redundancy"
 
 
 @pytest.fixture
-def run(monkeypatch, tmp_path):
+def run(run):
     """Run the command in an empty directory."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setenv("NO_COLOR", "1")
-    runner = CliRunner()
-    return lambda *arguments: runner.invoke(app, ["perspective-center", *map(str, arguments)])
+    return lambda *arguments: run("perspective-center", *arguments)
 
 
 @pytest.fixture
