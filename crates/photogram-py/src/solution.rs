@@ -176,7 +176,8 @@ impl BlockSolution {
     }
 }
 
-fn squares<const N: usize>(
+/// Matrices as an (n, N, N) array.
+pub fn squares<const N: usize>(
     py: Python<'_>,
     matrices: Vec<[[f64; N]; N]>,
 ) -> PyResult<Bound<'_, PyArray3<f64>>> {
