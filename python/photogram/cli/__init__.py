@@ -1,4 +1,4 @@
-"""The command line: `photogram giant`, `photogram simulate`.
+"""The command line: `photogram giant`, `photogram absolute-orientation`, `photogram simulate`.
 
 Results go to files and standard output, errors and progress to standard error. Heavy modules are imported by
 the commands that need them, so that `photogram --help` is quick.
@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from photogram.cli import giant, simulate
+from photogram.cli import absolute_orientation, giant, simulate
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
 
@@ -28,6 +28,12 @@ app = typer.Typer(
 giant_app = typer.Typer(name="giant", cls=GroupWithMain, help="Adjust or check a GIANT project.")
 giant_app.command("adjust")(giant.giant)
 app.add_typer(giant_app)
+orientation_app = typer.Typer(
+    name="absolute-orientation", cls=GroupWithMain, help="Orient a model absolutely, or transform its points."
+)
+orientation_app.command("orient")(absolute_orientation.orient)
+orientation_app.command("transform")(absolute_orientation.transform)
+app.add_typer(orientation_app)
 app.command()(simulate.simulate)
 
 
