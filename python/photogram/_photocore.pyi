@@ -418,6 +418,13 @@ class SimilaritySolution:
         """Condition number of the linearized misclosures."""
 
     @property
+    def weakness(self) -> tuple[str, list[int]] | None:
+        """What makes the control weak, and the stations concerned.
+
+        `coincident` (horizontal stations in plan), `elevations in line` (in plan) or `stations in line`.
+        """
+
+    @property
     def sum_of_squares(self) -> float:
         """Weighted sum of squares, both systems."""
 

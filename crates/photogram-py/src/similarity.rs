@@ -206,6 +206,11 @@ impl SimilaritySolution {
     }
 
     #[getter]
+    fn weakness(&self) -> Option<(&'static str, Vec<usize>)> {
+        self.solution.weakness.as_ref().map(|(cause, stations)| (cause.name(), stations.clone()))
+    }
+
+    #[getter]
     fn sum_of_squares(&self) -> f64 {
         self.solution.sum_of_squares
     }
@@ -241,6 +246,9 @@ impl SimilaritySolution {
     }
 }
 
+/// Positions and covariances.
+type Points<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
+
 #[pyfunction]
 fn transform_points<'py>(
     py: Python<'py>,
@@ -248,7 +256,7 @@ fn transform_points<'py>(
     tangent_covariance: PyReadonlyArrayDyn<'py, f64>,
     points: PyReadonlyArrayDyn<'py, f64>,
     points_sd: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+) -> PyResult<Points<'py>> {
     let similarity = from_row(similarity);
     let points: Vec<Vector3> = rows("points", &points)?;
     let points_sd: Vec<Vector3> = rows("points_sd", &points_sd)?;
@@ -265,11 +273,14 @@ fn similarity_partials(py: Python<'_>, similarity: CentredRow) -> PyResult<Bound
     table(py, from_row(similarity).parameter_partials().to_vec())
 }
 
+/// The auxiliary matrix D and the solution E.
+type CroutTables<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+
 #[pyfunction]
 fn gauss_crout<'py>(
     py: Python<'py>,
     normal: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Option<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)>> {
+) -> PyResult<Option<CroutTables<'py>>> {
     let rows: Vec<[f64; 8]> = rows("normal", &normal)?;
     let normal = rows.try_into().map_err(|_| PyValueError::new_err("normal has seven rows"))?;
     match crout(&normal) {

@@ -69,13 +69,16 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
         if known.setdefault(row["id"], number) != number:
             text = f"station {row['id']} occurs in record {known[row['id']]} already"
             raise InputError(text, file=path, record=number, text=lines[number - 1])
+    control, model = table(CONTROL_COLUMNS, np.nan), table(MODEL_COLUMNS, None)
+    control_sd = table(CONTROL_SD_COLUMNS, 0.0)
+    model_sd = table(MODEL_SD_COLUMNS, None) if weighted else None
     try:
         return Stations(
             [row["id"] for _, row in rows],
-            np.array(table(CONTROL_COLUMNS, np.nan)).reshape(-1, 3),
-            np.array(table(MODEL_COLUMNS, None)).reshape(-1, 3),
-            control_sd=np.array(table(CONTROL_SD_COLUMNS, 0.0)).reshape(-1, 3),
-            model_sd=np.array(table(MODEL_SD_COLUMNS, None)).reshape(-1, 3) if weighted else None,
+            control,
+            model,
+            control_sd=control_sd,
+            model_sd=model_sd,
             ground_unit=ground_unit,
             model_unit=model_unit,
         )

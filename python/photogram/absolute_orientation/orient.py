@@ -26,6 +26,11 @@ Floats = NDArray[np.float64]
 
 WEAK = 1e3
 """Condition number from which control is called weak."""
+WEAKNESS = {
+    "coincident": "the stations with horizontal coordinates almost coincide in plan",
+    "elevations in line": "the stations with elevations are almost in a straight line in plan",
+    "stations in line": "the stations are almost in a straight line",
+}
 SHARED = 10_000
 """Stations from which more than one thread is worth its start."""
 
@@ -199,11 +204,13 @@ def _orientation(
         weighted_sum_of_squares=squares,
         covariance_scale=scale,
         condition=solution.condition,
-        messages=_messages(solution, scale, freedom),
+        messages=_messages(solution, [stations.ids[row] for row in rows.tolist()], scale, freedom),
     )
 
 
-def _messages(solution: _photocore.SimilaritySolution, scale: float | None, freedom: int) -> list[Message]:
+def _messages(
+    solution: _photocore.SimilaritySolution, names: list[str], scale: float | None, freedom: int
+) -> list[Message]:
     """Collect remarks that did not stop the orientation, the gravest first."""
     messages = []
     if solution.alternatives:
@@ -215,7 +222,10 @@ def _messages(solution: _photocore.SimilaritySolution, scale: float | None, free
         messages.append(
             Message(f"the control fits another orientation as well ({others} deg); the one given {reason}")
         )
-    if solution.condition > WEAK:
+    if solution.weakness:
+        kind, concerned = solution.weakness
+        messages.append(Message(WEAKNESS[kind] + ": " + ", ".join(names[i] for i in concerned)))
+    elif solution.condition > WEAK:
         messages.append(
             Message(f"the control is weak: the condition number of the equations is {solution.condition:.1e}")
         )

@@ -13,6 +13,8 @@ use crate::geometry::{Matrix3, Vector3};
 const UNDETERMINED: f64 = 1e-6;
 /// Stations are in line when they are off it by less than this fraction of its length.
 const IN_LINE: f64 = 1e-5;
+/// And nearly so with this fraction.
+const NEARLY_IN_LINE: f64 = 1e-2;
 
 /// Why control does not determine the orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,17 +29,29 @@ pub enum Cause {
     Singular,
 }
 
+impl Cause {
+    /// A name for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Coincident => "coincident",
+            Self::ElevationsInLine => "elevations in line",
+            Self::StationsInLine => "stations in line",
+            Self::Singular => "singular",
+        }
+    }
+}
+
 impl fmt::Display for Cause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Coincident => {
-                "the stations with horizontal coordinates coincide in plan, which leaves kappa and the scale open"
+                "the stations with horizontal coordinates coincide in plan, so that kappa and the scale are open"
             }
             Self::ElevationsInLine => {
-                "the stations with elevations are in a straight line in plan, which leaves the tilt about it open"
+                "the stations with elevations are in a straight line in plan, so that the tilt about it is open"
             }
             Self::StationsInLine => {
-                "the stations are in a straight line, which leaves the rotation about it open"
+                "the stations are in a straight line, so that the rotation about it is open"
             }
             Self::Singular => "the normal equations are singular",
         })
@@ -60,28 +74,43 @@ pub fn check_geometry(stations: &[Station], similarity: &Similarity) -> Result<(
     if condition(stations, similarity) * UNDETERMINED < 1.0 {
         return Ok(());
     }
+    let all = || (Cause::Singular, (0..stations.len()).collect());
+    let (cause, stations) = shape(stations, similarity, IN_LINE).unwrap_or_else(all);
+    Err(SimilarityError::Undetermined { cause, stations })
+}
+
+/// What makes control weak that still determines the orientation, and the stations concerned.
+pub fn weakness(stations: &[Station], similarity: &Similarity) -> Option<(Cause, Vec<usize>)> {
+    shape(stations, similarity, NEARLY_IN_LINE)
+}
+
+/// Whether stations coincide or are in line, off it by less than a fraction of its length.
+fn shape(stations: &[Station], similarity: &Similarity, tolerance: f64) -> Option<(Cause, Vec<usize>)> {
     let chosen = |of: &dyn Fn(&Station) -> bool| -> Vec<usize> {
         (0..stations.len()).filter(|&i| of(&stations[i])).collect()
     };
-    let horizontal = chosen(&|station| station.horizontal());
-    let elevated = chosen(&|station| station.elevation());
     let plan = |list: &[usize]| -> Vec<Vector3> {
         let position = |&i: &usize| similarity.control_at(&stations[i].model);
         list.iter().map(position).map(|[x, y, _]| [x, y, 0.0]).collect()
     };
+    // Written so that coincident positions are in line.
+    let in_line = |positions: &[Vector3]| {
+        let [length, width, _] = extents(positions);
+        width <= tolerance * length
+    };
+    let horizontal = chosen(&|station| station.horizontal());
+    let elevated = chosen(&|station| station.elevation());
     let all = chosen(&|station| station.known() != [false; 3]);
     let space: Vec<Vector3> = all.iter().map(|&i| stations[i].model).collect();
-    let size = extents(&plan(&all))[0];
-    let (cause, concerned) = if extents(&plan(&horizontal))[0] <= IN_LINE * size {
-        (Cause::Coincident, horizontal)
+    if extents(&plan(&horizontal))[0] <= tolerance * extents(&plan(&all))[0] {
+        Some((Cause::Coincident, horizontal))
     } else if in_line(&space) {
-        (Cause::StationsInLine, all)
+        Some((Cause::StationsInLine, all))
     } else if in_line(&plan(&elevated)) {
-        (Cause::ElevationsInLine, elevated)
+        Some((Cause::ElevationsInLine, elevated))
     } else {
-        (Cause::Singular, all)
-    };
-    Err(SimilarityError::Undetermined { cause, stations: concerned })
+        None
+    }
 }
 
 /// The condition number of the linearized misclosures: rotations in radians, the scale relative, translations as fractions of the size
@@ -114,12 +143,6 @@ pub fn spread(stations: &[Station]) -> f64 {
 pub fn known_mean(stations: &[Station], value: impl Fn(&Station) -> Option<f64>) -> f64 {
     let values: Vec<f64> = stations.iter().filter_map(value).collect();
     values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
-fn in_line(positions: &[Vector3]) -> bool {
-    let [length, width, _] = extents(positions);
-    // Written so that coincident positions are in line.
-    width <= IN_LINE * length
 }
 
 /// Root mean square extents of some positions along their principal axes, the largest first.

@@ -47,6 +47,8 @@ pub struct Solution {
     pub tangent_cofactors: Matrix7,
     /// Condition number of the linearized misclosures.
     pub condition: f64,
+    /// What makes the control weak, and the stations concerned.
+    pub weakness: Option<(Cause, Vec<usize>)>,
     /// Weighted sum of squares.
     pub sum_of_squares: f64,
     /// The stations.
@@ -83,6 +85,7 @@ impl Solution {
             status: adjustment.status,
             cycles: cycles.map(|cycles| cycles.corrections),
             condition: determinacy::condition(stations, &similarity),
+            weakness: determinacy::weakness(stations, &similarity),
             sum_of_squares: outward * last.unwrap_or(adjustment.initial_sum_of_squares),
             iterations: iterations.collect(),
             tangent_cofactors: cofactors,

@@ -9,6 +9,10 @@ use crate::geometry::{Vector3, rotation};
 
 /// Another minimum fits as well when its sum of squares is at most this multiple of the least.
 const AS_WELL: f64 = 4.0;
+/// Initial values with direction cosines as near as this to those of the goal lead there.
+const CLOSE: f64 = 0.5;
+/// Rotations whose direction cosines are as near as this are one minimum.
+const SAME: f64 = 1e-4;
 /// Misclosures below this fraction of the size of the model are rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -56,11 +60,12 @@ pub fn choose(stations: &[Station], start: Start) -> Result<Chosen, SimilarityEr
             let rounding = (ROUNDING * spread(stations)).powi(2);
             let as_well = |similarity: &Similarity| sum(similarity) <= AS_WELL * sum(&best) + rounding;
             let reached = report.and_then(|r| moments.descend(&r.rotation)).filter(&as_well);
-            let (similarity, started, goal) = match (report, reached) {
-                (Some(report), Some(reached)) => (report, Started::Report, reached),
-                _ => (best, Started::ClosedForm, best),
+            let goal = reached.unwrap_or(best);
+            let (similarity, started) = match report {
+                Some(report) if apart(&report, &goal) < CLOSE => (report, Started::Report),
+                _ => (goal, Started::ClosedForm),
             };
-            let other = |minimum: &Similarity| as_well(minimum) && !near(minimum, &goal);
+            let other = |minimum: &Similarity| as_well(minimum) && apart(minimum, &goal) > SAME;
             Ok(Chosen { similarity, started, alternatives: minima.into_iter().filter(other).collect() })
         }
     }
@@ -81,9 +86,10 @@ fn sum_of_squares(stations: &[Station], similarity: &Similarity) -> f64 {
     stations.iter().map(squares).sum()
 }
 
-/// Whether two rotations are the same minimum.
-fn near(a: &Similarity, b: &Similarity) -> bool {
-    a.rotation.iter().flatten().zip(b.rotation.iter().flatten()).all(|(p, q)| (p - q).abs() < 1e-4)
+/// Largest difference of the direction cosines of two rotations.
+fn apart(a: &Similarity, b: &Similarity) -> f64 {
+    let elements = a.rotation.iter().flatten().zip(b.rotation.iter().flatten());
+    elements.map(|(p, q)| (p - q).abs()).fold(0.0, f64::max)
 }
 
 /// Initial values from the first two stations (TB 19, section 3, with kappa = theta_X - theta_x in its right quadrant):
