@@ -3,7 +3,6 @@
 use std::ops::ControlFlow;
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
-use photocore::adjustment::Status;
 use photocore::geometry::{Matrix3, Vector3};
 use photocore::programs::similarity::{
     AdjustedStation, Matrix7, Method, Options, Parameters, Similarity, SimilarityError as Failure, Solution,
@@ -14,7 +13,7 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{check_lengths, rows, table};
-use crate::solution::{IterationRow, iteration_row, squares};
+use crate::solution::{IterationRow, iteration_row, squares, status_name};
 
 create_exception!(
     _photocore,
@@ -154,11 +153,7 @@ impl SimilaritySolution {
 impl SimilaritySolution {
     #[getter]
     fn status(&self) -> &'static str {
-        match self.solution.status {
-            Status::Converged => "converged",
-            Status::NotConverged => "not converged",
-            Status::Diverged => "diverged",
-        }
+        status_name(self.solution.status)
     }
 
     #[getter]

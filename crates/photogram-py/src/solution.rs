@@ -16,6 +16,15 @@ pub fn iteration_row(iteration: &Iteration) -> IterationRow {
     (iteration.number, iteration.sum_of_squares, iteration.largest_change, iteration.damping)
 }
 
+/// How an adjustment ended, as Python sees it.
+pub fn status_name(status: Status) -> &'static str {
+    match status {
+        Status::Converged => "converged",
+        Status::NotConverged => "not converged",
+        Status::Diverged => "diverged",
+    }
+}
+
 /// An adjusted block.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct BlockSolution {
@@ -41,11 +50,7 @@ impl BlockSolution {
 impl BlockSolution {
     #[getter]
     fn status(&self) -> &'static str {
-        match self.solution.adjustment.status {
-            Status::Converged => "converged",
-            Status::NotConverged => "not converged",
-            Status::Diverged => "diverged",
-        }
+        status_name(self.solution.adjustment.status)
     }
 
     #[getter]

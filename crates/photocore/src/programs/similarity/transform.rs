@@ -18,7 +18,7 @@ pub struct Parameters {
 /// x - c_x = s A (X - c_X) + t.
 ///
 /// Its partials and cofactors are those of seven *tangent parameters*: three small rotations r about the model axes,
-/// A <- (I - [r]x) A, then s, then t. They are regular at every attitude; omega and kappa are not.
+/// `A <- (I - [r]x) A`, then s, then t. They are regular at every attitude; omega and kappa are not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Similarity {
     /// Rotation matrix A.
