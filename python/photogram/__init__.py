@@ -1,6 +1,7 @@
 """Photogrammetric least-squares adjustment with the covariance of every result."""
 
 from photogram._photocore import __version__
+from photogram.absolute_orientation import Orientation, absolute_orientation
 from photogram.adjusted import Iteration
 from photogram.adjustment import AsPublished, Progress, adjust
 from photogram.block import Block
@@ -21,6 +22,7 @@ __all__ = [
     "InputError",
     "Iteration",
     "Message",
+    "Orientation",
     "PhotogramError",
     "Plan",
     "Pose",
@@ -32,6 +34,7 @@ __all__ = [
     "Simulation",
     "Spheroid",
     "__version__",
+    "absolute_orientation",
     "adjust",
     "plan",
     "predict",

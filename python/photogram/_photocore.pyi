@@ -627,3 +627,183 @@ def adjust_comparator(
     ValueError
         An argument of another shape; the message names it and its shape.
     """
+
+_Vector = tuple[float, float, float] | list[float]
+_Matrix = list[list[float]]
+
+CentredRow = tuple[float, _Matrix, _Vector, _Vector, _Vector]
+"""Scale s, rotation A (3 x 3), shift t, centre of the control c_X, centre of the model c_x of the similarity
+x - c_x = s A (X - c_X) + t."""
+
+ParametersRow = tuple[float, _Matrix, _Vector]
+"""Scale s, rotation A (3 x 3), translation B of the similarity x = s A X + B."""
+
+class SimilarityError(Exception):
+    """A model that cannot be oriented.
+
+    `args` is (kind, message, stations): kind is `insufficient`, `undetermined`, `first stations`, `scale`,
+    `not finite` or `input`; stations is a list of the indices concerned.
+    """
+
+def orient_model(
+    control: _Floats,
+    control_sd: _Floats,
+    model: _Floats,
+    model_sd: _Floats,
+    *,
+    method: str,
+    start: str,
+    former: ParametersRow | None,
+    max_iterations: int,
+    tolerance: float,
+    threads: int,
+) -> SimilaritySolution:
+    """Find the similarity x = s A X + B between control X and model x (C&GS Technical Bulletin 19).
+
+    Parameters
+    ----------
+    control, control_sd
+        (n, 3) ground units: coordinates, NaN where unknown, and standard deviations, zero for an exact one,
+        infinite for one that takes no part.
+    model, model_sd
+        (n, 3) model units: coordinates and their standard deviations, positive.
+    method
+        `rigorous`, `report` or `fill-in`.
+    start
+        `auto`, `report` or `closed-form`; of no account with `former`.
+    former
+        A former result to start from, or None.
+    max_iterations
+        Iterations at the most.
+    tolerance
+        Fraction of its standard deviation by which no unknown changes any more (rigorous method).
+    threads
+        Number of threads; 0 for all processors.
+
+    Raises
+    ------
+    SimilarityError
+        A model that cannot be oriented.
+    ValueError
+        An argument of another shape, length or choice; the message names it.
+    """
+
+@final
+class SimilaritySolution:
+    """An oriented model, in the order of its n stations. Cofactors hold for a priori unit weight."""
+
+    @property
+    def status(self) -> str:
+        """`converged`, `not converged` or `diverged`."""
+
+    @property
+    def started(self) -> str:
+        """Where the initial values are from: `restart`, `report` or `closed-form`."""
+
+    @property
+    def similarity(self) -> CentredRow:
+        """The similarity."""
+
+    @property
+    def initial(self) -> CentredRow:
+        """Where the iteration started."""
+
+    @property
+    def alternatives(self) -> list[CentredRow]:
+        """Other orientations that fit as well."""
+
+    @property
+    def iterations(self) -> list[IterationRow]:
+        """Iterations of the rigorous method; none with the report's."""
+
+    @property
+    def cycles(self) -> list[float] | None:
+        """Largest correction of an angle (rad) in each cycle of the report's methods, else None."""
+
+    @property
+    def tangent_cofactors(self) -> _Floats:
+        """(7, 7) of three small rotations about the model axes (rad), s, t."""
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the linearized misclosures."""
+
+    @property
+    def weakness(self) -> tuple[str, list[int]] | None:
+        """What makes the control weak, and the stations concerned.
+
+        `coincident` (horizontal stations in plan), `elevations in line` (in plan) or `stations in line`.
+        """
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Weighted sum of squares, both systems."""
+
+    @property
+    def misclosures(self) -> _Floats:
+        """(n, 3) s X - A^T (x - B): control axes, model units; NaN where unknown."""
+
+    @property
+    def model_residuals(self) -> _Floats:
+        """(n, 3) s A X + B - x with the adjusted X: model axes, model units."""
+
+    @property
+    def adjusted_control(self) -> _Floats:
+        """(n, 3) adjusted control coordinates, ground units; unknown ones as the model gives them."""
+
+    @property
+    def control_cofactors(self) -> _Floats:
+        """(n, 3, 3) of the adjusted control coordinates."""
+
+    @property
+    def redundancy(self) -> _Floats:
+        """(n, 3) redundancy numbers of the misclosures; NaN where unknown."""
+
+    @property
+    def standardized(self) -> _Floats:
+        """(n, 3) misclosure / its standard deviation, a priori; NaN where unknown or unchecked."""
+
+def transform_points(
+    similarity: CentredRow, tangent_covariance: _Floats, points: _Floats, points_sd: _Floats
+) -> tuple[_Floats, _Floats]:
+    """Control coordinates of model points, with their covariances.
+
+    Parameters
+    ----------
+    similarity
+        The similarity.
+    tangent_covariance
+        (7, 7) of three small rotations about the model axes (rad), s, t.
+    points, points_sd
+        (n, 3) model coordinates and their own standard deviations, model units.
+
+    Returns
+    -------
+    (n, 3) X = A^T (x - B) / s and (n, 3, 3) covariances, ground units.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape; the message names it and its shape.
+    """
+
+def similarity_partials(similarity: CentredRow) -> _Floats:
+    """(7, 7) partials of omega, phi, kappa, s, b1, b2, b3 by three small rotations (model axes), s, t."""
+
+def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
+    """Gauss-Crout scheme of TB 19, section 4, for seven normal equations.
+
+    Parameters
+    ----------
+    normal
+        (7, 8) C; column 8 is the right-hand side.
+
+    Returns
+    -------
+    (7, 8) auxiliary matrix D and (7,) solution E; None when a pivot vanishes.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape; the message names it and its shape.
+    """

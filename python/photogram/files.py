@@ -1,12 +1,16 @@
-"""Writing files whole or not at all."""
+"""Reading text files, and writing files whole or not at all."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
-__all__ = ["write_whole"]
+from photogram.errors import InputError
+
+__all__ = ["read_lines", "whole", "write_whole"]
 
 
 def write_whole(files: Mapping[Path, bytes]) -> None:
@@ -30,3 +34,46 @@ def write_whole(files: Mapping[Path, bytes]) -> None:
     finally:
         for temporary in begun.values():
             temporary.unlink(missing_ok=True)
+
+
+def read_lines(path: Path) -> list[str]:
+    """Read the lines of a text file (UTF-8, else Latin-1; any line ends), without their ends.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").removesuffix("\x1a").split("\n")
+    if lines[-1] == "":
+        lines.pop()
+    return lines
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[BinaryIO]:
+    """Open a file to be written piece by piece that is there whole or not at all.
+
+    It is written beside its place and moved there at the end, unless an exception comes first.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; what was there has not changed.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with temporary.open("wb") as file:
+            yield file
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -5,6 +5,7 @@ mod block;
 mod comparator;
 mod geometry;
 mod resection;
+mod similarity;
 mod solution;
 
 use pyo3::prelude::*;
@@ -15,5 +16,6 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     geometry::register(module)?;
     block::register(module)?;
     comparator::register(module)?;
-    resection::register(module)
+    resection::register(module)?;
+    similarity::register(module)
 }

@@ -11,7 +11,15 @@ from typing import Annotated
 
 import typer
 
-from photogram.cli import check, comparator, giant, perspective_center, plan, simulate
+from photogram.cli import (
+    absolute_orientation,
+    check,
+    comparator,
+    giant,
+    perspective_center,
+    plan,
+    simulate,
+)
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
 
@@ -34,7 +42,13 @@ comparator_app = typer.Typer(
 )
 comparator_app.command("calibrate")(comparator.comparator)
 comparator_app.command("correct")(comparator.correct)
+orientation_app = typer.Typer(
+    name="absolute-orientation", cls=GroupWithMain, help="Orient a model absolutely, or transform its points."
+)
+orientation_app.command("orient")(absolute_orientation.orient)
+orientation_app.command("transform")(absolute_orientation.transform)
 app.add_typer(giant_app)
+app.add_typer(orientation_app)
 app.add_typer(comparator_app)
 app.command("perspective-center")(perspective_center.perspective_center)
 app.command()(plan.plan)

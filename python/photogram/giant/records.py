@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from photogram.errors import InputError
+from photogram.files import read_lines
 from photogram.giant.fields import format_deviations, parse_angle, parse_integer, parse_name, parse_real
 from photogram.messages import Message
 
@@ -51,18 +52,7 @@ class Source:
             The file cannot be read, or a record holds a tab or another control character, which would move
             its columns.
         """
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}", file=path) from None
-        try:
-            text = data.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            text = data.decode("latin-1")
-        lines = text.replace("\r\n", "\n").replace("\r", "\n").removesuffix("\x1a").split("\n")
-        if lines[-1] == "":
-            lines.pop()
-        source = cls(path, [line[:WIDTH] for line in lines], strip)
+        source = cls(path, [line[:WIDTH] for line in read_lines(path)], strip)
         if not "".join(source.lines).isprintable():
             record = next(record for record in source.filled() if not record.text.isprintable())
             what = next(character for character in record.text if not character.isprintable())

@@ -1,0 +1,167 @@
+//! Whether the control determines the seven parameters, and if not, why.
+
+use std::fmt;
+
+use faer::{Mat, Side};
+
+use super::transform::Similarity;
+use super::{SimilarityError, Station};
+use crate::geometry::{Matrix3, Vector3};
+
+/// A combination of parameters is not determined when a change of it moves the stations, in the known components, by less than this
+/// fraction of what the best determined one does.
+const UNDETERMINED: f64 = 1e-6;
+/// Stations are in line when they are off it by less than this fraction of its length.
+const IN_LINE: f64 = 1e-5;
+/// And nearly so with this fraction.
+const NEARLY_IN_LINE: f64 = 1e-2;
+
+/// Why control does not determine the orientation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// The horizontal stations coincide in plan.
+    Coincident,
+    /// The stations with elevations are in a straight line in plan.
+    ElevationsInLine,
+    /// All stations are in a straight line in space.
+    StationsInLine,
+    /// Another deficiency of the geometry.
+    Singular,
+}
+
+impl Cause {
+    /// A name for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Coincident => "coincident",
+            Self::ElevationsInLine => "elevations in line",
+            Self::StationsInLine => "stations in line",
+            Self::Singular => "singular",
+        }
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Coincident => {
+                "the stations with horizontal coordinates coincide in plan, so that kappa and the scale are open"
+            }
+            Self::ElevationsInLine => {
+                "the stations with elevations are in a straight line in plan, so that the tilt about it is open"
+            }
+            Self::StationsInLine => {
+                "the stations are in a straight line, so that the rotation about it is open"
+            }
+            Self::Singular => "the normal equations are singular",
+        })
+    }
+}
+
+/// Counts known components: n = 2 MN + N at least 7, MN at least 2, N at least 3.
+pub fn check_counts(stations: &[Station]) -> Result<(), SimilarityError> {
+    let pairs = stations.iter().filter(|station| station.horizontal()).count();
+    let elevations = stations.iter().filter(|station| station.elevation()).count();
+    let known = 2 * pairs + elevations;
+    if known < 7 || pairs < 2 || elevations < 3 {
+        return Err(SimilarityError::Insufficient { known, pairs, elevations });
+    }
+    Ok(())
+}
+
+/// Looks for combinations of parameters that leave all known components where they are.
+pub fn check_geometry(stations: &[Station], similarity: &Similarity) -> Result<(), SimilarityError> {
+    if condition(stations, similarity) * UNDETERMINED < 1.0 {
+        return Ok(());
+    }
+    let all = || (Cause::Singular, (0..stations.len()).collect());
+    let (cause, stations) = shape(stations, similarity, IN_LINE).unwrap_or_else(all);
+    Err(SimilarityError::Undetermined { cause, stations })
+}
+
+/// What makes control weak that still determines the orientation, and the stations concerned.
+pub fn weakness(stations: &[Station], similarity: &Similarity) -> Option<(Cause, Vec<usize>)> {
+    shape(stations, similarity, NEARLY_IN_LINE)
+}
+
+/// Whether stations coincide or are in line, off it by less than a fraction of its length.
+fn shape(stations: &[Station], similarity: &Similarity, tolerance: f64) -> Option<(Cause, Vec<usize>)> {
+    let chosen = |of: &dyn Fn(&Station) -> bool| -> Vec<usize> {
+        (0..stations.len()).filter(|&i| of(&stations[i])).collect()
+    };
+    let plan = |list: &[usize]| -> Vec<Vector3> {
+        let position = |&i: &usize| similarity.control_at(&stations[i].model);
+        list.iter().map(position).map(|[x, y, _]| [x, y, 0.0]).collect()
+    };
+    // Written so that coincident positions are in line.
+    let in_line = |positions: &[Vector3]| {
+        let [length, width, _] = extents(positions);
+        width <= tolerance * length
+    };
+    let horizontal = chosen(&|station| station.horizontal());
+    let elevated = chosen(&|station| station.elevation());
+    let all = chosen(&|station| station.known() != [false; 3]);
+    let space: Vec<Vector3> = all.iter().map(|&i| stations[i].model).collect();
+    if extents(&plan(&horizontal))[0] <= tolerance * extents(&plan(&all))[0] {
+        Some((Cause::Coincident, horizontal))
+    } else if in_line(&space) {
+        Some((Cause::StationsInLine, all))
+    } else if in_line(&plan(&elevated)) {
+        Some((Cause::ElevationsInLine, elevated))
+    } else {
+        None
+    }
+}
+
+/// The condition number of the linearized misclosures: rotations in radians, the scale relative, translations as fractions of the size
+/// of the model; infinite where they are singular.
+pub fn condition(stations: &[Station], similarity: &Similarity) -> f64 {
+    let size = spread(stations);
+    let unit = [1.0, 1.0, 1.0, similarity.scale, size, size, size];
+    let mut normal = [[0.0; 7]; 7];
+    for station in stations {
+        let partials = similarity.misclosure_partials(&station.control, &station.model);
+        for (partial, _) in partials.iter().zip(station.known()).filter(|(_, known)| *known) {
+            let row: [f64; 7] = std::array::from_fn(|i| partial[i] * unit[i] / size);
+            for i in 0..7 {
+                (0..7).for_each(|j| normal[i][j] += row[i] * row[j]);
+            }
+        }
+    }
+    let values = eigenvalues(&normal);
+    let (least, most) = (values[0].max(0.0), values[6]);
+    (most / least).sqrt()
+}
+
+/// Root mean square distance of the stations from their centre, in model units.
+pub fn spread(stations: &[Station]) -> f64 {
+    let positions: Vec<Vector3> = stations.iter().map(|station| station.model).collect();
+    extents(&positions).iter().map(|extent| extent * extent).sum::<f64>().sqrt()
+}
+
+/// Mean of the values that a function gives; zero when it gives none.
+pub fn known_mean(stations: &[Station], value: impl Fn(&Station) -> Option<f64>) -> f64 {
+    let values: Vec<f64> = stations.iter().filter_map(value).collect();
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Root mean square extents of some positions along their principal axes, the largest first.
+fn extents(positions: &[Vector3]) -> [f64; 3] {
+    let count = positions.len().max(1) as f64;
+    let mean: Vector3 = std::array::from_fn(|k| positions.iter().map(|p| p[k]).sum::<f64>() / count);
+    let moment = |i: usize, j: usize| -> f64 {
+        positions.iter().map(|p| (p[i] - mean[i]) * (p[j] - mean[j])).sum::<f64>() / count
+    };
+    let moments: Matrix3 = std::array::from_fn(|i| std::array::from_fn(|j| moment(i, j)));
+    let values = eigenvalues(&moments);
+    std::array::from_fn(|k| values[2 - k].max(0.0).sqrt())
+}
+
+/// Eigenvalues of a symmetric matrix, ascending; NaN when it is not finite.
+fn eigenvalues<const N: usize>(matrix: &[[f64; N]; N]) -> [f64; N] {
+    let matrix = Mat::from_fn(N, N, |i, j| matrix[i][j]);
+    match matrix.self_adjoint_eigenvalues(Side::Lower) {
+        Ok(values) => std::array::from_fn(|i| values[i]),
+        Err(_) => [f64::NAN; N],
+    }
+}

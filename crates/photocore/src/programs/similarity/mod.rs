@@ -1,0 +1,249 @@
+//! Absolute orientation: the similarity x = s A X + B between a model and its control (C&GS Technical Bulletin 19, "TB 19").
+//!
+//! Each station has model coordinates x and any part of its control coordinates X. The observations are the model coordinates,
+//! as in the bulletin; control coordinates are unknowns of their own, fixed where they are known exactly, weighted where they have
+//! standard deviations, free where they are missing. Eliminating the free ones leaves the misclosures
+//! u = s X - A^T (x - B) of the known components: the form that is right for any mix of full, horizontal and height control.
+
+mod crout;
+mod determinacy;
+mod misclosures;
+mod model;
+mod moments;
+mod published;
+mod solution;
+mod start;
+mod transform;
+
+use std::ops::ControlFlow;
+
+use rayon::ThreadPool;
+use thiserror::Error;
+
+use crate::adjustment::{self, AdjustError, Criterion, Event, Problem, Status};
+use crate::geometry::Vector3;
+use crate::normals::{Layout, LayoutError, Ordering, System};
+
+pub use crout::gauss_crout;
+pub use determinacy::Cause;
+use model::{AsControl, CHANGES};
+pub use solution::{AdjustedStation, Solution};
+use start::Chosen;
+pub use start::Started;
+pub use transform::{Matrix7, Parameters, Similarity};
+
+/// A station: a point of the model with some of its control coordinates.
+#[derive(Debug, Clone, Copy)]
+pub struct Station {
+    /// Control coordinates X in ground units; NaN where unknown.
+    pub control: Vector3,
+    /// Their standard deviations; zero for an exact one, infinite for one that takes no part.
+    pub control_sd: Vector3,
+    /// Model coordinates x in model units.
+    pub model: Vector3,
+    /// Their standard deviations, positive.
+    pub model_sd: Vector3,
+}
+
+impl Station {
+    /// Which control coordinates take part.
+    pub fn known(&self) -> [bool; 3] {
+        std::array::from_fn(|k| self.control[k].is_finite() && self.control_sd[k].is_finite())
+    }
+
+    /// Whether the horizontal coordinates take part. They come as a pair.
+    fn horizontal(&self) -> bool {
+        let [x, y, _] = self.known();
+        x && y
+    }
+
+    /// Whether the elevation takes part.
+    fn elevation(&self) -> bool {
+        self.known()[2]
+    }
+}
+
+/// How the iteration is carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Least squares by the engine, until no unknown changes by a fraction of its standard deviation.
+    Rigorous,
+    /// The cycle of TB 19 with the misclosures of the known components: Gauss-Crout, until all corrections of angles are 1e-5
+    /// radian at the most.
+    Report,
+    /// The cycle of TB 19 with its own equations, missing control coordinates filled in from the last cycle.
+    FillIn,
+}
+
+/// Where the iteration starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Start {
+    /// The report's values, unless they lead to a worse place than the closed form.
+    Auto,
+    /// From the first two stations (TB 19, section 3).
+    Report,
+    /// Horn's quaternion for full control; otherwise the best of the minima over all rotations.
+    ClosedForm,
+    /// From a former result.
+    Given(Parameters),
+}
+
+/// How to orient.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// How the iteration is carried out.
+    pub method: Method,
+    /// Where it starts.
+    pub start: Start,
+    /// Iterations at the most.
+    pub max_iterations: usize,
+    /// Fraction of its standard deviation by which no unknown changes any more (rigorous method).
+    pub tolerance: f64,
+}
+
+/// Why there is no orientation. Stations are indices.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SimilarityError {
+    /// Fewer known components than the seven parameters need, or too few of a kind.
+    #[error(
+        "insufficient control: {known} known coordinates ({pairs} horizontal pairs, {elevations} elevations)"
+    )]
+    Insufficient {
+        /// n = 2 pairs + elevations.
+        known: usize,
+        /// MN.
+        pairs: usize,
+        /// N.
+        elevations: usize,
+    },
+    /// The geometry of the control leaves a combination of parameters undetermined.
+    #[error("the control does not determine the orientation: {cause}")]
+    Undetermined {
+        /// Why.
+        cause: Cause,
+        /// The stations concerned.
+        stations: Vec<usize>,
+    },
+    /// The report's start needs horizontal control at the first two stations, at different places.
+    #[error("the first two stations {0}")]
+    FirstStations(&'static str),
+    /// The scale is not positive: the model is a mirror image of its control.
+    #[error("the scale became {0}: not positive")]
+    Scale(f64),
+    /// The initial values give nothing finite.
+    #[error("the initial values give model coordinates that are not finite")]
+    NotFinite,
+    /// The caller asked to stop.
+    #[error("interrupted")]
+    Interrupted,
+    /// More than can be numbered.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+}
+
+/// Standard deviation of a model coordinate, as a fraction of the size of the model, to which all are scaled inside at the most: the
+/// criterion of convergence must mean something where the unit weight is arbitrary.
+const INNER_SD: f64 = 1e-7;
+
+/// Finds the seven parameters by least squares.
+///
+/// `watch` is called on the calling thread; when it breaks, the adjustment stops.
+///
+/// # Errors
+/// Control that does not determine the parameters, a start that cannot be had, a mirror image, an interruption.
+pub fn orient(
+    stations: &[Station],
+    options: &Options,
+    pool: &ThreadPool,
+    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+) -> Result<Solution, SimilarityError> {
+    determinacy::check_counts(stations)?;
+    let chosen = start::choose(stations, options.start)?;
+    determinacy::check_geometry(stations, &chosen.similarity)?;
+    match options.method {
+        Method::Rigorous => adjust(stations, options, chosen, None, pool, watch),
+        Method::Report | Method::FillIn => {
+            let cycles = published::iterate(stations, options, &chosen.similarity)?;
+            adjust(stations, options, chosen, Some(cycles), pool, watch)
+        }
+    }
+}
+
+/// Adjusts by the engine; after the cycles of the bulletin only for cofactors and statistics.
+fn adjust(
+    stations: &[Station],
+    options: &Options,
+    chosen: Chosen,
+    cycles: Option<published::Cycles>,
+    pool: &ThreadPool,
+    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+) -> Result<Solution, SimilarityError> {
+    let start = cycles.as_ref().map_or(chosen.similarity, |cycles| cycles.similarity);
+    if start.scale.is_nan() || start.scale <= 0.0 {
+        return Err(SimilarityError::Scale(start.scale));
+    }
+    let inner = inner_scale(stations);
+    let problem = problem(stations, &start, inner)?;
+    let engine = adjustment::Options {
+        criterion: Criterion::Fraction(options.tolerance),
+        max_iterations: if cycles.is_some() { 0 } else { options.max_iterations },
+        covariance: true,
+    };
+    let mut adjusted = adjustment::adjust(&problem, &engine, pool, watch).map_err(|error| match error {
+        AdjustError::Interrupted => SimilarityError::Interrupted,
+        AdjustError::NotFinite => SimilarityError::NotFinite,
+        AdjustError::UndeterminedLocals(stations) => {
+            SimilarityError::Undetermined { cause: Cause::Singular, stations }
+        }
+        AdjustError::Undetermined(_) => {
+            SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] }
+        }
+    })?;
+    if let Some(cycles) = &cycles {
+        adjusted.status = if cycles.converged { Status::Converged } else { Status::NotConverged };
+    }
+    let solution = Solution::new(stations, &problem, &adjusted, inner, chosen, cycles)?;
+    let scale = solution.similarity.scale;
+    if scale.is_nan() || scale <= 0.0 { Err(SimilarityError::Scale(scale)) } else { Ok(solution) }
+}
+
+/// The factor that all standard deviations get inside.
+fn inner_scale(stations: &[Station]) -> f64 {
+    let mut deviations: Vec<f64> = stations.iter().flat_map(|station| station.model_sd).collect();
+    deviations.sort_unstable_by(f64::total_cmp);
+    (INNER_SD * determinacy::spread(stations) / deviations[deviations.len() / 2]).min(1.0)
+}
+
+/// The least-squares problem: the control coordinates are local blocks of three, the seven parameters one kept block.
+fn problem(
+    stations: &[Station],
+    start: &Similarity,
+    inner: f64,
+) -> Result<Problem<AsControl>, SimilarityError> {
+    let (mut initial, mut prior, mut sd) = (vec![], vec![], vec![]);
+    for station in stations {
+        let known = station.known();
+        let given = start.centred(&station.control);
+        let carried = start.centred(&start.control_at(&station.model));
+        for k in 0..3 {
+            initial.push(if known[k] { given[k] } else { carried[k] });
+            prior.push(if known[k] { given[k] } else { 0.0 });
+            sd.push(if known[k] { inner * station.control_sd[k] } else { f64::INFINITY });
+        }
+    }
+    let [x, y, z] = start.shift;
+    let parameters = [0.0, 0.0, 0.0, start.scale, x, y, z];
+    initial.extend(parameters);
+    prior.extend(parameters);
+    sd.extend([f64::INFINITY; CHANGES]);
+    let count = stations.len();
+    let layout = Layout::new(3, 3, &[CHANGES], (0..=count).collect(), vec![0; count])?;
+    Ok(Problem {
+        model: AsControl::new(stations, start),
+        system: System::new(layout, Ordering::Input),
+        observation_sd: stations.iter().flat_map(|station| station.model_sd.map(|sd| inner * sd)).collect(),
+        initial,
+        prior,
+        sd,
+    })
+}

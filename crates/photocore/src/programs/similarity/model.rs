@@ -1,0 +1,99 @@
+//! The observation equations: model coordinates of stations whose control coordinates are unknowns too.
+
+use super::Station;
+use super::transform::Similarity;
+use crate::adjustment::Model;
+use crate::geometry::vector::{apply, apply_transposed, product};
+use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
+use crate::normals::GroupRows;
+
+/// Unknowns of the kept block: three changes of the rotation (omega, phi, kappa of a rotation after that of the start), s, t.
+pub const CHANGES: usize = 7;
+
+/// Model coordinates as functions of control coordinates and the seven parameters (TB 19, equation 2.1).
+#[derive(Debug)]
+pub struct AsControl {
+    start: Similarity,
+    /// Model coordinates from their centre.
+    observed: Vec<Vector3>,
+    /// Which components of the control are free.
+    free: Vec<[bool; 3]>,
+}
+
+/// The unknowns, and the rotation with its partials.
+#[derive(Debug)]
+pub struct Prepared {
+    control: Vec<Vector3>,
+    similarity: Similarity,
+    /// Partials of A with respect to the three changes.
+    partials: [Matrix3; 3],
+}
+
+impl AsControl {
+    /// The model of some stations; the changes of the rotation are counted from a start.
+    pub fn new(stations: &[Station], start: &Similarity) -> Self {
+        let centre = start.model_centre;
+        let centred = |station: &Station| std::array::from_fn(|i| station.model[i] - centre[i]);
+        Self {
+            start: *start,
+            observed: stations.iter().map(centred).collect(),
+            free: stations.iter().map(|station| station.known().map(|known| !known)).collect(),
+        }
+    }
+
+    /// The similarity at given values of the seven unknowns.
+    pub fn similarity(&self, changes: &[f64]) -> Similarity {
+        let change = rotation([changes[0], changes[1], changes[2]]);
+        Similarity {
+            rotation: product(&change, &self.start.rotation),
+            scale: changes[3],
+            shift: [changes[4], changes[5], changes[6]],
+            ..self.start
+        }
+    }
+}
+
+impl Model for AsControl {
+    type Prepared = Prepared;
+
+    fn prepare(&self, unknowns: &[f64]) -> Prepared {
+        let (control, changes) = unknowns.split_at(3 * self.observed.len());
+        let (_, by_change) = rotation_with_partials([changes[0], changes[1], changes[2]]);
+        Prepared {
+            control: control.as_chunks().0.to_vec(),
+            similarity: self.similarity(changes),
+            partials: by_change.map(|partial| product(&partial, &self.start.rotation)),
+        }
+    }
+
+    /// Carries free control coordinates over from the model.
+    fn relocate(&self, unknowns: &mut [f64]) -> bool {
+        let (control, changes) = unknowns.split_at_mut(3 * self.observed.len());
+        let Similarity { rotation, scale, shift, .. } = self.similarity(changes);
+        for ((control, observed), free) in
+            control.as_chunks_mut::<3>().0.iter_mut().zip(&self.observed).zip(&self.free)
+        {
+            let reduced = std::array::from_fn(|i| observed[i] - shift[i]);
+            let carried = apply_transposed(&rotation, &reduced);
+            (0..3).filter(|&k| free[k]).for_each(|k| control[k] = carried[k] / scale);
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn observe(&self, prepared: &Prepared, local: usize, _group: usize, rows: &mut GroupRows<'_>) {
+        let Similarity { rotation, scale, shift, .. } = prepared.similarity;
+        let control = &prepared.control[local];
+        let turned = apply(&rotation, control);
+        let by_change = prepared.partials.map(|partial| apply(&partial, control));
+        for row in 0..3 {
+            rows.constant[row] = self.observed[local][row] - scale * turned[row] - shift[row];
+            rows.local[3 * row..][..3].copy_from_slice(&rotation[row].map(|a| scale * a));
+            let kept = &mut rows.kept[CHANGES * row..][..CHANGES];
+            kept.fill(0.0);
+            (0..3).for_each(|k| kept[k] = scale * by_change[k][row]);
+            kept[3] = turned[row];
+            kept[4 + row] = 1.0;
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The oriented model.
+
+use super::determinacy::Cause;
+use super::model::AsControl;
+use super::published::Cycles;
+use super::start::{Chosen, Started};
+use super::transform::{Matrix7, Similarity};
+use super::{SimilarityError, Station, determinacy, misclosures};
+use crate::adjustment::{Adjustment, Iteration, Problem, Status};
+use crate::geometry::{Matrix3, Vector3};
+
+/// A station after the orientation. What is unknown is NaN.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustedStation {
+    /// u = s X - A^T (x - B) of the known components, in control axes and model units.
+    pub misclosure: Vector3,
+    /// v = s A X + B - x with the adjusted X (TB 19, equation 5.1), in model axes and units.
+    pub model_residual: Vector3,
+    /// Adjusted control coordinates, in ground units; where unknown, what the model gives.
+    pub control: Vector3,
+    /// Their cofactors (a priori unit weight).
+    pub cofactors: Matrix3,
+    /// Redundancy numbers of the known components: they sum to the degrees of freedom.
+    pub redundancy: Vector3,
+    /// Misclosure / root of its own cofactor (Baarda's w), a priori unit weight; NaN without redundancy.
+    pub standardized: Vector3,
+}
+
+/// An oriented model.
+#[derive(Debug)]
+pub struct Solution {
+    /// The similarity.
+    pub similarity: Similarity,
+    /// Where the iteration started.
+    pub initial: Similarity,
+    /// Which initial values these were.
+    pub started: Started,
+    /// Other orientations that fit as well.
+    pub alternatives: Vec<Similarity>,
+    /// How the iteration ended.
+    pub status: Status,
+    /// Every iteration of the engine; none with the cycles of the bulletin.
+    pub iterations: Vec<Iteration>,
+    /// Largest correction of an angle in each cycle of the bulletin, radians.
+    pub cycles: Option<Vec<f64>>,
+    /// Cofactors of the tangent parameters (see [`Similarity`]), a priori unit weight.
+    pub tangent_cofactors: Matrix7,
+    /// Condition number of the linearized misclosures.
+    pub condition: f64,
+    /// What makes the control weak, and the stations concerned.
+    pub weakness: Option<(Cause, Vec<usize>)>,
+    /// Weighted sum of squares.
+    pub sum_of_squares: f64,
+    /// The stations.
+    pub stations: Vec<AdjustedStation>,
+}
+
+impl Solution {
+    /// Reads the solution out of an adjustment whose standard deviations were multiplied by `inner`.
+    pub(super) fn new(
+        stations: &[Station],
+        problem: &Problem<AsControl>,
+        adjustment: &Adjustment,
+        inner: f64,
+        chosen: Chosen,
+        cycles: Option<Cycles>,
+    ) -> Result<Self, SimilarityError> {
+        let similarity = problem.model.similarity(&adjustment.unknowns[3 * stations.len()..]);
+        let singular = || SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] };
+        let cofactors = misclosures::tangent_cofactors(stations, &similarity).ok_or_else(singular)?;
+        let adjusted =
+            |i: usize| AdjustedStation::new(i, &stations[i], &similarity, &cofactors, adjustment, inner);
+        let outward = inner * inner;
+        let last = adjustment.iterations.last().map(|iteration| iteration.sum_of_squares);
+        let iterations = adjustment.iterations.iter().map(|iteration| Iteration {
+            sum_of_squares: outward * iteration.sum_of_squares,
+            largest_change: inner * iteration.largest_change,
+            ..*iteration
+        });
+        Ok(Self {
+            similarity,
+            initial: chosen.similarity,
+            started: chosen.started,
+            alternatives: chosen.alternatives,
+            status: adjustment.status,
+            cycles: cycles.map(|cycles| cycles.corrections),
+            condition: determinacy::condition(stations, &similarity),
+            weakness: determinacy::weakness(stations, &similarity),
+            sum_of_squares: outward * last.unwrap_or(adjustment.initial_sum_of_squares),
+            iterations: iterations.collect(),
+            tangent_cofactors: cofactors,
+            stations: (0..stations.len()).map(adjusted).collect(),
+        })
+    }
+}
+
+impl AdjustedStation {
+    fn new(
+        index: usize,
+        station: &Station,
+        similarity: &Similarity,
+        cofactors: &Matrix7,
+        adjustment: &Adjustment,
+        inner: f64,
+    ) -> Self {
+        let known = station.known();
+        let u = similarity.misclosure(&station.control, &station.model);
+        let (redundancy, standardized) = misclosures::test(station, similarity, cofactors);
+        let values = &adjustment.unknowns[3 * index..];
+        let control = |k: usize| {
+            let exact = known[k] && station.control_sd[k] == 0.0;
+            if exact { station.control[k] } else { values[k] + similarity.control_centre[k] }
+        };
+        let local = adjustment.cofactors.as_ref().map(|all| &all.local[9 * index..]);
+        let cofactor = |i: usize, j: usize| local.map_or(f64::NAN, |own| own[3 * i + j] / (inner * inner));
+        Self {
+            misclosure: std::array::from_fn(|k| if known[k] { u[k] } else { f64::NAN }),
+            model_residual: std::array::from_fn(|k| -adjustment.residuals[3 * index + k]),
+            control: std::array::from_fn(control),
+            cofactors: std::array::from_fn(|i| std::array::from_fn(|j| cofactor(i, j))),
+            redundancy,
+            standardized,
+        }
+    }
+}

@@ -1,0 +1,235 @@
+"""Stations, former results and transformations in the card order of TB 19, section 7.
+
+The bulletin leaves the format of the cards open. Here a record is a line of words, separated by blanks or by
+commas; a missing control coordinate is a word `-`, or nothing between two commas.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.absolute_orientation.similarity import Similarity
+from photogram.absolute_orientation.stations import Stations
+from photogram.errors import InputError
+from photogram.files import read_lines
+from photogram.geometry import rotation_matrix
+from photogram.messages import Message
+
+__all__ = [
+    "Deck",
+    "read_cards",
+    "read_transformation",
+    "restart_record",
+    "transformation_records",
+]
+
+Floats = NDArray[np.float64]
+MISSING = ("", "-")
+
+
+@dataclass(frozen=True, eq=False)
+class Deck:
+    """The cards of part I.
+
+    Attributes
+    ----------
+    stations
+        The station records.
+    former
+        The approximate parameters of the first record; None when its words are zeros.
+    identification
+        The last word of the constants.
+    messages
+        Remarks on the records.
+    """
+
+    stations: Stations
+    former: Similarity | None
+    identification: str
+    messages: list[Message] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Record:
+    path: Path
+    number: int
+    text: str
+
+    def error(self, text: str) -> InputError:
+        return InputError(text, file=self.path, record=self.number, text=self.text)
+
+    def words(self, least: int, most: int, what: str) -> list[str]:
+        """Split into words; between two commas there may be none."""
+        split = self.text.split(",") if "," in self.text else self.text.split()
+        words = [word.strip() for word in split]
+        if not least <= len(words) <= most:
+            wanted = f"{least}" if least == most else f"{least} or {most}"
+            raise self.error(f"{what}: {len(words)} words, not {wanted}")
+        return words
+
+    def number_of(self, word: str, what: str) -> float:
+        """Read a number; D marks an exponent as E does."""
+        try:
+            value = float(word.upper().replace("D", "E"))
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.error(f"{what}: {word!r} is not a number")
+        return value
+
+    def count_of(self, word: str, what: str) -> int:
+        if not word.isdigit():
+            raise self.error(f"{what}: {word!r} is not a count")
+        return int(word)
+
+
+def read_cards(
+    path: Path,
+    *,
+    zero_missing: bool = False,
+    ground_unit: str = "ground unit",
+    model_unit: str = "model unit",
+) -> Deck:
+    """Read the cards of part I: approximate parameters, constants, stations.
+
+    Record 1: sin omega, sin phi, sin kappa, s, b1, b2, b3, identification; zeros stand for no approximation.
+    Record 2: M, N, MN, identification. Then M records X1 X2 X3 x1 x2 x3 number.
+
+    Parameters
+    ----------
+    path
+        The file.
+    zero_missing
+        Whether a control coordinate of zero is a missing one, as in the bulletin.
+    ground_unit, model_unit
+        Names of the units.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, a record has other words than these, or the counts M, N, MN are not those of
+        the stations; names file, record and text.
+    """
+    records = _records(path)
+    if len(records) < 2:
+        raise InputError("a deck begins with a record of parameters and one of constants", file=path)
+    constants = records[1].words(3, 4, "constants M, N, MN and identification")
+    m, n, mn = (records[1].count_of(w, name) for w, name in zip(constants, ("M", "N", "MN"), strict=False))
+    if len(records) - 2 != m:
+        raise records[1].error(f"M is {m}, but there are {len(records) - 2} station records")
+    stations = _stations(path, records[2:], zero_missing, ground_unit, model_unit)
+    pairs, elevations = int(stations.given[:, 0].sum()), int(stations.given[:, 2].sum())
+    if (elevations, pairs) != (n, mn):
+        raise records[1].error(
+            f"N is {n} and MN {mn}, but {elevations} elevations and {pairs} horizontal pairs are given"
+            " (a missing coordinate is '-'; --zero-missing takes 0 for one, as the bulletin does)"
+        )
+    messages: list[Message] = []
+    former = _former(records[0], stations, messages)
+    identification = constants[3] if len(constants) > 3 else ""
+    return Deck(stations, former, identification, messages)
+
+
+def _records(path: Path) -> list[_Record]:
+    lines = enumerate(read_lines(path), 1)
+    return [_Record(path, number, text) for number, text in lines if text.strip()]
+
+
+def _stations(
+    path: Path, records: list[_Record], zero_missing: bool, ground_unit: str, model_unit: str
+) -> Stations:
+    ids, control, model = [], [], []
+    for record in records:
+        words = record.words(7, 7, "station X1 X2 X3 x1 x2 x3 number")
+        row = [
+            math.nan if word in MISSING else record.number_of(word, f"X{k}")
+            for k, word in enumerate(words[:3], 1)
+        ]
+        control.append([math.nan if zero_missing and value == 0 else value for value in row])
+        model.append([record.number_of(word, f"x{k}") for k, word in enumerate(words[3:6], 1)])
+        if words[6] in ids:
+            raise record.error(f"station {words[6]} occurs twice")
+        ids.append(words[6])
+    try:
+        return Stations(
+            ids,
+            np.array(control).reshape(-1, 3),
+            np.array(model).reshape(-1, 3),
+            ground_unit=ground_unit,
+            model_unit=model_unit,
+        )
+    except InputError as error:
+        raise InputError(error.message, file=path) from None
+
+
+def _former(record: _Record, stations: Stations, messages: list[Message]) -> Similarity | None:
+    """Read the parameters of a former result; None when all are zero."""
+    words = record.words(7, 8, "parameters sin omega, sin phi, sin kappa, s, b1, b2, b3, identification")
+    values = np.array([record.number_of(word, "parameter") for word in words[:7]])
+    if not values.any():
+        return None
+    if np.abs(values[:3]).max() > 1:
+        raise record.error("a sine is beyond 1")
+    if values[3] <= 0:
+        raise record.error("s is not positive")
+    angles = np.arcsin(values[:3])
+    kappa = _kappa(stations)
+    if kappa is None:
+        remark = "the quadrant of kappa is not in its sine; it is taken within 90 degrees"
+        messages.append(Message(remark, record.path, record.number, record.text))
+    elif math.cos(kappa) < 0:
+        angles[2] = math.pi - angles[2]
+    return Similarity.from_parameters(values[3], rotation_matrix(angles[np.newaxis])[0], values[4:])
+
+
+def _kappa(stations: Stations) -> float | None:
+    """Kappa = theta_X - theta_x of the first two stations, for its quadrant; None where they have no plan."""
+    if len(stations.ids) < 2 or not stations.given[:2, 0].all():
+        return None
+    ground, model = (array[1, :2] - array[0, :2] for array in (stations.control, stations.model))
+    return math.atan2(ground[1] * model[0] - ground[0] * model[1], float(ground @ model))
+
+
+def restart_record(similarity: Similarity, identification: str) -> str:
+    """Return record 1 of part I for a new solution: sines of the angles, s, B, identification."""
+    values = [*np.sin(similarity.angles), similarity.scale, *similarity.translation]
+    return _record(values, identification)
+
+
+def transformation_records(similarity: Similarity, identification: str) -> list[str]:
+    """Return the two records that part II reads: a11 ... a23, then a31 a32 a33 s b1 b2 b3."""
+    a = similarity.rotation.ravel()
+    last = [*a[6:], similarity.scale, *similarity.translation]
+    return [_record(a[:6], identification), _record(last, identification)]
+
+
+def _record(values: list[float] | Floats, identification: str) -> str:
+    return " ".join([*(f"{value:.17g}" for value in values), identification or "0"])
+
+
+def read_transformation(path: Path) -> Similarity:
+    """Read the two records of part II, the output of part I. Its covariance is unknown.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or holds something else; names file, record and text.
+    """
+    records = _records(path)
+    if len(records) < 2:
+        raise InputError("a transformation has two records", file=path)
+    first = records[0].words(6, 7, "a11 a12 a13 a21 a22 a23, identification")
+    second = records[1].words(7, 8, "a31 a32 a33 s b1 b2 b3, identification")
+    values = [
+        *(records[0].number_of(word, "direction cosine") for word in first[:6]),
+        *(records[1].number_of(word, "parameter") for word in second[:7]),
+    ]
+    try:
+        return Similarity.from_parameters(values[9], np.reshape(values[:9], (3, 3)), values[10:])
+    except InputError as error:
+        raise InputError(error.message, file=path) from None

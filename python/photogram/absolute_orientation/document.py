@@ -1,0 +1,159 @@
+"""The JSON document of an orientation; `docs/absolute-orientation.md` describes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+from photogram import _photocore
+from photogram.absolute_orientation.orientation import Orientation
+from photogram.absolute_orientation.similarity import Similarity
+from photogram.errors import InputError
+
+__all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
+
+Floats = NDArray[np.float64]
+
+
+def to_json(result: Orientation) -> bytes:
+    """Return the whole result as JSON (UTF-8); its points are the stations without control."""
+    return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}"])
+
+
+def without_points(result: Orientation) -> Iterator[bytes]:
+    """Return the document up to the first of its points, so that any number of them can follow."""
+    head = orjson.dumps(_head(result), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
+    yield head.removesuffix(b"\n}")
+    yield b',\n  "points": ['
+
+
+def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> bytes:
+    """Return points as JSON objects, one a line, with commas between them."""
+    rows = zip(ids, positions.tolist(), covariances.tolist(), strict=True)
+    objects = (
+        orjson.dumps({"id": name, "position": position, "covariance": covariance})
+        for name, position, covariance in rows
+    )
+    return b"\n    " + b",\n    ".join(objects) if len(positions) else b""
+
+
+def _head(result: Orientation) -> dict[str, Any]:
+    similarity = result.similarity
+    return {
+        "program": f"photogram {_photocore.__version__} absolute-orientation",
+        "units": _units(result),
+        "conventions": {
+            "model": "x = s A X + B, A = K(kappa) Phi(phi) Omega(omega); x model, X control",
+            "covariance": "omega, phi, kappa, scale, b1, b2, b3; cofactors times covariance_scale",
+            "residual": "u = s X - A^T (x - B): control axes, model units; null where unknown",
+            "residual_ground": "u / s: given minus transformed, ground units",
+            "residual_model": "v = s A X + B - x with the adjusted X: model axes, model units",
+            "standardized": "residual / its standard deviation: a priori if any were given, else by sigma0",
+        },
+        "method": result.method,
+        "start": result.started,
+        "status": result.status,
+        "messages": [str(message) for message in result.messages],
+        "iterations": len(result.iterations) if result.cycles is None else len(result.cycles),
+        "initial": {
+            "scale": result.initial.scale,
+            "angles_rad": result.initial.angles,
+            "translation": result.initial.translation,
+        },
+        "scale": similarity.scale,
+        "rotation": similarity.rotation,
+        "angles_rad": similarity.angles,
+        "translation": similarity.translation,
+        "covariance": similarity.covariance,
+        "covariance_scale": result.covariance_scale,
+        "rms": result.rms,
+        "sigma0": result.sigma0,
+        "degrees_of_freedom": result.degrees_of_freedom,
+        "known_coordinates": result.known,
+        "weighted_sum_of_squares": result.weighted_sum_of_squares,
+        "condition": result.condition,
+        "centres": {"control": similarity.control_centre, "model": similarity.model_centre},
+        "control": list(_control(result)),
+        "rejected": list(_rejected(result)),
+    }
+
+
+def _units(result: Orientation) -> dict[str, str]:
+    ground, model = result.stations.ground_unit, result.stations.model_unit
+    return {
+        "scale": f"{model} / {ground}",
+        "angles_rad": "rad",
+        "translation": model,
+        "covariance": "products of rad, scale and translation",
+        "rms": model,
+        "sigma0": "1" if result.weighted else model,
+        "residual": model,
+        "residual_ground": ground,
+        "residual_model": model,
+        "adjusted": ground,
+        "position": ground,
+        "position_covariance": f"{ground}^2",
+    }
+
+
+def _control(result: Orientation) -> Iterator[dict[str, Any]]:
+    for row in np.flatnonzero(result.took_part).tolist():
+        yield {
+            "id": result.stations.ids[row],
+            "residual": result.residuals[row],
+            "residual_ground": result.residuals_ground[row],
+            "residual_model": result.model_residuals[row],
+            "redundancy": result.redundancy[row],
+            "standardized": result.standardized[row],
+            "adjusted": result.adjusted_control[row],
+            "covariance": result.control_covariances[row],
+        }
+
+
+def _rejected(result: Orientation) -> Iterator[dict[str, Any]]:
+    left_out = result.stations.given & ~result.used
+    differences = np.where(left_out, result.differences, np.nan)
+    for row in np.flatnonzero(left_out.any(axis=1)).tolist():
+        yield {"id": result.stations.ids[row], "residual_ground": differences[row]}
+
+
+def read_similarity(path: Path) -> Similarity:
+    """Read the parameters, with their covariance, out of a JSON document.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is no such document.
+    """
+    try:
+        found = orjson.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+    except orjson.JSONDecodeError as error:
+        raise InputError(f"is no JSON document: {error}", file=path) from None
+    try:
+        centres = found["centres"]
+        return Similarity.from_parameters(
+            found["scale"],
+            found["rotation"],
+            found["translation"],
+            _numbers(found["covariance"]),
+            control_centre=centres["control"],
+            model_centre=centres["model"],
+        )
+    except InputError as error:
+        raise InputError(error.message, file=path) from None
+    except (KeyError, TypeError, ValueError):
+        raise InputError("is no result of an absolute orientation", file=path) from None
+
+
+def _numbers(covariance: list[list[float | None]] | None) -> Floats | None:
+    """Read a covariance; None when it, or an element of it, is unknown."""
+    if covariance is None or any(value is None for row in covariance for value in row):
+        return None
+    return np.array(covariance, dtype=np.float64)

@@ -1,0 +1,263 @@
+"""Absolute orientation by least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram import _photocore
+from photogram.absolute_orientation.orientation import Orientation
+from photogram.absolute_orientation.similarity import Similarity
+from photogram.absolute_orientation.stations import Stations
+from photogram.adjusted import Iteration
+from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.messages import Message
+
+__all__ = ["Method", "Start", "UnitVariance", "absolute_orientation"]
+
+Method = Literal["rigorous", "report", "fill-in"]
+Start = Literal["auto", "report", "closed-form"]
+UnitVariance = Literal["estimated", "unity"]
+
+Floats = NDArray[np.float64]
+
+WEAK = 1e3
+"""Condition number from which control is called weak."""
+WEAKNESS = {
+    "coincident": "the stations with horizontal coordinates almost coincide in plan",
+    "elevations in line": "the stations with elevations are almost in a straight line in plan",
+    "stations in line": "the stations are almost in a straight line",
+}
+SHARED = 10_000
+"""Stations from which more than one thread is worth its start."""
+
+
+def absolute_orientation(
+    stations: Stations,
+    *,
+    method: Method = "rigorous",
+    start: Start | None = None,
+    former: Similarity | Orientation | None = None,
+    reject: Iterable[object] = (),
+    unit_variance: UnitVariance = "estimated",
+    max_iterations: int = 50,
+    tolerance: float = 1e-5,
+) -> Orientation:
+    """Orient a model absolutely: find s, A and B of x = s A X + B from any mix of control.
+
+    Minimised is the weighted sum of squares of the residuals in both systems; without standard deviations
+    that of u = s X - A^T (x - B) over the known components (TB 19, made right for partial control).
+
+    Parameters
+    ----------
+    stations
+        Model and control coordinates.
+    method
+        `rigorous`: until no unknown changes by more than `tolerance`. `report`: the bulletin's cycle
+        (Gauss-Crout, until all corrections of angles are 1e-5 rad at the most) on the same residuals.
+        `fill-in`: the bulletin's cycle on its own equations, missing coordinates filled in from the last
+        cycle; with partial control it ends elsewhere, by 1e-6 rad or so. The report's methods take no
+        standard deviations.
+    start
+        `report`: from the first two stations (omega = phi = 0, any kappa). `closed-form`: at any attitude, by
+        Horn's quaternion for full control, else the best minimum over all rotations. `auto`: the report's
+        values, unless the closed form finds a better place. None stands for `auto`, and for `report` with the
+        report's methods.
+    former
+        A former result to start from.
+    reject
+        Identifiers of stations whose control takes no part; their differences are reported.
+    unit_variance
+        Covariances are scaled by sigma0 squared (`estimated`), or not (`unity`, with standard deviations
+        given).
+    max_iterations
+        Iterations at the most.
+    tolerance
+        Fraction of its standard deviation by which no unknown changes any more.
+
+    Returns
+    -------
+    The orientation; its `status` says whether it converged.
+
+    Raises
+    ------
+    RankError
+        Control that does not determine the seven parameters: fewer than seven components, two horizontal
+        pairs or three elevations; stations or elevations in a straight line; horizontal stations that
+        coincide. Its `points` names the stations.
+    AdjustmentError
+        The scale became zero or negative (the model is a mirror image), or nothing finite.
+    InputError
+        An option that cannot be; with `start="report"` first two stations without horizontal coordinates, or
+        coincident.
+    KeyboardInterrupt
+        Ctrl-C.
+    """
+    start = start or ("auto" if method == "rigorous" else "report")
+    rejected = tuple(str(name) for name in reject)
+    _check_options(stations, method, start, rejected, unit_variance, max_iterations, tolerance)
+    used = stations.held & ~np.isin(np.array(stations.ids, dtype=object), rejected)[:, np.newaxis]
+    rows = np.flatnonzero(used.any(axis=1))
+    try:
+        solution = _photocore.orient_model(
+            stations.control[rows],
+            np.where(used, stations.control_sd, np.inf)[rows],
+            stations.model[rows],
+            np.ones((len(rows), 3)) if stations.model_sd is None else stations.model_sd[rows],
+            method=method,
+            start=start,
+            former=_parameters(former),
+            max_iterations=max_iterations,
+            tolerance=tolerance,
+            threads=1 if len(rows) < SHARED else 0,
+        )
+    except _photocore.SimilarityError as error:
+        raise _named(stations, used, rows, *error.args) from None
+    return _orientation(stations, used, rejected, method, unit_variance, rows, solution)
+
+
+def _parameters(former: Similarity | Orientation | None) -> _photocore.ParametersRow | None:
+    if former is None:
+        return None
+    similarity = former.similarity if isinstance(former, Orientation) else former
+    return similarity.scale, similarity.rotation.tolist(), similarity.translation.tolist()
+
+
+def _check_options(
+    stations: Stations,
+    method: str,
+    start: str,
+    rejected: tuple[str, ...],
+    unit_variance: str,
+    max_iterations: int,
+    tolerance: float,
+) -> None:
+    for name, value, choices in (
+        ("method", method, get_args(Method)),
+        ("start", start, get_args(Start)),
+        ("unit_variance", unit_variance, get_args(UnitVariance)),
+    ):
+        if value not in choices:
+            raise InputError(f"{name} is one of {', '.join(choices)}, not {value!r}")
+    if max_iterations < 1:
+        raise InputError("there must be one iteration at least")
+    if not tolerance > 0:
+        raise InputError("the criterion of convergence must be positive")
+    unknown = [name for name in rejected if name not in stations.ids]
+    if unknown:
+        raise InputError(f"station {unknown[0]} cannot be rejected: it is not there")
+    if stations.model_sd is not None and method != "rigorous":
+        raise InputError(f"the {method} method takes no standard deviations")
+    if stations.model_sd is None and unit_variance == "unity":
+        raise InputError("unit_variance 'unity' needs standard deviations")
+
+
+def _orientation(
+    stations: Stations,
+    used: NDArray[np.bool_],
+    rejected: tuple[str, ...],
+    method: str,
+    unit_variance: str,
+    rows: NDArray[np.intp],
+    solution: _photocore.SimilaritySolution,
+) -> Orientation:
+    weighted = stations.model_sd is not None
+    freedom = int(used.sum()) - 7
+    squares = solution.sum_of_squares if weighted else float(np.nansum(solution.misclosures**2))
+    variance = squares / freedom if freedom else None
+    scale = 1.0 if weighted and (unit_variance == "unity" or variance is None) else variance
+    count = len(stations.ids)
+
+    def spread(values: Floats) -> Floats:
+        """Put the rows that took part back among all stations."""
+        full = np.full((count, *values.shape[1:]), np.nan)
+        full[rows] = values
+        return full
+
+    # Without standard deviations the test values are in units of sigma0; without either there are none.
+    unit = 1.0 if weighted else (variance or np.nan) ** 0.5
+    known = np.nan if scale is None else scale
+    similarity = Similarity.from_core(
+        solution.similarity, None if scale is None else scale * solution.tangent_cofactors
+    )
+    return Orientation(
+        stations=stations,
+        used=used,
+        rejected=rejected,
+        similarity=similarity,
+        initial=Similarity.from_core(solution.initial),
+        started=solution.started,
+        alternatives=[Similarity.from_core(row) for row in solution.alternatives],
+        method=method,
+        status=solution.status,
+        iterations=[Iteration(*row) for row in solution.iterations],
+        cycles=solution.cycles,
+        residuals=spread(solution.misclosures),
+        model_residuals=spread(solution.model_residuals),
+        adjusted_control=spread(solution.adjusted_control),
+        control_covariances=spread(known * solution.control_cofactors),
+        redundancy=spread(solution.redundancy),
+        standardized=spread(solution.standardized / unit),
+        weighted_sum_of_squares=squares,
+        covariance_scale=scale,
+        condition=solution.condition,
+        messages=_messages(solution, [stations.ids[row] for row in rows.tolist()], scale, freedom),
+    )
+
+
+def _messages(
+    solution: _photocore.SimilaritySolution, names: list[str], scale: float | None, freedom: int
+) -> list[Message]:
+    """Collect remarks that did not stop the orientation, the gravest first."""
+    messages = []
+    if solution.alternatives:
+        others = "; ".join(
+            "omega {:.3f}, phi {:.3f}, kappa {:.3f}".format(*np.degrees(Similarity.from_core(row).angles))
+            for row in solution.alternatives
+        )
+        reason = "starts there" if solution.started == "report" else "has the least sum of squares"
+        messages.append(
+            Message(f"the control fits another orientation as well ({others} deg); the one given {reason}")
+        )
+    if solution.weakness:
+        kind, concerned = solution.weakness
+        messages.append(Message(WEAKNESS[kind] + ": " + ", ".join(names[i] for i in concerned)))
+    elif solution.condition > WEAK:
+        messages.append(
+            Message(f"the control is weak: the condition number of the equations is {solution.condition:.1e}")
+        )
+    if freedom == 0:
+        scaled = "covariances are unknown" if scale is None else "covariances are scaled by 1"
+        messages.append(Message(f"there are no degrees of freedom: nothing checks the control, and {scaled}"))
+    return messages
+
+
+def _named(
+    stations: Stations,
+    used: NDArray[np.bool_],
+    rows: NDArray[np.intp],
+    kind: str,
+    message: str,
+    concerned: list[int],
+) -> AdjustmentError | InputError:
+    """Put names to the stations of a failure of the core."""
+    names = [stations.ids[rows[i]] for i in concerned if i < len(rows)]
+    if kind == "insufficient":
+        pairs, elevations = int(used[:, 0].sum()), int(used[:, 2].sum())
+        text = (
+            f"insufficient control: {2 * pairs + elevations} known coordinates (7 needed),"
+            f" {pairs} horizontal pairs (2 needed), {elevations} elevations (3 needed)"
+        )
+        return RankError(text, [], [stations.ids[row] for row in rows])
+    if kind == "undetermined":
+        return RankError(f"{message}: {', '.join(names)}" if names else message, [], names)
+    if kind == "first stations":
+        return InputError(f"{message} ({', '.join(names)}); the report's initial values need two far apart")
+    if kind == "scale":
+        return AdjustmentError(
+            "the scale became zero or negative: the model is a mirror image or not that of its control"
+        )
+    return AdjustmentError(message)

@@ -1,0 +1,107 @@
+"""A plan of the control with its residuals."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.absolute_orientation.orientation import Orientation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["plot"]
+
+Floats = NDArray[np.float64]
+
+LONGEST = 0.12
+"""Length of the longest residual, as a fraction of the plan's larger side."""
+
+
+def plot(result: Orientation) -> bytes:
+    """Draw plan residuals as arrows and those of elevations as bars, given minus transformed; return a PNG.
+
+    Needs matplotlib (`pip install 'photogram[plots]'`).
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # takes long to import
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 7.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    rows = np.flatnonzero(result.took_part)
+    plan = result.adjusted_control[rows, :2]
+    residuals = result.residuals_ground[rows]
+    size = float(np.ptp(plan, axis=0).max())
+    largest = float(np.nanmax(np.abs(residuals)))
+    factor = LONGEST * size / largest if largest > 0 else 0.0
+    _stations(axes, result, rows, plan)
+    _residuals(axes, plan, residuals * factor)
+    _key(axes, plan, size, factor, result.stations.ground_unit)
+    axes.set_aspect("equal")
+    axes.margins(0.15)
+    axes.ticklabel_format(useOffset=False, style="plain")
+    axes.set_xlabel(f"X, {result.stations.ground_unit}")
+    axes.set_ylabel(f"Y, {result.stations.ground_unit}")
+    rms = result.rms / result.similarity.scale
+    axes.set_title(f"Control, given minus transformed; rms {rms:.3g} {result.stations.ground_unit}")
+    axes.locator_params(nbins=6)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=120)
+    return picture.getvalue()
+
+
+def _stations(axes: Axes, result: Orientation, rows: NDArray[np.intp], plan: Floats) -> None:
+    used = result.used[rows]
+    kinds = (
+        ("full control", used[:, 0] & used[:, 2], "^"),
+        ("horizontal control", used[:, 0] & ~used[:, 2], "s"),
+        ("height control", ~used[:, 0] & used[:, 2], "o"),
+    )
+    for name, chosen, marker in kinds:
+        if chosen.any():
+            axes.plot(*plan[chosen].T, marker, color="0.25", markerfacecolor="none", label=name)
+    for row, place in zip(rows.tolist(), plan, strict=True):
+        axes.annotate(result.stations.ids[row], place, (6, 6), textcoords="offset points", fontsize=8)
+
+
+def _residuals(axes: Axes, plan: Floats, drawn: Floats) -> None:
+    """Draw residuals, already in the scale of the plan."""
+    flat = np.isfinite(drawn[:, 0])
+    if flat.any():
+        axes.quiver(
+            *plan[flat].T,
+            *drawn[flat, :2].T,
+            angles="xy",
+            scale_units="xy",
+            scale=1,
+            width=0.004,
+            zorder=3,
+            color="C0",
+        )
+        axes.plot([], [], color="C0", label="plan residual")
+    high = np.isfinite(drawn[:, 2])
+    ends = plan[high, 1] + drawn[high, 2]
+    axes.vlines(
+        plan[high, 0], plan[high, 1], ends, color="C1", linewidth=3, label="height residual (up: positive)"
+    )
+    # Neither arrows nor bars widen the limits of the axes by themselves.
+    shown = np.where(np.isfinite(drawn[:, :2]), drawn[:, :2], 0.0) + plan
+    axes.update_datalim(shown)
+    axes.update_datalim(np.column_stack([plan[high, 0], ends]))
+
+
+def _key(axes: Axes, plan: Floats, size: float, factor: float, unit: str) -> None:
+    """Draw a bar of a round length below the plan."""
+    if factor == 0:
+        return
+    longest = LONGEST * size / factor
+    power = 10.0 ** np.floor(np.log10(longest))
+    length = max(step * power for step in (1, 2, 5) if step * power <= longest)
+    corner = plan.min(axis=0) - [0.0, 0.2 * size]
+    axes.plot([corner[0], corner[0] + length * factor], [corner[1]] * 2, color="0.25", linewidth=2)
+    axes.annotate(f"{length:g} {unit}", corner, (0, -12), textcoords="offset points", fontsize=8)

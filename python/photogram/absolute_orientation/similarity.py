@@ -1,0 +1,184 @@
+"""The similarity x = s A X + B with its covariance, and the transformation of points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram import _photocore
+from photogram.errors import InputError
+from photogram.geometry import rotation_angles
+
+__all__ = ["Similarity"]
+
+Floats = NDArray[np.float64]
+
+ORTHOGONAL = 1e-6
+"""Elements of A A^T - I that a matrix read from a file may have."""
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity:
+    """The similarity x = s A X + B from control X (ground units) to model x (model units).
+
+    A = K(kappa) Phi(phi) Omega(omega) (TB 19, equation 2.3).
+
+    Attributes
+    ----------
+    scale
+        s, model units per ground unit.
+    rotation
+        (3, 3) A.
+    control_centre, model_centre, shift
+        (3,) x - model_centre = s A (X - control_centre) + shift: the form that is computed with, so that
+        large coordinates cost no digits.
+    tangent_covariance
+        (7, 7) of three small rotations about the model axes (rad), s and shift; it is regular at every
+        attitude. None when it is unknown.
+    """
+
+    scale: float
+    rotation: Floats
+    control_centre: Floats
+    model_centre: Floats
+    shift: Floats
+    tangent_covariance: Floats | None = None
+
+    @classmethod
+    def from_core(cls, row: _photocore.CentredRow, tangent_covariance: Floats | None = None) -> Self:
+        """Take over what the core returns."""
+        scale, rotation, shift, control_centre, model_centre = row
+        return cls(
+            scale,
+            np.array(rotation),
+            np.array(control_centre),
+            np.array(model_centre),
+            np.array(shift),
+            tangent_covariance,
+        )
+
+    @classmethod
+    def from_parameters(
+        cls,
+        scale: float,
+        rotation: ArrayLike,
+        translation: ArrayLike,
+        covariance: ArrayLike | None = None,
+        *,
+        control_centre: ArrayLike = (0.0, 0.0, 0.0),
+        model_centre: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Self:
+        """Make a similarity from x = s A X + B.
+
+        Parameters
+        ----------
+        scale, rotation, translation
+            s, A (3, 3), B (3,).
+        covariance
+            (7, 7) of omega, phi, kappa (rad), s, b1, b2, b3, or None.
+        control_centre, model_centre
+            (3,) where to count from; any points amid the stations.
+
+        Raises
+        ------
+        InputError
+            A scale that is not positive, a matrix that is no rotation, a covariance of another shape.
+        """
+        a, b = np.array(rotation, dtype=np.float64), np.array(translation, dtype=np.float64)
+        if a.shape != (3, 3) or b.shape != (3,):
+            raise InputError(f"a rotation is (3, 3) and a translation (3,), not {a.shape} and {b.shape}")
+        if not (np.abs(a @ a.T - np.eye(3)).max() < ORTHOGONAL and np.linalg.det(a) > 0):
+            raise InputError("the nine direction cosines do not make a rotation")
+        if not (scale > 0 and np.isfinite(scale) and np.isfinite(b).all()):
+            raise InputError("a similarity needs a positive scale and a finite translation")
+        centre, model = np.array(control_centre, dtype=np.float64), np.array(model_centre, dtype=np.float64)
+        made = cls(float(scale), a, centre, model, b + scale * a @ centre - model)
+        return made if covariance is None else made._with_covariance(covariance)
+
+    def _with_covariance(self, covariance: ArrayLike) -> Self:
+        given = np.array(covariance, dtype=np.float64)
+        if given.shape != (7, 7):
+            raise InputError(f"the covariance of a similarity is (7, 7), not {given.shape}")
+        back = np.linalg.inv(self.parameter_partials)
+        return type(self)(
+            self.scale,
+            self.rotation,
+            self.control_centre,
+            self.model_centre,
+            self.shift,
+            back @ given @ back.T,
+        )
+
+    @property
+    def translation(self) -> Floats:
+        """(3,) B in model units."""
+        b: Floats = self.shift + self.model_centre - self.scale * self.rotation @ self.control_centre
+        return b
+
+    @property
+    def angles(self) -> Floats:
+        """(3,) omega, phi, kappa in radians; phi in [-pi/2, pi/2]."""
+        angles: Floats = rotation_angles(self.rotation[np.newaxis])[0]
+        return angles
+
+    @property
+    def parameter_partials(self) -> Floats:
+        """(7, 7) partials of omega, phi, kappa, s, b1, b2, b3 with respect to the tangent parameters."""
+        return _photocore.similarity_partials(self._row())
+
+    @property
+    def covariance(self) -> Floats | None:
+        """(7, 7) of omega, phi, kappa (rad), s, b1, b2, b3 (model units); None when it is unknown.
+
+        Where phi comes near 90 degrees, those of omega and kappa grow without bound; points keep theirs.
+        """
+        if self.tangent_covariance is None:
+            return None
+        partials = self.parameter_partials
+        covariance: Floats = partials @ self.tangent_covariance @ partials.T
+        return covariance
+
+    def to_model(self, control: ArrayLike) -> Floats:
+        """Model coordinates x = s A X + B, (n, 3), of (n, 3) control coordinates (TB 19, equation 2.1)."""
+        centred = np.asarray(control, dtype=np.float64) - self.control_centre
+        model: Floats = self.scale * centred @ self.rotation.T + self.shift + self.model_centre
+        return model
+
+    def transform(self, model: ArrayLike, model_sd: ArrayLike = 0.0) -> tuple[Floats, Floats]:
+        """Control coordinates of model points, with their covariances (TB 19, equation 2.2).
+
+        Parameters
+        ----------
+        model
+            (n, 3) model coordinates.
+        model_sd
+            (n, 3) their own standard deviations in model units, or anything that broadcasts to that; 0 for
+            the covariance that the parameters alone give.
+
+        Returns
+        -------
+        (n, 3) X = A^T (x - B) / s in ground units, and their (n, 3, 3) covariances, NaN when that of the
+        parameters is unknown.
+
+        Raises
+        ------
+        ValueError
+            Another shape.
+        """
+        points = np.asarray(model, dtype=np.float64)
+        sd = np.broadcast_to(np.asarray(model_sd, dtype=np.float64), points.shape)
+        covariance = self.tangent_covariance
+        known = np.full((7, 7), np.nan) if covariance is None else covariance
+        return _photocore.transform_points(self._row(), known, points, sd)
+
+    def _row(self) -> _photocore.CentredRow:
+        return (
+            self.scale,
+            self.rotation.tolist(),
+            self.shift.tolist(),
+            self.control_centre.tolist(),
+            self.model_centre.tolist(),
+        )

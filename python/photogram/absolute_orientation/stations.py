@@ -1,0 +1,166 @@
+"""The stations of a model: model coordinates, and control coordinates as far as they are known."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["CONTROL_COLUMNS", "CONTROL_SD_COLUMNS", "MODEL_COLUMNS", "MODEL_SD_COLUMNS", "Stations"]
+
+Floats = NDArray[np.float64]
+
+CONTROL_COLUMNS = ("X", "Y", "Z")
+MODEL_COLUMNS = ("x", "y", "z")
+CONTROL_SD_COLUMNS = ("sd_X", "sd_Y", "sd_Z")
+MODEL_SD_COLUMNS = ("sd_x", "sd_y", "sd_z")
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """The stations of a model, in their order; arrays are copied and checked.
+
+    A station without any control coordinate is a point to be transformed.
+
+    Attributes
+    ----------
+    ids
+        (n,) identifiers, each once.
+    control
+        (n, 3) control coordinates X, Y, Z in ground units; NaN where unknown. X and Y come as a pair.
+    model
+        (n, 3) model coordinates x, y, z in model units.
+    control_sd
+        (n, 3) standard deviations of the control in ground units, or anything that broadcasts to that:
+        0 exact (the default), infinite for a known coordinate that takes no part.
+    model_sd
+        (n, 3) standard deviations of the model coordinates in model units, or anything that broadcasts to
+        that; positive. None when only their equality is known: sigma0 then is their standard deviation.
+    ground_unit, model_unit
+        Names of the units, for reports.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, an identifier that occurs twice, half a horizontal pair, a model coordinate
+        that is not finite, a standard deviation that cannot be.
+    """
+
+    ids: Sequence[str]
+    control: Floats
+    model: Floats
+    control_sd: Floats
+    model_sd: Floats | None
+    ground_unit: str
+    model_unit: str
+
+    def __init__(
+        self,
+        ids: Iterable[object],
+        control: ArrayLike,
+        model: ArrayLike,
+        *,
+        control_sd: ArrayLike = 0.0,
+        model_sd: ArrayLike | None = None,
+        ground_unit: str = "ground unit",
+        model_unit: str = "model unit",
+    ) -> None:
+        names = tuple(str(name) for name in ids)
+        put = object.__setattr__  # the dataclass is frozen
+        put(self, "ids", names)
+        put(self, "control", _table("control", control, len(names)))
+        put(self, "model", _table("model", model, len(names)))
+        put(self, "control_sd", _table("control_sd", control_sd, len(names)))
+        put(self, "model_sd", None if model_sd is None else _table("model_sd", model_sd, len(names)))
+        put(self, "ground_unit", ground_unit)
+        put(self, "model_unit", model_unit)
+        self._check()
+
+    @classmethod
+    def from_table(cls, table: pd.DataFrame, **units: str) -> Self:
+        """Read a data frame with the columns of a CSV file: id, X, Y, Z, x, y, z, and sd_ of each.
+
+        Parameters
+        ----------
+        table
+            `id`, `X`, `Y`, `Z` (NaN where unknown), `x`, `y`, `z`; `sd_X`, `sd_Y`, `sd_Z` and `sd_x`, `sd_y`,
+            `sd_z` if there are any (a missing control deviation is 0).
+        units
+            `ground_unit`, `model_unit`.
+
+        Raises
+        ------
+        InputError
+            A column is missing, or as for the class itself.
+        """
+        missing = [name for name in ("id", *CONTROL_COLUMNS, *MODEL_COLUMNS) if name not in table]
+        if missing:
+            raise InputError(f"the table has no column {', '.join(missing)}")
+        control_sd = [
+            table[name].fillna(0.0) if name in table else 0.0 * table["x"] for name in CONTROL_SD_COLUMNS
+        ]
+        weighted = all(name in table for name in MODEL_SD_COLUMNS)
+        return cls(
+            table["id"],
+            table[list(CONTROL_COLUMNS)],
+            table[list(MODEL_COLUMNS)],
+            control_sd=np.column_stack(control_sd) if len(table) else 0.0,
+            model_sd=table[list(MODEL_SD_COLUMNS)] if weighted else None,
+            **units,
+        )
+
+    @property
+    def given(self) -> NDArray[np.bool_]:
+        """(n, 3) which control coordinates are known."""
+        return np.isfinite(self.control)
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """(n, 3) which control coordinates may take part: known, with a finite standard deviation."""
+        return self.given & np.isfinite(self.control_sd)
+
+    def _check(self) -> None:
+        repeated = [name for name, count in Counter(self.ids).items() if count > 1]
+        if repeated:
+            raise InputError(f"station {repeated[0]} occurs more than once")
+        self._refuse(~np.isfinite(self.model), "has a model coordinate that is not a finite number")
+        self._refuse(np.isinf(self.control), "has a control coordinate that is not a finite number")
+        pair = self.given[:, :2]
+        self._refuse(pair[:, :1] != pair[:, 1:], "has one horizontal coordinate; they come as a pair")
+        sd = np.where(self.given, self.control_sd, 0.0)
+        self._refuse(~(sd >= 0), "has a standard deviation of control that is not zero or positive")
+        held = self.held[:, :2]
+        self._refuse(held[:, :1] != held[:, 1:], "has one held horizontal coordinate; they come as a pair")
+        if self.model_sd is not None:
+            positive = (self.model_sd > 0) & np.isfinite(self.model_sd)
+            self._refuse(~positive, "has a standard deviation of the model that is not positive and finite")
+        elif (sd[self.held] > 0).any():
+            raise InputError(
+                "the control has standard deviations but the model has none:"
+                " without them errors cannot be shared out"
+            )
+
+    def _refuse(self, faulty: NDArray[np.bool_], text: str) -> None:
+        if faulty.any():
+            raise InputError(f"station {self.ids[int(np.flatnonzero(faulty.any(axis=1))[0])]} {text}")
+
+
+def _table(name: str, values: ArrayLike, count: int) -> Floats:
+    array = np.array(values, dtype=np.float64)
+    if array.ndim == 2 and array.shape != (count, 3):
+        raise InputError(f"{name} has the shape {array.shape}, not ({count}, 3)")
+    try:
+        return np.broadcast_to(array, (count, 3)).copy()
+    except ValueError:
+        raise InputError(
+            f"{name} has the shape {array.shape}, which does not broadcast to ({count}, 3)"
+        ) from None

@@ -1,0 +1,246 @@
+"""Part II: any number of model points from file to file, chunk by chunk."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+from photogram.absolute_orientation.csv_files import header
+from photogram.absolute_orientation.document import point_rows
+from photogram.absolute_orientation.similarity import Similarity
+from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
+from photogram.errors import InputError
+from photogram.files import whole
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["CHUNK", "Document", "decimals_for", "transform_file"]
+
+Floats = NDArray[np.float64]
+
+CHUNK = 100_000
+"""Points transformed at a time."""
+OUTPUT = b"id,X,Y,Z,sd_X,sd_Y,sd_Z\n"
+
+
+@dataclass(frozen=True)
+class Document:
+    """A JSON document that the points are written into as well.
+
+    Attributes
+    ----------
+    path
+        Where it goes.
+    head
+        Everything up to its first point.
+    first
+        Points that come before those of the file.
+    """
+
+    path: Path
+    head: bytes
+    first: bytes = b""
+
+
+def transform_file(
+    similarity: Similarity,
+    source: Path,
+    target: Path,
+    *,
+    decimals: int = 6,
+    point_sd: float = 0.0,
+    document: Document | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> int:
+    """Transform the points of a file into another file: control coordinates and their standard deviations.
+
+    `source` is a CSV file with the columns `id`, `x`, `y`, `z` and, if there are any, `sd_x`, `sd_y`,
+    `sd_z`; or lines `x y z number` without a header (part II of TB 19). `target` gets the columns `id`, `X`,
+    `Y`, `Z`, `sd_X`, `sd_Y`, `sd_Z`, the last three empty when the covariance of the similarity is unknown.
+    What is written is there whole or not at all.
+
+    Parameters
+    ----------
+    similarity
+        The similarity.
+    source, target
+        The files.
+    decimals
+        Decimals that coordinates are rounded to; standard deviations get one more.
+    point_sd
+        Standard deviation of each coordinate of a point in model units, where the file has none.
+    document
+        A JSON document to write the points into as well, with their full covariances.
+    progress
+        Called after each chunk with the number of points done; an exception it raises stops the work.
+
+    Returns
+    -------
+    The number of points.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, has other columns, no points, or a field that is no number; names file,
+        record and text.
+    OSError
+        A file cannot be written.
+    """
+    done = 0
+    with ExitStack() as files:
+        out = files.enter_context(whole(target))
+        json = files.enter_context(whole(document.path)) if document else None
+        out.write(OUTPUT)
+        if document and json:
+            json.write(document.head + document.first)
+        separator = b"," if document and document.first else b""
+        for ids, points, sd in _chunks(source):
+            positions, covariances = similarity.transform(points, point_sd if sd is None else sd)
+            out.write(_lines(ids, positions, covariances, decimals))
+            if json:
+                json.write(separator + point_rows(ids, positions, covariances))
+                separator = b","
+            done += len(ids)
+            if progress:
+                progress(done)
+        if not done:
+            raise InputError("holds no points", file=source)
+        _close(json)
+    return done
+
+
+def _close(json: BinaryIO | None) -> None:
+    if json:
+        json.write(b"\n  ]\n}")
+
+
+def decimals_for(deviation: float) -> int:
+    """Return decimals for coordinates whose last digit is a thousandth of a standard deviation."""
+    if not deviation > 0:
+        return 6
+    return int(np.clip(np.ceil(3 - np.log10(deviation)), 0, 15))
+
+
+def _lines(ids: list[str], positions: Floats, covariances: Floats, decimals: int) -> bytes:
+    """Return the lines of a chunk; orjson writes numbers far faster than pandas."""
+    sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    known = bool(np.isfinite(sd).all())
+    values: list[Floats] = [np.round(positions, decimals)]
+    if known:
+        values.append(np.asarray(np.round(sd, decimals + 1), dtype=np.float64))
+    text = orjson.dumps(np.ascontiguousarray(np.hstack(values)), option=orjson.OPT_SERIALIZE_NUMPY)
+    rows = text[2:-2].split(b"],[")
+    end = b"\n" if known else b",,,\n"
+    return b"".join([b"%b,%b%b" % (name, row, end) for name, row in zip(_cells(ids), rows, strict=True)])
+
+
+def _cells(ids: list[str]) -> list[bytes]:
+    """Return identifiers as fields, quoted where they must be."""
+    joined = "\n".join(ids)
+    if "," in joined or '"' in joined:
+        quote = '"'
+        return [
+            f'"{name.replace(quote, quote * 2)}"'.encode() if set(name) & {",", quote} else name.encode()
+            for name in ids
+        ]
+    return joined.encode().split(b"\n")
+
+
+def _chunks(source: Path) -> Iterator[tuple[list[str], Floats, Floats | None]]:
+    """Read identifiers, coordinates and, where there are any, standard deviations, chunk by chunk."""
+    import pandas as pd  # takes long to import
+
+    names, options = _layout(source)
+    weighted = "sd_x" in names
+    columns = [*MODEL_COLUMNS, *(MODEL_SD_COLUMNS if weighted else ())]
+    types: dict[str, Any] = {**dict.fromkeys(names, str), **dict.fromkeys(columns, np.float64)}
+    try:
+        with pd.read_csv(
+            source,
+            dtype=types,
+            chunksize=CHUNK,
+            keep_default_na=False,
+            **options,
+        ) as reader:
+            for table in reader:
+                yield _checked(table, weighted)
+    except (ValueError, UnicodeDecodeError, pd.errors.ParserError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise _fault(source, names) or InputError(str(error), file=source) from None
+
+
+def _layout(source: Path) -> tuple[list[str], dict[str, Any]]:
+    """Find the columns of a file of points, and how pandas is to read them."""
+    try:
+        with source.open(encoding="utf-8-sig", errors="replace") as file:
+            first = next((line for line in file if line.strip()), "")
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=source) from None
+    names = header(first.rstrip("\r\n").split(","))
+    if "x" not in names:
+        if not first:
+            raise InputError("holds no points", file=source)
+        separator = "," if "," in first else r"\s+"
+        return [*MODEL_COLUMNS, "id"], {"names": [*MODEL_COLUMNS, "id"], "header": None, "sep": separator}
+    wanted = {"id", *MODEL_COLUMNS, *(MODEL_SD_COLUMNS if set(names) & set(MODEL_SD_COLUMNS) else ())}
+    missing = sorted(wanted - set(names))
+    if missing:
+        raise InputError(f"the header lacks the column {missing[0]!r}", file=source, text=first.rstrip())
+    return names, {"names": names, "header": 0}
+
+
+def _checked(table: pd.DataFrame, weighted: bool) -> tuple[list[str], Floats, Floats | None]:
+    import pandas as pd  # takes long to import
+
+    points = table[list(MODEL_COLUMNS)].to_numpy()
+    sd = table[list(MODEL_SD_COLUMNS)].to_numpy() if weighted else None
+    # pandas takes the first column for an index where rows have one field more than the header.
+    if not isinstance(table.index, pd.RangeIndex):
+        raise ValueError("a record has more fields than the header")
+    if not np.isfinite(points).all() or (sd is not None and not (sd >= 0).all()):
+        raise ValueError("a coordinate is not a finite number, or a standard deviation is negative")
+    return table["id"].tolist(), points, sd
+
+
+def _fault(source: Path, names: list[str]) -> InputError | None:
+    """Look for the first record that cannot be read, slowly; None when all can."""
+    numeric = [name for name in names if name in (*MODEL_COLUMNS, *MODEL_SD_COLUMNS)]
+    with source.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        seen_header = names[-1] == "id" and names[0] == "x"
+        for number, raw in enumerate(file, 1):
+            line = raw.rstrip("\r\n")
+            if not line.strip():
+                continue
+            if not seen_header and "x" in header(line.split(",")):
+                seen_header = True
+                continue
+            cells = next(csv.reader([line])) if "," in line else line.split()
+            if len(cells) != len(names):
+                text = f"has {len(cells)} fields, not {len(names)}"
+                return InputError(text, file=source, record=number, text=line)
+            fields = dict(zip(names, cells, strict=True))
+            for name in numeric:
+                if not _readable(fields[name], name):
+                    text = f"column {name}: {fields[name]!r} is not a finite number"
+                    if name in MODEL_SD_COLUMNS:
+                        text += ", zero or positive"
+                    return InputError(text, file=source, record=number, text=line)
+    return None
+
+
+def _readable(text: str, name: str) -> bool:
+    try:
+        value = float(text)
+    except ValueError:
+        return False
+    return bool(np.isfinite(value)) and (name in MODEL_COLUMNS or value >= 0)

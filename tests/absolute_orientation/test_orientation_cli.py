@@ -1,0 +1,175 @@
+"""`photogram absolute-orientation`: what is written, exit codes, the page in docs."""
+
+import json
+import re
+import shlex
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from orientation_golden import cards_of, cases, csv_of
+from typer.testing import CliRunner
+
+from photogram.cli import app
+
+EXAMPLE = files("photogram") / "examples" / "absolute_orientation"
+PAGE = Path(__file__).parents[2] / "docs" / "absolute-orientation.md"
+MEMBERS = {
+    "scale",
+    "rotation",
+    "angles_rad",
+    "translation",
+    "covariance",
+    "rms",
+    "sigma0",
+    "degrees_of_freedom",
+}
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    """Run the command in an empty directory."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("NO_COLOR", "1")
+    runner = CliRunner()
+    return lambda *arguments: runner.invoke(app, ["absolute-orientation", *map(str, arguments)])
+
+
+def test_the_example(run, tmp_path):
+    result = run("--example", "--json", "result.json", "--listing", "listing.txt", "--plot", "plan.png")
+    assert result.exit_code == 0, result.output
+    assert "converged" in result.output
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "points-transformed.csv",
+        "result.json",
+        "listing.txt",
+        "plan.png",
+    }
+    document = json.loads(Path("result.json").read_bytes())
+    assert set(document) >= {*MEMBERS, "control", "points"}
+    assert np.shape(document["covariance"]) == (7, 7)
+    assert [point["id"] for point in document["points"][:3]] == ["P301", "P302", "P401"]
+    assert len(document["points"]) == 14
+    height = next(station for station in document["control"] if station["id"] == "V201")
+    assert height["residual"][:2] == [None, None]
+    sums = sum(value or 0 for station in document["control"] for value in station["redundancy"])
+    assert sums == pytest.approx(document["degrees_of_freedom"], abs=1e-8)
+    squares = sum((value or 0) ** 2 for station in document["control"] for value in station["residual"])
+    assert document["rms"] == pytest.approx((squares / document["known_coordinates"]) ** 0.5)
+    assert Path("plan.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("case", cases("partial_mixed", "partial_min"))
+@pytest.mark.parametrize("write", [csv_of, cards_of])
+def test_a_golden_model_from_a_file(run, case, write, tmp_path):
+    Path("stations.dat").write_text(write(case["stations"]))
+    lines = [f"Q{k},{','.join(map(repr, point))}" for k, point in enumerate(case["part2"]["model"])]
+    Path("points.csv").write_text("id,x,y,z\n" + "\n".join(lines) + "\n")
+    result = run("stations.dat", "--points", "points.csv", "--json", "result.json")
+    assert result.exit_code == 0, result.output
+    document = json.loads(Path("result.json").read_bytes())
+    np.testing.assert_allclose(document["rotation"], case["expected"]["A"], rtol=0, atol=2e-9)
+    positions = [point["position"] for point in document["points"]]
+    np.testing.assert_allclose(positions, case["part2"]["ground"], rtol=1e-8)
+    determined = case["counts"]["dof"] > 0
+    assert (document["covariance"] is not None) == determined
+    assert (document["sigma0"] is not None) == determined
+    assert document["points"][0]["covariance"][0][0] is not None or not determined
+    assert Path("points-transformed.csv").is_file()
+
+
+@pytest.mark.parametrize("case", cases("blunder_full"))
+def test_a_station_is_rejected_and_the_solution_restarted(run, case):
+    Path("stations.csv").write_text(csv_of(case["stations"]))
+    first = run("stations.csv", "--json", "first.json")
+    assert re.search(r"^  4 +[XYZ].*<--$", first.output, re.MULTILINE)
+    arguments = ["stations.csv", "--reject", 4, "--restart", "first.json", "--method", "report"]
+    assert run(*arguments, "--json", "second.json", "--listing", "second.txt").exit_code == 0
+    second = json.loads(Path("second.json").read_bytes())
+    assert second["start"] == "restart"
+    assert second["iterations"] == 2
+    assert [station["id"] for station in second["rejected"]] == ["4"]
+    assert "Rejected control" in Path("second.txt").read_text()
+    assert second["rms"] < 0.1 * json.loads(Path("first.json").read_bytes())["rms"]
+
+
+def test_part_two_by_itself(run, tmp_path):
+    assert run("--example", "--json", "result.json", "--listing", "listing.txt", "-q").exit_code == 0
+    listing = Path("listing.txt").read_text()
+    records = listing[listing.index("as part II reads it") :].splitlines()[2:4]
+    Path("cards.txt").write_text("\n".join(records) + "\n")
+    source = str(EXAMPLE / "points.csv")
+    assert run("transform", "result.json", source, "a.csv", "--decimals", 5).exit_code == 0
+    bare = run("transform", "cards.txt", source, "b.csv", "--decimals", 5)
+    assert "12 points written" in bare.output
+    with_sd, without, inline = (
+        Path(name).read_text().splitlines() for name in ("a.csv", "b.csv", "points-transformed.csv")
+    )
+    assert [line.split(",")[:4] for line in with_sd] == [line.split(",")[:4] for line in inline]
+    assert [line.split(",")[:4] for line in without] == [line.split(",")[:4] for line in inline]
+    assert all(line.endswith(",,,") for line in without[1:])
+    # The points' own errors come on top.
+    assert run("transform", "result.json", source, "c.csv", "--point-sd", 0.008).exit_code == 0
+    sd, own = (float(Path(name).read_text().splitlines()[1].split(",")[4]) for name in ("a.csv", "c.csv"))
+    assert own**2 == pytest.approx(sd**2 + (0.008 * 6) ** 2, rel=1e-3)
+
+
+def test_weights(run):
+    text = (EXAMPLE / "stations.csv").read_text().splitlines()
+    rows = [
+        text[0] + ",sd_X,sd_Y,sd_Z,sd_x,sd_y,sd_z",
+        *(f"{line},.02,.02,.03,.01,.01,.01" for line in text[1:]),
+    ]
+    Path("stations.csv").write_text("\n".join(rows) + "\n")
+    documents = []
+    for variance in ("estimated", "unity"):
+        result = run("stations.csv", "--unit-variance", variance, "--json", "result.json")
+        assert result.exit_code == 0, result.output
+        documents.append(json.loads(Path("result.json").read_bytes()))
+    estimated, unity = documents
+    assert unity["covariance_scale"] == 1
+    assert estimated["covariance_scale"] == pytest.approx(estimated["sigma0"] ** 2)
+    ratio = np.array(estimated["covariance"]) / np.array(unity["covariance"])
+    np.testing.assert_allclose(np.diag(ratio), estimated["sigma0"] ** 2)
+
+
+def test_exit_codes(run, tmp_path):
+    for arguments in ([], ["a.csv", "--example"], ["--example", "--method", "best"], ["transform", "a"]):
+        assert run(*arguments).exit_code == 2
+    missing = run("none.csv")
+    assert missing.exit_code == 1
+    assert "cannot be read" in missing.output
+    Path("few.csv").write_text("id,X,Y,Z,x,y,z\nA,1,2,3,4,5,6\n")
+    few = run("few.csv", "--json", "result.json")
+    assert few.exit_code == 3
+    assert "insufficient control" in few.output
+    Path("points.csv").write_text("id,x,y,z\nA,1,2,bad\n")
+    faulty = run(
+        "--example", "--points", "points.csv", "--json", "r.json", "--listing", "l.txt", "--plot", "p.png"
+    )
+    assert faulty.exit_code == 1
+    assert "record 2" in faulty.output
+    over = run("--example", "--points", "points.csv", "--points-out", "points.csv")
+    assert "would be written over" in over.output
+    assert {path.name for path in tmp_path.iterdir()} == {"few.csv", "points.csv"}
+
+
+def test_the_numbers_of_the_page(run):
+    """Every block of output in docs/absolute-orientation.md is what the command above it prints or writes."""
+    page = PAGE.read_text()
+    blocks = re.findall(
+        r"```sh\n(photogram absolute-orientation [^\n]*)\n```\n+```text\n(.*?)```", page, re.DOTALL
+    )
+    assert len(blocks) >= 2
+    for command, shown in blocks:
+        result = run(*shlex.split(command)[2:])
+        assert result.exit_code == 0, result.output
+        texts = [
+            result.output,
+            *(path.read_text() for path in Path().glob("*.*") if path.suffix in (".txt", ".csv")),
+        ]
+        printed = {line.strip() for text in texts for line in text.splitlines()}
+        for line in filter(None, map(str.strip, shown.splitlines())):
+            assert line == "..." or line in printed

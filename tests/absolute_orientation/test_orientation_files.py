@@ -1,0 +1,297 @@
+"""Files of stations: CSV and cards; what is wrong is said with file, record and text."""
+
+import numpy as np
+import pytest
+from orientation_golden import cards_of, cases, csv_of, stations
+from orientation_models import simulate
+
+from photogram import absolute_orientation
+from photogram.absolute_orientation import Similarity, Stations, read_cards, read_csv
+from photogram.absolute_orientation.cards import read_transformation, restart_record, transformation_records
+from photogram.errors import AdjustmentError, InputError, RankError
+
+HEADER = "id,X,Y,Z,x,y,z\n"
+CARDS = """\
+0 0 0 0 0 0 0 9
+5 3 2 9
+500 500 - 0.3 0.2 0.1 1
+900 100 - 0.7 -0.2 0.1 2
+- - 20 0.2 0.3 0.02 3
+- - 30 0.8 0.2 0.03 4
+- - 40 0.4 -0.6 0.04 5
+"""
+
+
+def write(tmp_path, text, name="stations.csv"):
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("case", cases("partial_mixed", "legit_zero_coordinate", "full_large_offset"))
+def test_csv_and_cards_say_the_same(case, tmp_path):
+    expected = stations(case["stations"])
+    from_csv = read_csv(write(tmp_path, csv_of(case["stations"])))
+    deck = read_cards(write(tmp_path, cards_of(case["stations"])))
+    assert deck.former is None
+    assert deck.identification == "7"
+    for read in (from_csv, deck.stations):
+        assert read.ids == expected.ids
+        np.testing.assert_array_equal(read.control, expected.control)
+        np.testing.assert_array_equal(read.model, expected.model)
+
+
+@pytest.mark.parametrize("case", cases("partial_mixed", "legit_zero_coordinate"))
+def test_zeros_are_values_unless_told(case, tmp_path):
+    path = write(tmp_path, cards_of(case["stations"], zeros=True))
+    if case["id"] == "partial_mixed":
+        with pytest.raises(InputError, match=r"record 2: N is 6 and MN 4, but 8 elevations and 8 horizontal"):
+            read_cards(path)
+        np.testing.assert_array_equal(
+            read_cards(path, zero_missing=True).stations.control, stations(case["stations"]).control
+        )
+    else:
+        assert read_cards(path).stations.given.all()
+        with pytest.raises(InputError, match="come as a pair"):
+            read_cards(path, zero_missing=True)
+
+
+def test_csv_columns(tmp_path):
+    text = (
+        "# control of 1962\nx1,x2,x3,id,X3,X2,X1,sd_Z,sd_X,sd_Y,sd_x,sd_y,sd_z\n"
+        '1,2,3,"A, old",6,5,4,0.1,,,.01,.02,1e-2\n\n4,5,6,B,7,,,inf,,,.01,.02,.03\n'
+    )
+    read = read_csv(write(tmp_path, text), ground_unit="ft", model_unit="um")
+    assert read.ids == ("A, old", "B")
+    np.testing.assert_array_equal(read.control, [[4, 5, 6], [np.nan, np.nan, 7]])
+    np.testing.assert_array_equal(read.control_sd, [[0, 0, 0.1], [0, 0, np.inf]])
+    np.testing.assert_array_equal(read.model_sd, [[0.01, 0.02, 0.01], [0.01, 0.02, 0.03]])
+    assert (read.ground_unit, read.model_unit) == ("ft", "um")
+    np.testing.assert_array_equal(read.held, [[1, 1, 1], [0, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "holds no stations"),
+        (HEADER, "holds no stations"),
+        ("id,X,Y,x,y,z\n", "record 1: the header lacks the column 'Z'"),
+        ("id,X,Y,Z,x,y,z,w\n", "record 1: the header does not know the column 'w'"),
+        ("id,X,Y,Z,x,y,z,x\n", "record 1: the header repeats the column 'x'"),
+        ("id,X,Y,Z,x,y,z,sd_x\nA,1,2,3,4,5,6,7\n", "sd_x, sd_y and sd_z come together"),
+        (HEADER + "A,1,2,3,4,5\n", "record 2: has 6 fields, but the header has 7"),
+        (HEADER + "A,1,2,3,4,5,six\n", "record 2: column z: 'six' is not a number"),
+        (HEADER + "A,1,2,3,4,5,\n", "record 2: column z: is empty"),
+        (HEADER + "A,1,2,nan,4,5,6\n", "record 2: column Z: 'nan' is not a number"),
+        (HEADER + "A,1,2,inf,4,5,6\n", "record 2: column Z: 'inf' is not a number"),
+        (HEADER + "A,1,2,3,4,5,6\n\nA,1,2,3,4,5,6\n", "record 4: station A occurs in record 2 already"),
+        (HEADER + ",1,2,3,4,5,6\n", "record 2: the id is empty"),
+        (HEADER + "A,1,,3,4,5,6\n", "station A has one horizontal coordinate; they come as a pair"),
+    ],
+)
+def test_faults_of_a_csv_file(text, message, tmp_path):
+    path = write(tmp_path, text)
+    with pytest.raises(InputError) as caught:
+        read_csv(path)
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+    if "record" in message:
+        assert caught.value.text == text.splitlines()[caught.value.record - 1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("5 3 2 9\n", "", "record 2: constants"),
+        ("5 3 2 9", "6 3 2 9", "record 2: M is 6, but there are 5 station records"),
+        ("5 3 2 9", "5 2 2 9", "record 2: N is 2 and MN 2, but 3 elevations and 2 horizontal pairs"),
+        ("5 3 2 9", "5 3 x 9", "record 2: MN: 'x' is not a count"),
+        ("- - 20 0.2", "20 0.2", "record 5: station X1 X2 X3 x1 x2 x3 number: 5 words, not 7"),
+        ("0.02 3", "0.0z 3", "record 5: x3: '0.0z' is not a number"),
+        ("0.03 4", "0.03 3", "record 6: station 3 occurs twice"),
+        ("0 0 0 0 0 0 0 9", "0 0 2 1 0 0 0 9", "record 1: a sine is beyond 1"),
+        ("0 0 0 0 0 0 0 9", "0 0 0.1 0 1 0 0 9", "record 1: s is not positive"),
+        ("0 0 0 0 0 0 0 9", "0 0 0", "record 1: parameters"),
+        ("500 500 -", "500 - -", "come as a pair"),
+    ],
+)
+def test_faults_of_cards(old, new, message, tmp_path):
+    assert old in CARDS
+    path = write(tmp_path, CARDS.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        read_cards(path)
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_cards_with_commas(tmp_path):
+    commas = CARDS.replace("- - 20 0.2 0.3 0.02 3", ",,2.0D1, 0.2,0.3,0.02, 3")
+    plain, with_commas = (read_cards(write(tmp_path, text)).stations for text in (CARDS, commas))
+    np.testing.assert_array_equal(plain.control, with_commas.control)
+
+
+@pytest.mark.parametrize("kappa", [-3.0, -1.7, 0.4, 1.7, 3.0])
+def test_the_restart_record_keeps_the_quadrant_of_kappa(kappa, tmp_path):
+    model = simulate(np.random.default_rng(4), angles=(0.05, -0.08, kappa))
+    first = absolute_orientation(model.stations())
+    given = first.stations
+    rows = [
+        " ".join(
+            [*("-" if np.isnan(v) else repr(float(v)) for v in control), *map(repr, map(float, x)), name]
+        )
+        for control, x, name in zip(given.control, given.model, given.ids, strict=True)
+    ]
+    counts = f"{len(rows)} {given.given[:, 2].sum()} {given.given[:, 0].sum()} 1"
+    text = "\n".join([restart_record(first.similarity, "1"), counts, *rows]) + "\n"
+    deck = read_cards(write(tmp_path, text))
+    np.testing.assert_allclose(deck.former.rotation, first.similarity.rotation, atol=1e-12)
+    again = absolute_orientation(deck.stations, former=deck.former, method="report")
+    assert len(again.cycles) == 1
+    assert again.started == "restart"
+    assert not deck.messages
+
+
+def test_without_horizontal_stations_in_front_the_quadrant_is_assumed(tmp_path):
+    record = "0.01 0.02 0.5 0.001 0.1 0.2 0.3 9"
+    lines = CARDS.splitlines()
+    text = "\n".join([record, lines[1], *reversed(lines[2:])]) + "\n"
+    deck = read_cards(write(tmp_path, text))
+    assert abs(deck.former.angles[2]) < np.pi / 2
+    assert "quadrant of kappa" in str(deck.messages[0])
+
+
+def test_transformation_records(tmp_path):
+    truth = simulate(np.random.default_rng(4)).truth
+    text = "\n".join(transformation_records(truth, "5")) + "\n"
+    again = read_transformation(write(tmp_path, text))
+    np.testing.assert_array_equal(again.rotation, truth.rotation)
+    np.testing.assert_array_equal(again.translation, truth.translation)
+    with pytest.raises(InputError, match="do not make a rotation"):
+        read_transformation(write(tmp_path, text.replace(text.split()[0], "0.1234", 1)))
+    with pytest.raises(InputError, match="two records"):
+        read_transformation(write(tmp_path, text.splitlines()[0]))
+
+
+# Arrays
+
+
+def full(count=6):
+    return simulate(np.random.default_rng(1), ("XYZ",) * count).stations()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"ids": ["1", "1", "2", "3", "4", "5"]}, "station 1 occurs more than once"),
+        ({"model": np.zeros((5, 3))}, "model has the shape (5, 3), not (6, 3)"),
+        ({"model_sd": np.zeros(2)}, "does not broadcast"),
+        ({"model_sd": 0.0}, "standard deviation of the model that is not positive"),
+        ({"control_sd": -1.0, "model_sd": 1.0}, "standard deviation of control"),
+        ({"control_sd": 0.1}, "the control has standard deviations but the model has none"),
+        ({"control_sd": (0, np.inf, 0), "model_sd": 1.0}, "one held horizontal coordinate"),
+        ({"control": np.inf}, "control coordinate that is not a finite number"),
+        ({"model": np.nan}, "model coordinate that is not a finite number"),
+    ],
+)
+def test_arrays_that_cannot_be(change, message):
+    given = full()
+    arguments = {"ids": given.ids, "control": given.control, "model": given.model, **change}
+    with pytest.raises(InputError) as caught:
+        Stations(**arguments)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"method": "fast"}, "method is one of"),
+        ({"start": "best"}, "start is one of"),
+        ({"reject": ["nobody"]}, "station nobody cannot be rejected"),
+        ({"max_iterations": 0}, "one iteration"),
+        ({"tolerance": 0.0}, "criterion"),
+        ({"unit_variance": "unity"}, "needs standard deviations"),
+    ],
+)
+def test_options_that_cannot_be(options, message):
+    with pytest.raises(InputError, match=message):
+        absolute_orientation(full(), **options)
+
+
+def test_the_methods_of_the_report_take_no_weights():
+    given = full()
+    weighted = Stations(given.ids, given.control, given.model, model_sd=1.0)
+    with pytest.raises(InputError, match="takes no standard deviations"):
+        absolute_orientation(weighted, method="report")
+
+
+# Control that does not do
+
+
+def test_too_few_components_after_a_rejection():
+    given = full(3)
+    with pytest.raises(RankError, match=r"insufficient control: 3 known coordinates \(7 needed\), 1 horiz"):
+        absolute_orientation(given, reject=["0", "1"])
+
+
+def degenerate(control, model=None):
+    control = np.array(control, dtype=float)
+    exact = 0.001 * np.nan_to_num(control)
+    return Stations(range(len(control)), control, exact if model is None else model)
+
+
+def test_reasons():
+    nan = np.nan
+    line = [[100.0 * k, 50.0 * k, 20.0 * k] for k in range(5)]
+    with pytest.raises(RankError, match="stations are in a straight line"):
+        absolute_orientation(degenerate(line))
+    plan = [(0, 0), (900, 50), (100, 100), (400, 400), (600, 600)]
+    model = np.column_stack([0.001 * np.array(plan), [0.01, 0.02, 0.01, 0.02, 0.015]])
+    control = [[0, 0, nan], [900, 50, nan], [nan, nan, 10], [nan, nan, 20], [nan, nan, 15]]
+    # Only the relief of the horizontal stations, 10 m on 900, holds the tilt about the line of elevations.
+    weak = absolute_orientation(degenerate(control, model))
+    assert any("elevations are almost in a straight line in plan: 2, 3, 4" in str(m) for m in weak.messages)
+    model[:, 2] = 0.01
+    control = [[x, y, 10.0 if height > 0 else nan] for x, y, height in control]
+    with pytest.raises(RankError, match="elevations are in a straight line in plan") as caught:
+        absolute_orientation(degenerate(control, model))
+    assert caught.value.points == ["2", "3", "4"]
+    same = [[100, 100, nan], [100, 100, nan], [nan, nan, 10], [nan, nan, 20], [nan, nan, 15]]
+    model = np.column_stack([0.001 * np.array([(100, 100), (100, 100), *plan[2:]]), np.full(5, 0.01)])
+    model[4, 1] += 0.3
+    with pytest.raises(RankError, match="coincide in plan"):
+        absolute_orientation(degenerate(same, model))
+
+
+def test_the_first_two_stations_of_the_report():
+    given = simulate(np.random.default_rng(2), ("Z", "XYZ", "XYZ", "XYZ")).stations()
+    with pytest.raises(InputError, match=r"first two stations have no horizontal coordinates \(0, 1\)"):
+        absolute_orientation(given, start="report")
+    assert absolute_orientation(given).started == "closed-form"
+    control = given.control.copy()
+    control[0] = control[1]
+    with pytest.raises(InputError, match="first two stations coincide in plan"):
+        absolute_orientation(Stations(given.ids, control, given.model), start="report")
+
+
+def test_a_mirror_image_fits_badly():
+    given = full()
+    result = absolute_orientation(Stations(given.ids, given.control, given.model * [1, 1, -1]))
+    assert result.rms > 0.02 * np.ptp(given.model)
+
+
+@pytest.mark.parametrize("method", ["rigorous", "report"])
+def test_a_scale_that_is_not_positive_is_refused(method):
+    """Values half a turn away lead to a mirror image (specification, section 8, fault 3)."""
+    model = simulate(np.random.default_rng(2), angles=(0.02, 0.01, 0.5))
+    turned = np.diag([-1.0, -1.0, 1.0]) @ model.truth.rotation
+    former = Similarity.from_parameters(model.truth.scale, turned, model.truth.translation)
+    with pytest.raises(AdjustmentError, match="scale became zero or negative"):
+        absolute_orientation(model.stations(), former=former, method=method)
+
+
+def test_iterations_may_run_out():
+    given = simulate(np.random.default_rng(2), angles=(0.2, 0.2, 1)).stations()
+    for method in ("rigorous", "report"):
+        result = absolute_orientation(given, max_iterations=1, method=method, start="report")
+        assert not result.converged
+        assert "do not use these values" in result.report()
