@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from umeyama import umeyama
 
-from photogram import absolute_orientation
+from photogram import orient
 from photogram.absolute_orientation import Similarity, Stations
 from photogram.geometry import rotation_matrix
 
@@ -70,7 +70,7 @@ def simulate(count: int, seed: int) -> tuple[Floats, Floats]:
 
 def photogram_solver(control: Floats, model: Floats) -> Parameters:
     """Solve with every covariance, redundancy number and test value."""
-    found = absolute_orientation(Stations(range(len(control)), control, model)).similarity
+    found = orient(Stations(range(len(control)), control, model)).similarity
     return found.scale, found.rotation, found.translation
 
 

@@ -1,7 +1,7 @@
 """Photogrammetric least-squares adjustment with the covariance of every result."""
 
 from photogram._photocore import __version__
-from photogram.absolute_orientation import Orientation, absolute_orientation
+from photogram.absolute_orientation import Orientation, orient
 from photogram.adjusted import Iteration
 from photogram.adjustment import AsPublished, Progress, adjust
 from photogram.block import Block
@@ -34,8 +34,8 @@ __all__ = [
     "Simulation",
     "Spheroid",
     "__version__",
-    "absolute_orientation",
     "adjust",
+    "orient",
     "plan",
     "predict",
     "resect",

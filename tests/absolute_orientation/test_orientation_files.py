@@ -5,7 +5,7 @@ import pytest
 from orientation_golden import cards_of, cases, csv_of, stations
 from orientation_models import simulate
 
-from photogram import absolute_orientation
+from photogram import orient
 from photogram.absolute_orientation import Similarity, Stations, read_cards, read_csv
 from photogram.absolute_orientation.cards import read_transformation, restart_record, transformation_records
 from photogram.errors import AdjustmentError, InputError, RankError
@@ -133,7 +133,7 @@ def test_cards_with_commas(tmp_path):
 @pytest.mark.parametrize("kappa", [-3.0, -1.7, 0.4, 1.7, 3.0])
 def test_the_restart_record_keeps_the_quadrant_of_kappa(kappa, tmp_path):
     model = simulate(np.random.default_rng(4), angles=(0.05, -0.08, kappa))
-    first = absolute_orientation(model.stations())
+    first = orient(model.stations())
     given = first.stations
     rows = [
         " ".join(
@@ -145,7 +145,7 @@ def test_the_restart_record_keeps_the_quadrant_of_kappa(kappa, tmp_path):
     text = "\n".join([restart_record(first.similarity, "1"), counts, *rows]) + "\n"
     deck = read_cards(write(tmp_path, text))
     np.testing.assert_allclose(deck.former.rotation, first.similarity.rotation, atol=1e-12)
-    again = absolute_orientation(deck.stations, former=deck.former, method="report")
+    again = orient(deck.stations, former=deck.former, method="report")
     assert len(again.cycles) == 1
     assert again.started == "restart"
     assert not deck.messages
@@ -214,14 +214,14 @@ def test_arrays_that_cannot_be(change, message):
 )
 def test_options_that_cannot_be(options, message):
     with pytest.raises(InputError, match=message):
-        absolute_orientation(full(), **options)
+        orient(full(), **options)
 
 
 def test_the_methods_of_the_report_take_no_weights():
     given = full()
     weighted = Stations(given.ids, given.control, given.model, model_sd=1.0)
     with pytest.raises(InputError, match="takes no standard deviations"):
-        absolute_orientation(weighted, method="report")
+        orient(weighted, method="report")
 
 
 # Control that does not do
@@ -230,7 +230,7 @@ def test_the_methods_of_the_report_take_no_weights():
 def test_too_few_components_after_a_rejection():
     given = full(3)
     with pytest.raises(RankError, match=r"insufficient control: 3 known coordinates \(7 needed\), 1 horiz"):
-        absolute_orientation(given, reject=["0", "1"])
+        orient(given, reject=["0", "1"])
 
 
 def degenerate(control, model=None):
@@ -243,39 +243,39 @@ def test_reasons():
     nan = np.nan
     line = [[100.0 * k, 50.0 * k, 20.0 * k] for k in range(5)]
     with pytest.raises(RankError, match="stations are in a straight line"):
-        absolute_orientation(degenerate(line))
+        orient(degenerate(line))
     plan = [(0, 0), (900, 50), (100, 100), (400, 400), (600, 600)]
     model = np.column_stack([0.001 * np.array(plan), [0.01, 0.02, 0.01, 0.02, 0.015]])
     control = [[0, 0, nan], [900, 50, nan], [nan, nan, 10], [nan, nan, 20], [nan, nan, 15]]
     # Only the relief of the horizontal stations, 10 m on 900, holds the tilt about the line of elevations.
-    weak = absolute_orientation(degenerate(control, model))
+    weak = orient(degenerate(control, model))
     assert any("elevations are almost in a straight line in plan: 2, 3, 4" in str(m) for m in weak.messages)
     model[:, 2] = 0.01
     control = [[x, y, 10.0 if height > 0 else nan] for x, y, height in control]
     with pytest.raises(RankError, match="elevations are in a straight line in plan") as caught:
-        absolute_orientation(degenerate(control, model))
+        orient(degenerate(control, model))
     assert caught.value.points == ["2", "3", "4"]
     same = [[100, 100, nan], [100, 100, nan], [nan, nan, 10], [nan, nan, 20], [nan, nan, 15]]
     model = np.column_stack([0.001 * np.array([(100, 100), (100, 100), *plan[2:]]), np.full(5, 0.01)])
     model[4, 1] += 0.3
     with pytest.raises(RankError, match="coincide in plan"):
-        absolute_orientation(degenerate(same, model))
+        orient(degenerate(same, model))
 
 
 def test_the_first_two_stations_of_the_report():
     given = simulate(np.random.default_rng(2), ("Z", "XYZ", "XYZ", "XYZ")).stations()
     with pytest.raises(InputError, match=r"first two stations have no horizontal coordinates \(0, 1\)"):
-        absolute_orientation(given, start="report")
-    assert absolute_orientation(given).started == "closed-form"
+        orient(given, start="report")
+    assert orient(given).started == "closed-form"
     control = given.control.copy()
     control[0] = control[1]
     with pytest.raises(InputError, match="first two stations coincide in plan"):
-        absolute_orientation(Stations(given.ids, control, given.model), start="report")
+        orient(Stations(given.ids, control, given.model), start="report")
 
 
 def test_a_mirror_image_fits_badly():
     given = full()
-    result = absolute_orientation(Stations(given.ids, given.control, given.model * [1, 1, -1]))
+    result = orient(Stations(given.ids, given.control, given.model * [1, 1, -1]))
     assert result.rms > 0.02 * np.ptp(given.model)
 
 
@@ -286,12 +286,12 @@ def test_a_scale_that_is_not_positive_is_refused(method):
     turned = np.diag([-1.0, -1.0, 1.0]) @ model.truth.rotation
     former = Similarity.from_parameters(model.truth.scale, turned, model.truth.translation)
     with pytest.raises(AdjustmentError, match="scale became zero or negative"):
-        absolute_orientation(model.stations(), former=former, method=method)
+        orient(model.stations(), former=former, method=method)
 
 
 def test_iterations_may_run_out():
     given = simulate(np.random.default_rng(2), angles=(0.2, 0.2, 1)).stations()
     for method in ("rigorous", "report"):
-        result = absolute_orientation(given, max_iterations=1, method=method, start="report")
+        result = orient(given, max_iterations=1, method=method, start="report")
         assert not result.converged
         assert "do not use these values" in result.report()

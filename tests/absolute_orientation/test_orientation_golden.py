@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from orientation_golden import DATA, array, cases, load, stations
 
-from photogram import _photocore, absolute_orientation
+from photogram import _photocore, orient
 from photogram.absolute_orientation import Similarity
 from photogram.errors import RankError
 
@@ -36,7 +36,7 @@ def check_statistics(result, expected):
 @pytest.mark.parametrize("case", cases())
 @pytest.mark.parametrize("start", ["auto", "report", "closed-form"])
 def test_a_model_is_oriented(case, start):
-    result = absolute_orientation(stations(case["stations"]), start=start)
+    result = orient(stations(case["stations"]), start=start)
     expected = case["expected"]
     assert result.converged
     similarity = result.similarity
@@ -66,7 +66,7 @@ def test_a_model_is_oriented(case, start):
 
 @pytest.mark.parametrize("case", cases())
 def test_points_are_transformed(case):
-    result = absolute_orientation(stations(case["stations"]))
+    result = orient(stations(case["stations"]))
     positions, covariances = result.similarity.transform(case["part2"]["model"])
     np.testing.assert_allclose(positions, case["part2"]["ground"], rtol=1e-8, atol=1e-8)
     assert np.isfinite(covariances).all() == (case["counts"]["dof"] > 0)
@@ -74,7 +74,7 @@ def test_points_are_transformed(case):
 
 @pytest.mark.parametrize("case", cases())
 def test_the_cycle_of_the_report(case):
-    result = absolute_orientation(stations(case["stations"]), method="report")
+    result = orient(stations(case["stations"]), method="report")
     check_parameters(result.similarity, case["expected"])
     assert abs(len(result.cycles) - case["reference_iteration"]["cycles"]) <= 1
     assert result.cycles[-1] <= 1e-5 < result.cycles[-2]
@@ -89,7 +89,7 @@ def test_the_cycle_of_the_report(case):
 
 @pytest.mark.parametrize("case", cases())
 def test_filling_in_ends_beside_the_minimum_with_partial_control_only(case):
-    result = absolute_orientation(stations(case["stations"]), method="fill-in")
+    result = orient(stations(case["stations"]), method="fill-in")
     difference = np.abs(result.similarity.rotation - case["expected"]["A"]).max()
     assert result.converged
     if case["id"].startswith("full") or case["counts"]["dof"] == 0:
@@ -105,12 +105,12 @@ def test_a_restart_after_a_rejection():
     document = load("cases.json")
     rerun = document["reruns"][0]
     base = next(case for case in document["cases"] if case["id"] == rerun["base_case"])
-    first = absolute_orientation(stations(base["stations"]))
+    first = orient(stations(base["stations"]))
     worst = np.nanargmax(np.abs(first.standardized).max(axis=1))
     assert first.stations.ids[worst] == str(rerun["removed_station"])
 
     reject = [rerun["removed_station"]]
-    second = absolute_orientation(first.stations, former=first, reject=reject)
+    second = orient(first.stations, former=first, reject=reject)
     check_parameters(second.similarity, rerun["expected"])
     check_statistics(second, rerun["expected"])
     assert second.started == "restart"
@@ -119,7 +119,7 @@ def test_a_restart_after_a_rejection():
     assert 4.5 < np.abs(second.differences[worst]).max() < 5.5
     assert np.abs(np.delete(second.differences, worst, axis=0)).max() < 0.1
 
-    cycles = absolute_orientation(first.stations, former=first, reject=reject, method="report").cycles
+    cycles = orient(first.stations, former=first, reject=reject, method="report").cycles
     assert abs(len(cycles) - rerun["reference_iteration"]["cycles_from_restart"]) <= 1
 
 
@@ -129,7 +129,7 @@ def test_degenerate_control_is_refused_by_name():
     for case in load("degenerate_cases.json"):
         for method in ("rigorous", "report"):
             with pytest.raises(RankError) as caught:
-                absolute_orientation(stations(case["stations"]), method=method)
+                orient(stations(case["stations"]), method=method)
             messages[case["id"]] = str(caught.value)
             assert caught.value.points == [str(row["id"]) for row in case["stations"]]
     assert "5 known coordinates (7 needed), 1 horizontal pairs" in messages["one_horizontal"]
@@ -151,7 +151,7 @@ def test_gauss_crout():
 
 @pytest.mark.parametrize("case", cases("full_noise", "partial_mixed"))
 def test_a_legacy_solution_is_the_same_similarity(case):
-    result = absolute_orientation(stations(case["stations"])).similarity
+    result = orient(stations(case["stations"])).similarity
     again = Similarity.from_parameters(result.scale, result.rotation, result.translation, result.covariance)
     here, there = (each.transform(case["part2"]["model"]) for each in (result, again))
     np.testing.assert_allclose(here[0], there[0], rtol=1e-12)

@@ -5,7 +5,7 @@ import pytest
 from orientation_models import MIXED, simulate
 from scipy import stats
 
-from photogram import absolute_orientation
+from photogram import orient
 
 RUNS = 1500
 MODEL_SD = 0.004
@@ -41,8 +41,8 @@ def test_covariances(weighted, angles):
     results = []
     for _ in range(RUNS):
         errors = (sd * generator.standard_normal(shape) for sd in (control_sd, model_sd))
-        results.append(absolute_orientation(model.stations(*errors, **options), unit_variance="unity"))
-    exact = absolute_orientation(model.stations(**options), unit_variance="unity")
+        results.append(orient(model.stations(*errors, **options), unit_variance="unity"))
+    exact = orient(model.stations(**options), unit_variance="unity")
     check_mean_square(tangent_errors(results, model.truth), exact.similarity.tangent_covariance)
 
     points = model.truth.to_model(POINTS)
@@ -68,7 +68,7 @@ def test_the_seven_parameters_and_a_point_with_errors_of_its_own():
     parameters, inside, errors = [], [], []
     for _ in range(RUNS):
         error = MODEL_SD * generator.standard_normal((len(MIXED), 3))
-        result = absolute_orientation(model.stations(model_error=error))
+        result = orient(model.stations(model_error=error))
         similarity = result.similarity
         found = np.array([*similarity.angles, similarity.scale, *similarity.translation])
         parameters.append((found - truth) / np.sqrt(np.diag(similarity.covariance)))

@@ -6,7 +6,7 @@ from orientation_models import FULL, HEIGHT, HORIZONTAL, MIXED, simulate
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from photogram import absolute_orientation
+from photogram import orient
 from photogram.absolute_orientation import Similarity, Stations
 
 NOISE = 0.004
@@ -26,7 +26,7 @@ def test_exact_recovery_at_any_attitude(kinds, phi):
     for _ in range(60):
         angles = None if phi is None else (generator.uniform(-3, 3), phi, generator.uniform(-3, 3))
         model = simulate(generator, kinds, angles=angles, scale=10 ** generator.uniform(-3, 3))
-        result = absolute_orientation(model.stations())
+        result = orient(model.stations())
         assert result.converged
         if result.alternatives:
             ambiguous += 1
@@ -43,7 +43,7 @@ def test_the_two_methods_agree_on_any_kappa():
     for kappa in np.linspace(-np.pi, np.pi, 13):
         model = simulate(generator, angles=(0.05, -0.08, kappa))
         noisy = model.stations(model_error=NOISE * generator.standard_normal((len(MIXED), 3)))
-        rigorous, report = (absolute_orientation(noisy, method=method) for method in ("rigorous", "report"))
+        rigorous, report = (orient(noisy, method=method) for method in ("rigorous", "report"))
         assert difference(report, rigorous.similarity) < 1e-8
         np.testing.assert_allclose(report.residuals, rigorous.residuals, atol=1e-5 * NOISE)
         np.testing.assert_allclose(
@@ -72,7 +72,7 @@ def test_origin_and_units_do_not_matter(angles, control_scale, control_shift, mo
     moved = Stations(
         given.ids, control_scale * given.control + control_shift, model_scale * given.model + model_shift
     )
-    first, second = absolute_orientation(given), absolute_orientation(moved)
+    first, second = orient(given), orient(moved)
     np.testing.assert_allclose(second.similarity.rotation, first.similarity.rotation, atol=1e-9)
     assert second.similarity.scale == pytest.approx(
         first.similarity.scale * model_scale / control_scale, rel=1e-9
@@ -97,7 +97,7 @@ def test_the_order_of_the_stations_does_not_matter():
     given = noisy_stations(8, (0.02, 0.03, 1.0))
     order = np.random.default_rng(0).permutation(len(given.ids))
     shuffled = Stations(order, given.control[order], given.model[order])
-    first, second = absolute_orientation(given), absolute_orientation(shuffled)
+    first, second = orient(given), orient(shuffled)
     np.testing.assert_allclose(second.similarity.rotation, first.similarity.rotation, atol=1e-10)
     np.testing.assert_allclose(second.residuals, first.residuals[order], atol=1e-7 * NOISE)
 
@@ -113,9 +113,7 @@ def test_redundancy_numbers_sum_to_the_degrees_of_freedom(weighted):
                 "control_sd": generator.uniform(0, 0.05, (15, 3)),
                 "model_sd": generator.uniform(0.002, 0.01, (15, 3)),
             }
-        result = absolute_orientation(
-            model.stations(model_error=NOISE * generator.standard_normal((15, 3)), **sd)
-        )
+        result = orient(model.stations(model_error=NOISE * generator.standard_normal((15, 3)), **sd))
         assert np.nansum(result.redundancy) == pytest.approx(result.degrees_of_freedom, abs=1e-8)
         within = result.redundancy[result.used]
         assert ((within > -1e-9) & (within < 1 + 1e-9)).all() or weighted
@@ -124,13 +122,13 @@ def test_redundancy_numbers_sum_to_the_degrees_of_freedom(weighted):
 def test_a_zero_deviation_of_control_and_equal_ones_of_the_model_change_nothing():
     given = noisy_stations(11)
     weighted = Stations(given.ids, given.control, given.model, model_sd=0.123)
-    first, second = absolute_orientation(given), absolute_orientation(weighted)
+    first, second = orient(given), orient(weighted)
     np.testing.assert_allclose(second.similarity.rotation, first.similarity.rotation, atol=1e-10)
     np.testing.assert_allclose(
         second.similarity.covariance, first.similarity.covariance, rtol=1e-6, atol=1e-12
     )
     assert second.sigma0 == pytest.approx(first.sigma0 / 0.123, rel=1e-8)
-    a_priori = absolute_orientation(weighted, unit_variance="unity")
+    a_priori = orient(weighted, unit_variance="unity")
     np.testing.assert_allclose(
         a_priori.similarity.tangent_covariance * second.sigma0**2,
         second.similarity.tangent_covariance,
@@ -153,7 +151,7 @@ def test_errors_are_shared_out_between_the_systems():
         control_sd=control_sd,
         model_sd=model_sd,
     )
-    result = absolute_orientation(given)
+    result = orient(given)
 
     def residuals(unknowns):
         change, scale, translation, ground = (
@@ -230,10 +228,10 @@ def test_the_covariance_of_points_is_regular_at_gimbal_lock():
     generator = np.random.default_rng(14)
     error = NOISE * generator.standard_normal((len(MIXED), 3))
     locked = simulate(generator, angles=(0.3, np.pi / 2, 0.4))
-    result = absolute_orientation(locked.stations(model_error=error))
+    result = orient(locked.stations(model_error=error))
     cycled = np.roll(np.eye(3), 1, axis=0)
     other = Stations(result.stations.ids, result.stations.control, result.stations.model @ cycled.T)
-    renamed = absolute_orientation(other)
+    renamed = orient(other)
     assert np.abs(renamed.similarity.angles[1]) < 1.2
     here = result.similarity.transform(locked.exact)[1]
     there = renamed.similarity.transform(locked.exact @ cycled.T)[1]

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from orientation_models import SIZE, simulate
 
-from photogram import absolute_orientation
+from photogram import orient
 from photogram.absolute_orientation import Similarity, stream, transform_file
 from photogram.absolute_orientation.document import read_similarity
 from photogram.errors import InputError
@@ -18,7 +18,7 @@ from photogram.errors import InputError
 def oriented():
     generator = np.random.default_rng(8)
     model = simulate(generator, angles=(0.1, 0.2, 2.0))
-    return absolute_orientation(model.stations(model_error=0.004 * generator.standard_normal((8, 3))))
+    return orient(model.stations(model_error=0.004 * generator.standard_normal((8, 3))))
 
 
 @pytest.fixture

@@ -1,8 +1,8 @@
 """Absolute orientation: the similarity between a model and its control (C&GS Technical Bulletin 19, 1962)."""
 
+from photogram.absolute_orientation.adjust import orient
 from photogram.absolute_orientation.cards import read_cards
 from photogram.absolute_orientation.csv_files import read_csv
-from photogram.absolute_orientation.orient import absolute_orientation
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
@@ -12,7 +12,7 @@ __all__ = [
     "Orientation",
     "Similarity",
     "Stations",
-    "absolute_orientation",
+    "orient",
     "read_cards",
     "read_csv",
     "transform_file",

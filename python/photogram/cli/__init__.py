@@ -45,7 +45,7 @@ comparator_app.command("correct")(comparator.correct)
 orientation_app = typer.Typer(
     name="absolute-orientation", cls=GroupWithMain, help="Orient a model absolutely, or transform its points."
 )
-orientation_app.command("orient")(absolute_orientation.orient)
+orientation_app.command("orient")(absolute_orientation.absolute_orientation)
 orientation_app.command("transform")(absolute_orientation.transform)
 app.add_typer(giant_app)
 app.add_typer(orientation_app)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity, Stations
     from photogram.messages import Message
 
-__all__ = ["orient", "transform"]
+__all__ = ["absolute_orientation", "transform"]
 
 SHOWN = 40
 """Lines of a section that the summary shows at most."""
@@ -57,7 +57,7 @@ class UnitVariance(StrEnum):
     UNITY = "unity"
 
 
-def orient(
+def absolute_orientation(
     file: Annotated[
         Path | None,
         typer.Argument(
@@ -146,7 +146,7 @@ def orient(
     if example == (file is not None):
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
     with failures(), ExitStack() as resources:
-        from photogram import absolute_orientation
+        from photogram import orient
         from photogram.absolute_orientation.document import read_similarity
         from photogram.files import write_whole
 
@@ -156,7 +156,7 @@ def orient(
             points_out = points_out or (Path("points-transformed.csv") if points is None else None)
             points = points or directory / "points.csv"
         stations, former, messages = _read(file, format, zero_missing, ground_unit, model_unit)
-        result = absolute_orientation(
+        result = orient(
             stations,
             method=method.value,
             start=start.value if start else None,

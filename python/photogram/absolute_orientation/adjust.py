@@ -16,7 +16,7 @@ from photogram.adjusted import Iteration
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 
-__all__ = ["Method", "Start", "UnitVariance", "absolute_orientation"]
+__all__ = ["Method", "Start", "UnitVariance", "orient"]
 
 Method = Literal["rigorous", "report", "fill-in"]
 Start = Literal["auto", "report", "closed-form"]
@@ -35,7 +35,7 @@ SHARED = 10_000
 """Stations from which more than one thread is worth its start."""
 
 
-def absolute_orientation(
+def orient(
     stations: Stations,
     *,
     method: Method = "rigorous",
