@@ -4,6 +4,7 @@ mod arrays;
 mod block;
 mod geometry;
 mod solution;
+mod stellar;
 
 use pyo3::prelude::*;
 
@@ -11,5 +12,6 @@ use pyo3::prelude::*;
 fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     geometry::register(module)?;
-    block::register(module)
+    block::register(module)?;
+    stellar::register(module)
 }

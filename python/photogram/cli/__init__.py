@@ -1,4 +1,4 @@
-"""The command line: `photogram giant`, `photogram simulate`.
+"""The command line: `photogram giant`, `photogram simulate`, `photogram stellar-camera`.
 
 Results go to files and standard output, errors and progress to standard error. Heavy modules are imported by
 the commands that need them, so that `photogram --help` is quick.
@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from photogram.cli import giant, simulate
+from photogram.cli import giant, simulate, stellar_camera
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
 
@@ -29,6 +29,7 @@ giant_app = typer.Typer(name="giant", cls=GroupWithMain, help="Adjust or check a
 giant_app.command("adjust")(giant.giant)
 app.add_typer(giant_app)
 app.command()(simulate.simulate)
+app.command("stellar-camera")(stellar_camera.stellar_camera)
 
 
 def main() -> None:

@@ -3,18 +3,27 @@
 //! * [`vector`]: products of 3-vectors and 3x3 matrices;
 //! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix;
 //! * [`ellipsoid`]: longitude, latitude, height, geocentric coordinates, and the local vertical frame;
-//! * [`collinearity`]: the projection of a point into a photo and its linearization.
+//! * [`collinearity`]: the projection of a point into a photo and its linearization;
+//! * [`lens`]: radial and decentering distortion, forward and inverse;
+//! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates;
+//! * [`mod@pointing`]: the attitude of a camera under the sky.
 //!
 //! Angles are radians, image coordinates millimetres, lengths the linear unit of the object space.
 
 pub mod collinearity;
 pub mod ellipsoid;
+pub mod lens;
+pub mod pointing;
 pub mod rotation;
+pub mod sky;
 pub mod vector;
 
 pub use collinearity::{ObjectSpace, Photo, Point, Projection, Ray, RotationSense};
 pub use ellipsoid::{Ellipsoid, local_vertical, local_vertical_with_partials};
+pub use lens::{Displacement, Distortion, Undistorted};
+pub use pointing::{pointing, pointing_angles, pointing_with_partials};
 pub use rotation::{rotation, rotation_angles, rotation_with_partials};
+pub use sky::{Air, Standard, Station};
 pub use vector::{Matrix3, Vector3};
 
 /// What geometry refuses.

@@ -1,3 +1,4 @@
 //! The photogrammetric models.
 
 pub mod block;
+pub mod stellar;
