@@ -43,6 +43,9 @@ type Place = (f64, f64, f64, f64);
 /// Reference principal distance (none: scale first), Brown's decentering, common scale.
 type CameraKind = (Option<f64>, bool, bool);
 
+/// Attitude, standard coordinates, plate coordinates and weight of the axis.
+type AxisRow = (usize, [f64; 2], [f64; 2], [[f64; 2]; 2]);
+
 fn station((latitude, aberration, temperature, pressure): Place) -> Station {
     Station::new(latitude, aberration, Air::new(temperature, pressure))
 }
@@ -186,7 +189,7 @@ impl StellarProblem {
         image_weights: Array<'_>,
         image_times: Array<'_>,
         image_shifts: Array<'_>,
-        axis: Option<(usize, [f64; 2], [f64; 2], [[f64; 2]; 2])>,
+        axis: Option<AxisRow>,
     ) -> PyResult<Self> {
         let places = rows("star_places", &star_places)?;
         let catalogue = rows("star_catalogue", &star_catalogue)?;
