@@ -96,11 +96,11 @@ def test_camera_and_attitudes_come_back(catalogue):
         assert (found[found >= 0] == made[-1].stars[found >= 0]).mean() > 0.98
         assert (found >= 0).mean() > 0.6
         exposures.append(replace(rough, stars=found))
-    # A few of these stars are wrong, and the corners are empty: only what is well determined is estimated.
+    # The corners are empty as yet: only what is well determined is estimated.
     first = calibrate_exposures(exposures, start, SITE, bright, fixed=("cx", "cy", "k2", "k3", "p1", "p2"))
     for number, attitude in enumerate(first.attitudes):
         again = replace(exposures[number], attitude=attitude)
-        found = identify(again, first.camera, SITE, bright, frame=FRAME, radius=30.0, tolerance=8.0)
+        found = identify(again, first.camera, SITE, bright, frame=FRAME, radius=60.0, tolerance=25.0)
         assert (found[found >= 0] == made[number].stars[found >= 0]).all()
         assert (found >= 0).mean() > 0.95
         exposures[number] = replace(again, stars=found)

@@ -91,7 +91,7 @@ class Catalogue:
 
     @classmethod
     def read(cls, path: Path, epoch: float = 2000.0) -> Self:
-        """Read a CSV file with the columns id, ra_deg, dec_deg, pm_ra_mas, pm_dec_mas, parallax_mas, magnitude.
+        """Read a CSV file: id, ra_deg, dec_deg, pm_ra_mas, pm_dec_mas, parallax_mas, magnitude.
 
         Raises
         ------
