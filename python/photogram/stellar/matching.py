@@ -17,7 +17,8 @@ _SEEDS, _PAIRS = 25, 400
 def match(measured: Floats, predicted: Floats, *, radius: float, tolerance: float) -> Indices:
     """Match measured star images to predicted ones.
 
-    Pairs of bright images vote for a similarity between the two sets; the best one is refined by an affinity.
+    Pairs of bright images vote for a similarity between the two sets; the best one is refined by cubic
+    polynomials.
 
     Parameters
     ----------
@@ -28,7 +29,7 @@ def match(measured: Floats, predicted: Floats, *, radius: float, tolerance: floa
     radius
         Largest distance between an image and its prediction.
     tolerance
-        Largest distance that is left after the best affinity.
+        Largest distance that is left after them.
 
     Returns
     -------
@@ -46,14 +47,16 @@ def match(measured: Floats, predicted: Floats, *, radius: float, tolerance: floa
             best, most = transform, count
     if best is None:
         return none
-    found = none
-    for limit in (3 * tolerance, 2 * tolerance, tolerance):
-        found = _nearest(_apply(best, measured), predicted, limit)
+    moved = _apply(best, measured)
+    for degree in (1, 1, 2, 3, 3, 3):
+        found = _nearest(moved, predicted, 2 * tolerance)
         chosen = found >= 0
         if chosen.sum() < 3:
             return none
-        best = _affinity(measured[chosen], predicted[found[chosen]])
-    return _nearest(_apply(best, measured), predicted, tolerance)
+        # Three matches and more for each coefficient.
+        degree = min(degree, 3 if chosen.sum() > 30 else 2 if chosen.sum() > 18 else 1)
+        moved = _fitted(measured, chosen, predicted[found[chosen]], degree)
+    return _nearest(moved, predicted, tolerance)
 
 
 def _hypotheses(measured: Floats, predicted: Floats, radius: float, tolerance: float) -> list[Floats]:
@@ -87,9 +90,12 @@ def _apply(transform: Floats, points: Floats) -> Floats:
     return np.asarray(points @ transform[:2] + transform[2], float)
 
 
-def _affinity(measured: Floats, predicted: Floats) -> Floats:
-    design = np.column_stack([measured, np.ones(len(measured))])
-    return np.asarray(np.linalg.lstsq(design, predicted, rcond=None)[0], float)
+def _fitted(measured: Floats, chosen: NDArray[np.bool_], predicted: Floats, degree: int) -> Floats:
+    """Move all images by the polynomials that fit the matched ones; tilt is quadratic, distortion cubic."""
+    x, y = (measured / np.abs(measured).max(initial=1.0)).T
+    powers = [(i, k - i) for k in range(degree + 1) for i in range(k + 1)]
+    design = np.column_stack([x**i * y**j for i, j in powers])
+    return np.asarray(design @ np.linalg.lstsq(design[chosen], predicted, rcond=None)[0], float)
 
 
 def _nearest(points: Floats, predicted: Floats, limit: float) -> Indices:

@@ -156,11 +156,22 @@ class SkyCalibration:
 
 
 def project_sky(camera: BrownCamera, attitude: Floats, site: Site, places: Floats, time: float) -> Floats:
-    """Return the pixels of apparent places, (n, 2); NaN below the horizon and behind the camera."""
+    """Return the pixels (n, 2) of apparent places.
+
+    NaN below the horizon, behind the camera, and where distortion folds.
+    """
     standard = site.standard_coordinates(places, time)
-    return _photocore.plate_images(
-        standard, np.asarray(attitude, float), camera.common[:13], (1.0, True, False)
-    )
+    attitude = np.asarray(attitude, float)
+    pixels = _photocore.plate_images(standard, attitude, camera.common[:13], (1.0, True, False))
+    ideal = np.zeros(13)
+    ideal[3:5] = 1.0
+    square = np.sum(_photocore.plate_images(standard, attitude, ideal, (1.0, True, False)) ** 2, axis=1)
+    # Where radial distortion turns back, it would fold stars from far outside into the frame.
+    k1, k2, k3 = camera.values[4:7]
+    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0]) if camera.values[4:7].any() else np.zeros(0)
+    turns = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real
+    pixels[square >= turns.min(initial=np.inf)] = np.nan
+    return pixels
 
 
 def identify(
@@ -187,7 +198,7 @@ def identify(
     frame
         Width and height in pixels.
     radius, tolerance
-        Largest error of the approximate attitude, and of an image after the best affinity, pixels.
+        Largest error of the approximate attitude, and of an image after the best polynomials, pixels.
     dut1
         UT1 - UTC in seconds.
 
