@@ -165,11 +165,7 @@ class Result:
 
     @property
     def star_covariances(self) -> Floats:
-        """(S, 2, 2) of the adjusted places, radians squared.
-
-        As in the report an unknown direction with several images has the mean error of its own images for
-        them, and that of unit weight for the parameters.
-        """
+        """(S, 2, 2) of the adjusted places, radians squared, scaled by `mean_error` for known and unknown stars."""
         return self.mean_error**2 * self.solved.star_cofactors
 
     @property
