@@ -165,7 +165,7 @@ class Result:
 
     @property
     def star_covariances(self) -> Floats:
-        """(S, 2, 2) of the adjusted places, radians squared, scaled by `mean_error` for known and unknown stars."""
+        """(S, 2, 2) of the adjusted places, radians squared, scaled by `mean_error`."""
         return self.mean_error**2 * self.solved.star_cofactors
 
     @property
