@@ -5,7 +5,7 @@ space. All functions release the GIL.
 """
 
 from collections.abc import Callable
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -807,3 +807,196 @@ def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
     ValueError
         An argument of another shape; the message names it and its shape.
     """
+
+_Station = tuple[float, float, float, float]
+"""Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury)."""
+_CameraKind = tuple[float | None, bool, bool]
+"""Principal distance of the distorted image (None: scale first), Brown's decentering, common scale."""
+
+class StellarError(Exception):
+    """The camera cannot be calibrated.
+
+    `args` are the kind (`undetermined stars`, `undetermined`, `weight`, `not finite`, `input`), a message,
+    and the indices of the stars concerned.
+    """
+
+def refraction(
+    zenith_distances: _Floats, temperature: float, pressure: float, tau: _Floats, observed: bool
+) -> _Floats:
+    """Refraction of (n,) zenith distances, observed or true, radians (NOAA TR NOS 55, equations 7 to 11).
+
+    Parameters
+    ----------
+    zenith_distances
+        (n,) radians.
+    temperature, pressure
+        Kelvin, millimetres of mercury.
+    tau
+        (4,) coefficients in seconds of arc.
+    observed
+        Whether the zenith distances are observed.
+
+    Returns
+    -------
+    (n,) true minus observed zenith distance, radians.
+    """
+
+def standard_coordinates(places: _Floats, sidereal_times: _Floats, place: _Station, tau: _Floats) -> _Floats:
+    """Refracted standard coordinates xi (north), eta (east), (n, 2), of (n, 2) apparent places.
+
+    NaN at and below the horizon.
+    """
+
+def star_places(standard: _Floats, sidereal_times: _Floats, place: _Station, tau: _Floats) -> _Floats:
+    """Apparent right ascension and declination, (n, 2), of refracted standard coordinates."""
+
+def pointing_matrix(angles: _Floats) -> _Floats:
+    """Matrix (3, 3) of alpha, omega, kappa (3,): north, east, zenith to x, y, axis (equation 19)."""
+
+def pointing_of_matrix(matrix: _Floats) -> _Floats:
+    """Angles alpha, omega, kappa (3,) of a matrix (3, 3)."""
+
+def plate_images(standard: _Floats, angles: _Floats, interior: _Floats, camera: _CameraKind) -> _Floats:
+    """Plate coordinates (n, 2) of standard coordinates (n, 2); NaN behind the camera.
+
+    Parameters
+    ----------
+    standard
+        (n, 2) xi, eta.
+    angles
+        (3,) alpha, omega, kappa.
+    interior
+        (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3.
+    camera
+        Its kind.
+    """
+
+def plate_directions(
+    xy: _Floats, angles: _Floats, interior: _Floats, camera: _CameraKind, *, tolerance: float, passes: int
+) -> _Floats:
+    """Directions of plate coordinates, the inverse of `plate_images`.
+
+    Returns
+    -------
+    (n, 5) xi, eta, undistorted x, y, and 1 where the distortion settled within `tolerance` in `passes`
+    passes.
+    """
+
+@final
+class StellarProblem:
+    """A calibration as it is known beforehand: S stars, G attitudes, m images.
+
+    Parameters
+    ----------
+    station, camera
+        Where, and the kind of the camera.
+    pointings, common
+        (G, 3) attitudes; (17,) 13 interior parameters and 4 coefficients of refraction (arcsec).
+    fixed
+        3 G + 17 flags: which parameters are held.
+    weighted, weighted_values, weight_root
+        (k,) which parameters have weight, their given values, and R (k, k) of their weight matrix R^T R. With
+        more than three attitudes only common parameters can.
+    star_places, star_catalogue, star_weights, star_fixed
+        (S, 2) initial and catalogue places; (S, 2, 2) weights, zero for unknown directions; S flags.
+    image_stars, image_pointings, image_xy, image_weights, image_times, image_shifts
+        (m,) indices of star and attitude; (m, 2) measured; (m, 2, 2); (m,) sidereal time; (m, 2) place of the
+        star at the time of the image minus the place that is adjusted.
+    axis
+        Attitude, standard coordinates, plate coordinates and weight of the axis, if it is known.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape.
+    """
+
+    def __new__(
+        cls,
+        *,
+        station: _Station,
+        camera: _CameraKind,
+        pointings: _Floats,
+        common: _Floats,
+        fixed: list[bool],
+        weighted: _Indices,
+        weighted_values: _Floats,
+        weight_root: _Floats,
+        star_places: _Floats,
+        star_catalogue: _Floats,
+        star_weights: _Floats,
+        star_fixed: list[bool],
+        image_stars: _Indices,
+        image_pointings: _Indices,
+        image_xy: _Floats,
+        image_weights: _Floats,
+        image_times: _Floats,
+        image_shifts: _Floats,
+        axis: tuple[int, tuple[float, float], list[float], list[list[float]]] | None,
+    ) -> StellarProblem: ...
+    def adjust(
+        self,
+        *,
+        unit: float,
+        fraction: float,
+        max_iterations: int,
+        covariance: bool,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> dict[str, Any]:
+        """Adjust by least squares with exact partials.
+
+        Parameters
+        ----------
+        unit
+            Mean error of unit weight that is expected: `fraction` and the history count in it.
+        fraction
+            Converged when no unknown changes by more than this fraction of its standard deviation.
+        max_iterations, covariance, threads, progress
+            As for `adjust_block`.
+
+        Returns
+        -------
+        `status`, `iterations`, `initial_sum_of_squares` (in units of `unit` squared), `parameters`
+        (3 G + 17,), `cofactors` for unit weight (all parameters squared where G <= 3; else of each attitude
+        3 x 20, then 17 x 17), `places` (S, 2), `place_cofactors` (S, 2, 2), `residuals` (m, 2) measured minus
+        computed, `axis_residual`, `sums_of_squares` (images, stars, parameters, axis), and `redundancy` and
+        `standardized` of `image`, `place`, `axis`: of decorrelated components where weights are correlated.
+
+        Raises
+        ------
+        StellarError
+            Unknowns that are not determined, or initial values that give no image.
+        """
+
+    def equations(self) -> dict[str, _Floats]:
+        """Equations of the images at the initial values with exact partials, not weighted.
+
+        Returns
+        -------
+        `constant` (m, 2) measured minus computed, `star` (m, 2, 2), `pointing` (m, 2, 3), `common` (m, 2,
+        17).
+        """
+
+    def axis_equations(self) -> dict[str, _Floats]:
+        """Equations of the axis as `equations` has them, with one row or none."""
+
+    def published(
+        self, corrections: _Floats, *, refraction: float, distortion: float, passes: int
+    ) -> dict[str, Any]:
+        """Equations of the images as the report's program formed them (equations 48 to 62, 73, 74).
+
+        Parameters
+        ----------
+        corrections
+            (S, 2) added to the refracted places.
+        refraction, distortion, passes
+            Tolerances (radians, unit of the plate) and limit of the inner iterations.
+
+        Returns
+        -------
+        As `equations`, and `standard` (m, 2), `undistorted` (m, 2), `unsettled`: images and last changes.
+        """
+
+    def directions(self) -> _Floats:
+        """Right ascension and declination (m, 2) of every image at the initial values."""

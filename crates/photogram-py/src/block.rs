@@ -10,6 +10,7 @@ use photocore::programs::block::{Block, BlockError as Failure, Image, Options, P
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
+use rayon::ThreadPool;
 
 use crate::arrays::{check_lengths, indices, numbers, rows};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
@@ -119,7 +120,7 @@ fn adjust_block(
     run(py, &block, &options, threads, progress)
 }
 
-/// Adjusts without the GIL. Signals and the caller's `progress` are looked after now and then, on this thread.
+/// Adjusts a block and says what fails in terms of its photos and points.
 fn run(
     py: Python<'_>,
     block: &Block,
@@ -127,6 +128,17 @@ fn run(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BlockSolution> {
+    let solution = watched(py, threads, progress, |pool, watch| block.adjust(options, pool, watch))?;
+    solution.map(BlockSolution::new).map_err(|error| failure(&error))
+}
+
+/// Works without the GIL. Signals and the caller's `progress` are looked after now and then, on this thread.
+pub fn watched<T: Send, E: Send>(
+    py: Python<'_>,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&ThreadPool, &mut dyn FnMut(Event) -> ControlFlow<()>) -> Result<T, E> + Send,
+) -> PyResult<Result<T, E>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| PyValueError::new_err(error.to_string()))?;
     let mut raised = None;
@@ -145,12 +157,8 @@ fn run(
             }
         }
     };
-    let solution = py.detach(|| block.adjust(options, &pool, &mut watch));
-    match (solution, raised) {
-        (_, Some(error)) => Err(error),
-        (Ok(solution), None) => Ok(BlockSolution::new(solution)),
-        (Err(error), None) => Err(failure(&error)),
-    }
+    let done = py.detach(|| work(&pool, &mut watch));
+    raised.map_or(Ok(done), Err)
 }
 
 /// Between two looks at signals and progress.

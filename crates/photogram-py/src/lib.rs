@@ -7,6 +7,7 @@ mod geometry;
 mod resection;
 mod similarity;
 mod solution;
+mod stellar;
 
 use pyo3::prelude::*;
 
@@ -17,5 +18,6 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     block::register(module)?;
     comparator::register(module)?;
     resection::register(module)?;
-    similarity::register(module)
+    similarity::register(module)?;
+    stellar::register(module)
 }

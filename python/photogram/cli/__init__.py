@@ -19,6 +19,7 @@ from photogram.cli import (
     perspective_center,
     plan,
     simulate,
+    stellar_camera,
 )
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
@@ -51,6 +52,7 @@ app.add_typer(giant_app)
 app.add_typer(orientation_app)
 app.add_typer(comparator_app)
 app.command("perspective-center")(perspective_center.perspective_center)
+app.command("stellar-camera")(stellar_camera.stellar_camera)
 app.command()(plan.plan)
 app.command()(simulate.simulate)
 

@@ -4,6 +4,9 @@
 //! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix;
 //! * [`ellipsoid`]: longitude, latitude, height, geocentric coordinates, and the local vertical frame;
 //! * [`collinearity`]: the projection of a point into a photo and its linearization;
+//! * [`lens`]: radial and decentering distortion, forward and inverse;
+//! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates;
+//! * [`mod@pointing`]: the attitude of a camera under the sky.
 //! * [`refraction`]: how air and water displace a point, [`atmosphere`]: the air.
 //!
 //! Angles are radians, image coordinates millimetres, lengths the linear unit of the object space.
@@ -11,14 +14,20 @@
 pub mod atmosphere;
 pub mod collinearity;
 pub mod ellipsoid;
+pub mod lens;
+pub mod pointing;
 pub mod refraction;
 pub mod rotation;
+pub mod sky;
 pub mod vector;
 
 pub use collinearity::{Lift, ObjectSpace, Photo, Point, Projection, Ray, RotationSense};
 pub use ellipsoid::{Ellipsoid, local_vertical, local_vertical_with_partials};
+pub use lens::{Displacement, Distortion, Undistorted};
+pub use pointing::{pointing, pointing_angles, pointing_with_partials};
 pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
 pub use rotation::{rotation, rotation_angles, rotation_with_partials};
+pub use sky::{Air, Standard, Station};
 pub use vector::{Matrix3, Vector3};
 
 /// What geometry refuses.

@@ -21,6 +21,8 @@ pub struct Cofactors {
     pub kept: Vec<f64>,
     /// Of the border.
     pub border: Vec<f64>,
+    /// Of each kept block with the border (its unknowns x those of the border, row by row), one after the other.
+    pub kept_border: Vec<f64>,
     /// a Q a^T of each equation a x = l, in the order of groups and rows: the share of the equation that its own
     /// unknowns take up. One minus it is the redundancy number of an observation.
     pub equations: Vec<f64>,
@@ -44,6 +46,7 @@ impl System {
             local: vec![0.0; layout.locals() * l * l],
             kept: Vec::new(),
             border: Vec::new(),
+            kept_border: Vec::new(),
             equations: vec![0.0; layout.groups() * rows],
         };
         let (mut local_rest, mut rest) = (&mut result.local[..], &mut result.equations[..]);
@@ -78,6 +81,8 @@ impl System {
         }
         if layout.border_dim() > 0 {
             result.border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
+            let with_border = (0..layout.kept()).filter_map(|block| inverse.block(block, layout.kept()));
+            result.kept_border = with_border.flatten().collect();
         }
         ControlFlow::Continue(result)
     }

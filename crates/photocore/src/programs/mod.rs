@@ -4,3 +4,4 @@ pub mod block;
 pub mod comparator;
 pub mod resection;
 pub mod similarity;
+pub mod stellar;

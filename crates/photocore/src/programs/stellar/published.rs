@@ -1,0 +1,142 @@
+//! The observation equations as the report's program formed them (its equations 48 to 62 and 73 to 74).
+//!
+//! Distortion is that of the image undistorted from the measurement, so that discrepancies live on the undistorted plate; the
+//! change of refraction with direction is neglected in the partials.
+
+use super::model::{Rows, Sight};
+use super::{Attitude, COMMON, Calibration, Camera, Image, StellarError};
+use crate::geometry::Displacement;
+
+/// Tolerances of the inner iterations.
+#[derive(Debug, Clone, Copy)]
+pub struct Tolerances {
+    /// Of refraction, in radians.
+    pub refraction: f64,
+    /// Of distortion, in the unit of the plate coordinates.
+    pub distortion: f64,
+    /// Passes of the distortion at the most.
+    pub passes: usize,
+}
+
+/// The equations of an image as published.
+#[derive(Debug, Clone, Copy)]
+pub struct PublishedRows {
+    /// Discrepancies and partials.
+    pub rows: Rows,
+    /// Refracted standard coordinates of the star.
+    pub standard: [f64; 2],
+    /// The measured image without distortion.
+    pub undistorted: [f64; 2],
+    /// Changes of radial and decentering distortion in the last pass, where they did not fall below the tolerance.
+    pub unsettled: Option<[f64; 2]>,
+}
+
+impl Calibration {
+    /// The equations of all images at the initial values as the report's program formed them.
+    ///
+    /// `corrections` (right ascension, declination) are added to the refracted places of the stars, refraction as it was.
+    pub fn published(
+        &self,
+        corrections: &[[f64; 2]],
+        tolerances: &Tolerances,
+    ) -> Result<Vec<PublishedRows>, StellarError> {
+        self.check()?;
+        if corrections.len() != self.stars.len() {
+            return Err(StellarError::Index("a correction".into()));
+        }
+        let sight = self.initial();
+        let rows = |image: &Image| self.published_image(&sight, image, corrections[image.star], tolerances);
+        Ok(self.images.iter().map(rows).collect())
+    }
+
+    fn published_image(
+        &self,
+        sight: &Sight,
+        image: &Image,
+        correction: [f64; 2],
+        tolerances: &Tolerances,
+    ) -> PublishedRows {
+        let place = self.stars[image.star].place;
+        let place = [place[0] + image.shift[0], place[1] + image.shift[1]];
+        let (equatorial, _) = self.station.aberrated(place, image.sidereal_time);
+        let direction = self.station.direction(equatorial);
+        let sin = direction[0].hypot(direction[1]);
+        let zenith_distance = sin.atan2(direction[2]);
+        let angle = self.station.air.published(zenith_distance, &sight.tau, tolerances.refraction);
+        let tangent = (zenith_distance - angle).tan();
+        let along = if sin > 0.0 { tangent / sin } else { 1.0 };
+        let apparent = [direction[0] * along, direction[1] * along, 1.0];
+        let [hour, dec] = self.station.equatorial(&apparent);
+        let refracted = [hour - correction[0], dec + correction[1]];
+        let direction = self.station.direction(refracted);
+        let standard = [direction[0] / direction[2], direction[1] / direction[2]];
+        let star = self.station.standard_by_refracted(refracted, direction[2], standard[0]);
+        let coefficients = self.station.air.refraction(zenith_distance - angle, &sight.tau).coefficients;
+        let attitude = &sight.attitudes[image.pointing];
+        let (undistorted, changes, converged) =
+            sight.camera.undistorted(image.xy, tolerances.distortion, tolerances.passes);
+        let mut rows =
+            approximate(&sight.camera, attitude, standard, image.xy, undistorted, self.kind.common_scale);
+        let tangent = standard[0].hypot(standard[1]);
+        let f = tangent.recip() + tangent;
+        for i in 0..2 {
+            let [j, k] = rows.star[i];
+            let along = -(j * standard[0] + k * standard[1]) * f;
+            (0..4).for_each(|t| rows.common[i][COMMON - 4 + t] = along * coefficients[t]);
+            rows.star[i] = std::array::from_fn(|c| j * star[0][c] + k * star[1][c]);
+        }
+        PublishedRows { rows, standard, undistorted, unsettled: (!converged).then_some(changes) }
+    }
+}
+
+/// The rows of an image; those of the star still with respect to standard coordinates.
+fn approximate(
+    camera: &Camera,
+    attitude: &Attitude,
+    standard: [f64; 2],
+    measured: [f64; 2],
+    undistorted: [f64; 2],
+    common_scale: bool,
+) -> Rows {
+    let [epsilon, xp, yp, cx, cy, dx, dy, ..] = *camera.interior();
+    let offset = [undistorted[0] - xp - dx, undistorted[1] - yp - dy];
+    let lens = camera.distortion().linearize(offset);
+    let [m, n, q] = Attitude::turned(&attitude.matrix, standard);
+    let computed = [cx * m / q + xp + lens.shift[0] - epsilon * measured[1], cy * n / q + yp + lens.shift[1]];
+    let [[a1, b1, _], [a2, b2, _], [d, e, _]] = attitude.matrix;
+    let (p1, p2) = ((computed[0] - xp) / cx, (computed[1] - yp) / cy);
+    let (p3, p4, p6, p7) = (p1 * d - a1, p1 * e - b1, p2 * d - a2, p2 * e - b2);
+    let p9 = p2 * b1 - p1 * b2;
+    // With the axis upright in omega B1 and B2 are -cos omega sin kappa and cos omega cos kappa.
+    let (sin, cos) = (-b1).atan2(b2).sin_cos();
+    let mut common = camera_columns(camera, &lens);
+    common[0][0] = -measured[1];
+    common[0][3] = p1;
+    common[1][if common_scale { 3 } else { 4 }] = p2;
+    Rows {
+        constant: [measured[0] - computed[0], measured[1] - computed[1]],
+        star: [[-cx * p3 / q, -cx * p4 / q], [-cy * p6 / q, -cy * p7 / q]],
+        pointing: [
+            [-cx * (p1 * p9 + p7), cx * ((1.0 + p1 * p1) * sin - p1 * p2 * cos), -cx * p2],
+            [-cy * (p2 * p9 - p4), -cy * ((1.0 + p2 * p2) * cos - p1 * p2 * sin), cy * p1],
+        ],
+        common,
+    }
+}
+
+/// Columns of principal point and distortion.
+fn camera_columns(camera: &Camera, lens: &Displacement) -> [[f64; COMMON]; 2] {
+    let phi = camera.interior()[12];
+    let (sin, cos) = phi.sin_cos();
+    std::array::from_fn(|i| {
+        let mut row = [0.0; COMMON];
+        for j in 0..2 {
+            row[5 + j] = -lens.offset[i][j];
+            row[1 + j] = f64::from(u8::from(i == j)) + row[5 + j];
+        }
+        row[7..10].copy_from_slice(&lens.radial[i]);
+        row[10..12].copy_from_slice(&lens.profile[i]);
+        row[12] = lens.direction[i][1] * cos - lens.direction[i][0] * sin;
+        row
+    })
+}

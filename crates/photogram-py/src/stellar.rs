@@ -1,0 +1,361 @@
+//! Stellar camera calibration; its documentation is in `_photocore.pyi`.
+
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
+use photocore::adjustment::{Criterion, Options as AdjustmentOptions, Status};
+use photocore::geometry::{Air, Station, Vector3, pointing, pointing_angles};
+use photocore::programs::stellar::{
+    Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Options, Rows, Star,
+    StellarError as Failure, Tested, Tolerances, Weights,
+};
+use pyo3::create_exception;
+use pyo3::exceptions::{PyException, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{check_lengths, indices, matrices, numbers, rows, table};
+use crate::block::watched;
+use crate::solution::iteration_row;
+
+create_exception!(
+    _photocore,
+    StellarError,
+    PyException,
+    "The camera cannot be calibrated: (kind, message, stars)."
+);
+
+/// Adds the class and the functions to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("StellarError", module.py().get_type::<StellarError>())?;
+    module.add_class::<StellarProblem>()?;
+    module.add_function(wrap_pyfunction!(refraction, module)?)?;
+    module.add_function(wrap_pyfunction!(standard_coordinates, module)?)?;
+    module.add_function(wrap_pyfunction!(star_places, module)?)?;
+    module.add_function(wrap_pyfunction!(pointing_matrix, module)?)?;
+    module.add_function(wrap_pyfunction!(pointing_of_matrix, module)?)?;
+    module.add_function(wrap_pyfunction!(plate_images, module)?)?;
+    module.add_function(wrap_pyfunction!(plate_directions, module)?)
+}
+
+type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
+type Indices<'py> = PyReadonlyArrayDyn<'py, i64>;
+/// Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury).
+type Place = (f64, f64, f64, f64);
+/// Reference principal distance (none: scale first), Brown's decentering, common scale.
+type CameraKind = (Option<f64>, bool, bool);
+
+/// Attitude, standard coordinates, plate coordinates and weight of the axis.
+type AxisRow = (usize, [f64; 2], [f64; 2], [[f64; 2]; 2]);
+
+fn station((latitude, aberration, temperature, pressure): Place) -> Station {
+    Station::new(latitude, aberration, Air::new(temperature, pressure))
+}
+
+fn kind((reference, cartesian, common_scale): CameraKind) -> Kind {
+    Kind {
+        form: reference.map_or(Form::ScaleFirst, Form::DistortionFirst),
+        decentering: if cartesian { Decentering::Cartesian } else { Decentering::Polar },
+        common_scale,
+    }
+}
+
+fn fixed_size<const N: usize>(name: &str, array: &Array<'_>) -> PyResult<[f64; N]> {
+    let values = numbers(name, array)?;
+    let count = values.len();
+    values.try_into().map_err(|_| PyValueError::new_err(format!("{name} has {count} numbers, not {N}")))
+}
+
+#[pyfunction]
+fn refraction<'py>(
+    py: Python<'py>,
+    zenith_distances: Array<'py>,
+    temperature: f64,
+    pressure: f64,
+    tau: Array<'py>,
+    observed: bool,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (air, tau) = (Air::new(temperature, pressure), fixed_size("tau", &tau)?);
+    let angle = |&z: &f64| if observed { air.refraction(z, &tau).angle } else { z - air.observed(z, &tau) };
+    let values = numbers("zenith_distances", &zenith_distances)?;
+    Ok(PyArray1::from_vec(py, values.iter().map(angle).collect()))
+}
+
+#[pyfunction]
+fn standard_coordinates<'py>(
+    py: Python<'py>,
+    places: Array<'py>,
+    sidereal_times: Array<'py>,
+    place: Place,
+    tau: Array<'py>,
+) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+    let (station, tau) = (station(place), fixed_size("tau", &tau)?);
+    let (places, times) = (rows("places", &places)?, numbers("sidereal_times", &sidereal_times)?);
+    check_lengths(("places", places.len()), &[("sidereal_times", times.len())])?;
+    let all = places.iter().zip(&times);
+    table(py, all.map(|(&place, &time)| station.standard(place, time, &tau).coordinates).collect())
+}
+
+#[pyfunction]
+fn star_places<'py>(
+    py: Python<'py>,
+    standard: Array<'py>,
+    sidereal_times: Array<'py>,
+    place: Place,
+    tau: Array<'py>,
+) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+    let (station, tau) = (station(place), fixed_size("tau", &tau)?);
+    let (standard, times) = (rows("standard", &standard)?, numbers("sidereal_times", &sidereal_times)?);
+    check_lengths(("standard", standard.len()), &[("sidereal_times", times.len())])?;
+    let all = standard.iter().zip(&times);
+    table(py, all.map(|(&standard, &time)| station.place(standard, time, &tau)).collect())
+}
+
+#[pyfunction]
+fn pointing_matrix<'py>(py: Python<'py>, angles: Array<'py>) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+    table(py, pointing(fixed_size("angles", &angles)?).to_vec())
+}
+
+#[pyfunction]
+fn pointing_of_matrix<'py>(py: Python<'py>, matrix: Array<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let matrix: Vec<Vector3> = rows("matrix", &matrix)?;
+    let matrix = matrix.try_into().map_err(|_| PyValueError::new_err("matrix does not have 3 rows"))?;
+    Ok(PyArray1::from_vec(py, pointing_angles(&matrix).to_vec()))
+}
+
+#[pyfunction]
+fn plate_images<'py>(
+    py: Python<'py>,
+    standard: Array<'py>,
+    angles: Array<'py>,
+    interior: Array<'py>,
+    camera: CameraKind,
+) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+    let camera = Camera::new(kind(camera), fixed_size("interior", &interior)?);
+    let attitude = Attitude::new(fixed_size("angles", &angles)?);
+    let standard: Vec<[f64; 2]> = rows("standard", &standard)?;
+    table(py, standard.iter().map(|&standard| camera.linearize(&attitude, standard).xy).collect())
+}
+
+#[pyfunction]
+#[pyo3(signature = (xy, angles, interior, camera, *, tolerance, passes))]
+fn plate_directions<'py>(
+    py: Python<'py>,
+    xy: Array<'py>,
+    angles: Array<'py>,
+    interior: Array<'py>,
+    camera: CameraKind,
+    tolerance: f64,
+    passes: usize,
+) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+    let camera = Camera::new(kind(camera), fixed_size("interior", &interior)?);
+    let attitude = Attitude::new(fixed_size("angles", &angles)?);
+    let xy: Vec<[f64; 2]> = rows("xy", &xy)?;
+    let direction = |&xy: &[f64; 2]| {
+        let ([x, y], _, converged) = camera.undistorted(xy, tolerance, passes);
+        let [xi, eta] = camera.standard(&attitude.matrix, [x, y]);
+        [xi, eta, x, y, f64::from(u8::from(converged))]
+    };
+    table(py, xy.iter().map(direction).collect())
+}
+
+/// A calibration as it is known beforehand.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct StellarProblem {
+    calibration: Calibration,
+}
+
+#[pymethods]
+impl StellarProblem {
+    #[new]
+    #[pyo3(signature = (
+        *, station, camera, pointings, common, fixed, weighted, weighted_values, weight_root, star_places, star_catalogue,
+        star_weights, star_fixed, image_stars, image_pointings, image_xy, image_weights, image_times, image_shifts, axis
+    ))]
+    fn new(
+        station: Place,
+        camera: CameraKind,
+        pointings: Array<'_>,
+        common: Array<'_>,
+        fixed: Vec<bool>,
+        weighted: Indices<'_>,
+        weighted_values: Array<'_>,
+        weight_root: Array<'_>,
+        star_places: Array<'_>,
+        star_catalogue: Array<'_>,
+        star_weights: Array<'_>,
+        star_fixed: Vec<bool>,
+        image_stars: Indices<'_>,
+        image_pointings: Indices<'_>,
+        image_xy: Array<'_>,
+        image_weights: Array<'_>,
+        image_times: Array<'_>,
+        image_shifts: Array<'_>,
+        axis: Option<AxisRow>,
+    ) -> PyResult<Self> {
+        let places = rows("star_places", &star_places)?;
+        let catalogue = rows("star_catalogue", &star_catalogue)?;
+        let weights: Vec<[[f64; 2]; 2]> = matrices("star_weights", &star_weights)?;
+        check_lengths(
+            ("star_places", places.len()),
+            &[
+                ("star_catalogue", catalogue.len()),
+                ("star_weights", weights.len()),
+                ("star_fixed", star_fixed.len()),
+            ],
+        )?;
+        let star = |i: usize| Star {
+            place: places[i],
+            catalogue: catalogue[i],
+            weight: (weights[i][0][0] > 0.0).then_some(weights[i]),
+            fixed: star_fixed[i],
+        };
+        let (stars_of, pointings_of) =
+            (indices("image_stars", &image_stars)?, indices("image_pointings", &image_pointings)?);
+        let (xy, plate) = (rows("image_xy", &image_xy)?, matrices("image_weights", &image_weights)?);
+        let (times, shifts) = (numbers("image_times", &image_times)?, rows("image_shifts", &image_shifts)?);
+        check_lengths(
+            ("image_xy", xy.len()),
+            &[
+                ("image_stars", stars_of.len()),
+                ("image_pointings", pointings_of.len()),
+                ("image_weights", plate.len()),
+                ("image_times", times.len()),
+                ("image_shifts", shifts.len()),
+            ],
+        )?;
+        let image = |i: usize| Image {
+            star: stars_of[i],
+            pointing: pointings_of[i],
+            xy: xy[i],
+            weight: plate[i],
+            sidereal_time: times[i],
+            shift: shifts[i],
+        };
+        let root = weight_root.as_array().iter().copied().collect();
+        Ok(Self {
+            calibration: Calibration {
+                station: self::station(station),
+                kind: kind(camera),
+                pointings: rows("pointings", &pointings)?,
+                common: fixed_size("common", &common)?,
+                fixed,
+                weights: Weights {
+                    parameters: indices("weighted", &weighted)?,
+                    values: numbers("weighted_values", &weighted_values)?,
+                    root,
+                },
+                stars: (0..places.len()).map(star).collect(),
+                images: (0..xy.len()).map(image).collect(),
+                axis: axis.map(|(pointing, standard, xy, weight)| Axis { pointing, standard, xy, weight }),
+            },
+        })
+    }
+
+    #[pyo3(signature = (*, unit, fraction, max_iterations, covariance, threads, progress))]
+    fn adjust<'py>(
+        &self,
+        py: Python<'py>,
+        unit: f64,
+        fraction: f64,
+        max_iterations: usize,
+        covariance: bool,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let criterion = Criterion::Fraction(fraction);
+        let options =
+            Options { adjustment: AdjustmentOptions { criterion, max_iterations, covariance }, unit };
+        let work = |pool: &rayon::ThreadPool, watch: &mut dyn FnMut(_) -> _| {
+            self.calibration.adjust(&options, pool, watch)
+        };
+        let solution = watched(py, threads, progress, work)?.map_err(|error| failure(&error))?;
+        let found = PyDict::new(py);
+        let status = match solution.adjustment.status {
+            Status::Converged => "converged",
+            Status::NotConverged => "not converged",
+            Status::Diverged => "diverged",
+        };
+        found.set_item("status", status)?;
+        let iterations: Vec<_> = solution.adjustment.iterations.iter().map(iteration_row).collect();
+        found.set_item("iterations", iterations)?;
+        found.set_item("initial_sum_of_squares", solution.adjustment.initial_sum_of_squares)?;
+        found.set_item("parameters", PyArray1::from_vec(py, solution.parameters))?;
+        found.set_item("cofactors", PyArray1::from_vec(py, solution.cofactors))?;
+        found.set_item("places", table(py, solution.places)?)?;
+        found.set_item("place_cofactors", squares(py, solution.place_cofactors)?)?;
+        found.set_item("residuals", table(py, solution.residuals)?)?;
+        found.set_item("axis_residual", solution.axis_residual)?;
+        found.set_item("sums_of_squares", solution.sums_of_squares)?;
+        tests(&found, "image", &solution.image_tests)?;
+        tests(&found, "place", &solution.place_tests)?;
+        tests(&found, "axis", &[solution.axis_test])?;
+        Ok(found)
+    }
+
+    fn equations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        equations(py, &self.calibration.equations().map_err(|error| failure(&error))?)
+    }
+
+    fn axis_equations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let rows = self.calibration.axis_equations().map_err(|error| failure(&error))?;
+        equations(py, &rows.into_iter().collect::<Vec<_>>())
+    }
+
+    #[pyo3(signature = (corrections, *, refraction, distortion, passes))]
+    fn published<'py>(
+        &self,
+        py: Python<'py>,
+        corrections: Array<'py>,
+        refraction: f64,
+        distortion: f64,
+        passes: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let corrections = rows("corrections", &corrections)?;
+        let tolerances = Tolerances { refraction, distortion, passes };
+        let found = self.calibration.published(&corrections, &tolerances).map_err(|error| failure(&error))?;
+        let dict = equations(py, &found.iter().map(|image| image.rows).collect::<Vec<_>>())?;
+        dict.set_item("standard", table(py, found.iter().map(|image| image.standard).collect())?)?;
+        dict.set_item("undistorted", table(py, found.iter().map(|image| image.undistorted).collect())?)?;
+        let unsettled = found.iter().enumerate().filter_map(|(i, image)| Some((i, image.unsettled?)));
+        dict.set_item("unsettled", unsettled.collect::<Vec<_>>())?;
+        Ok(dict)
+    }
+
+    fn directions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+        table(py, self.calibration.directions().map_err(|error| failure(&error))?)
+    }
+}
+
+/// Discrepancies and partials as arrays; the second index is x or y.
+fn equations<'py>(py: Python<'py>, all: &[Rows]) -> PyResult<Bound<'py, PyDict>> {
+    let count = all.len();
+    let dict = PyDict::new(py);
+    dict.set_item("constant", table(py, all.iter().map(|rows| rows.constant).collect())?)?;
+    dict.set_item("star", squares(py, all.iter().map(|rows| rows.star).collect())?)?;
+    let pointing = all.iter().flat_map(|rows| rows.pointing).collect::<Vec<_>>().into_flattened();
+    dict.set_item("pointing", PyArray1::from_vec(py, pointing).reshape([count, 2, 3])?)?;
+    let common = all.iter().flat_map(|rows| rows.common).collect::<Vec<_>>().into_flattened();
+    dict.set_item("common", PyArray1::from_vec(py, common).reshape([count, 2, COMMON])?)?;
+    Ok(dict)
+}
+
+fn tests(dict: &Bound<'_, PyDict>, name: &str, all: &[Tested]) -> PyResult<()> {
+    let py = dict.py();
+    dict.set_item(format!("{name}_redundancy"), table(py, all.iter().map(|t| t.redundancy).collect())?)?;
+    dict.set_item(format!("{name}_standardized"), table(py, all.iter().map(|t| t.standardized).collect())?)
+}
+
+fn squares(py: Python<'_>, all: Vec<[[f64; 2]; 2]>) -> PyResult<Bound<'_, numpy::PyArray3<f64>>> {
+    let count = all.len();
+    PyArray1::from_vec(py, all.into_flattened().into_flattened()).reshape([count, 2, 2])
+}
+
+fn failure(error: &Failure) -> PyErr {
+    let (kind, stars) = match error {
+        Failure::UndeterminedStars(stars) => ("undetermined stars", stars.clone()),
+        Failure::Undetermined(_) => ("undetermined", vec![]),
+        Failure::Weight(_) => ("weight", vec![]),
+        Failure::NotFinite => ("not finite", vec![]),
+        Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![]),
+    };
+    StellarError::new_err((kind, error.to_string(), stars))
+}

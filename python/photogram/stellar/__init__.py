@@ -1,0 +1,19 @@
+"""Stellar camera calibration (NOAA Technical Report NOS 55, 1972)."""
+
+from photogram.stellar.adjustment import calibrate
+from photogram.stellar.options import Options
+from photogram.stellar.problem import Axis, Problem, default_parameters
+from photogram.stellar.result import Result
+from photogram.stellar.sky import Air, Site, refraction
+
+__all__ = [
+    "Air",
+    "Axis",
+    "Options",
+    "Problem",
+    "Result",
+    "Site",
+    "calibrate",
+    "default_parameters",
+    "refraction",
+]

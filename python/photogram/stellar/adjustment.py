@@ -1,0 +1,201 @@
+"""Calibration of a camera by stars: the order of solutions (NOAA TR NOS 55, sections 5 and 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.errors import AdjustmentError, InputError
+from photogram.messages import Message
+from photogram.stellar import published, strict
+from photogram.stellar.combination import combine
+from photogram.stellar.counts import degrees_of_freedom
+from photogram.stellar.movement import movement, pairs_to_combine
+from photogram.stellar.parameters import GROUPS, INDEX
+from photogram.stellar.problem import Problem
+from photogram.stellar.result import PreRun, Result
+from photogram.stellar.state import Level, Solved
+
+__all__ = ["calibrate"]
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+def calibrate(
+    problem: Problem, *, threads: int | None = None, progress: Callable[..., None] | None = None
+) -> Result:
+    """Calibrate a camera.
+
+    In order: minimum solution where its stars are named (8 parameters, one attitude), pre-run residuals if
+    asked for, maximum solution, coefficients of refraction if asked for, movement test, combination of
+    attitudes that do not differ.
+
+    Parameters
+    ----------
+    problem
+        The problem with its options.
+    threads
+        Number of threads; all processors when None.
+    progress
+        Called now and then; an exception it raises stops the adjustment.
+
+    Returns
+    -------
+    The result; its `converged` says whether the last solution did.
+
+    Raises
+    ------
+    AdjustmentError
+        Errors 2 to 4 of the report: stars or parameters that are not determined, observations too few.
+    InputError
+        Stars of the minimum solution that are not there.
+    KeyboardInterrupt
+        Ctrl-C.
+    """
+    iterate = (
+        published.iterate
+        if problem.options.as_published
+        else partial(strict.iterate, threads=threads, progress=progress)
+    )
+    messages: list[Message] = []
+    initial = problem.initial.copy()
+    levels: tuple[Level, ...] = ()
+    if problem.options.minimum_stars:
+        smallest = _minimum_problem(problem)
+        solved = iterate(
+            smallest,
+            initial,
+            _free_minimum(problem),
+            solution="minimum",
+            limit=problem.options.max_iterations_minimum,
+        )
+        levels = solved.levels
+        initial = solved.parameters.copy()
+        initial[0:3] = initial[3:6] = initial[6:9]
+        if problem.options.pre_run:
+            return _result(
+                problem, smallest, solved, messages, pre_run=_pre_run(problem, smallest, initial, solved)
+            )
+    free = free_parameters(problem)
+    _check_groups(problem)
+    limit = problem.options.max_iterations
+    solved = iterate(problem, initial, free, solution="maximum", limit=limit)
+    levels = (*levels, *solved.levels)
+    if problem.options.refraction:
+        solved, levels = _refraction(problem, iterate, solved, levels, messages)
+    result = _result(problem, problem, replace(solved, levels=levels), messages)
+    return _combined(result) if problem.options.movement_factor > 0 else result
+
+
+def free_parameters(problem: Problem) -> Bools:
+    """Say which of the 26 parameters are estimated in the maximum solution."""
+    free = ~problem.fixed
+    for group in range(3):
+        if not (problem.known[problem.image_stars] & (problem.image_groups == group)).any():
+            free[3 * group : 3 * group + 3] = False
+    if problem.options.common_scale:
+        free[INDEX["cy"]] = False
+    free[22:] = False
+    return free
+
+
+def _free_minimum(problem: Problem) -> Bools:
+    free = np.zeros(len(problem.initial), bool)
+    free[6:14] = ~problem.fixed[6:14]
+    if problem.options.common_scale:
+        free[INDEX["cy"]] = False
+    return free
+
+
+def _minimum_problem(problem: Problem) -> Problem:
+    """Take the stars of the minimum solution, all images with the attitude of the event."""
+    names = set(problem.options.minimum_stars)
+    missing = names - set(problem.star_ids)
+    if missing:
+        raise InputError(f"incorrect stars specified for minimum solution: {', '.join(sorted(missing))}")
+    others = np.array([star not in names for star in problem.star_ids])
+    chosen = problem.without(others, np.zeros(len(problem.image_points), bool))
+    if not chosen.known.all():
+        raise InputError("incorrect stars specified for minimum solution: a direction that is not known")
+    return replace(chosen, image_groups=np.full_like(chosen.image_groups, 2))
+
+
+def _check_groups(problem: Problem) -> None:
+    """Refuse a group that has images of unknown directions but too few known stars for an attitude."""
+    known = problem.known[problem.image_stars]
+    for group, name in enumerate(GROUPS):
+        of_group = problem.image_groups == group
+        if of_group.any() and len(np.unique(problem.image_stars[of_group & known])) < 2:
+            weighted = (
+                problem.weighted[3 * group : 3 * group + 3].all()
+                or problem.fixed[3 * group : 3 * group + 3].all()
+            )
+            if not weighted:
+                raise AdjustmentError(
+                    f"insufficient type 2 stars for individual orientation: {name} needs two known stars"
+                )
+
+
+def _pre_run(problem: Problem, smallest: Problem, initial: Floats, solved: Solved) -> PreRun:
+    """Compute residuals of all images that took no part in the minimum solution."""
+    used = set(smallest.star_ids)
+    rest = problem.without(
+        np.array([star in used for star in problem.star_ids]), np.zeros(len(problem.image_points), bool)
+    )
+    core = rest.core(initial, rest.star_places, np.ones(len(initial), bool))
+    return PreRun(
+        points=rest.image_points,
+        stars=tuple(rest.star_ids[i] for i in rest.image_stars),
+        residuals=-core.equations()["constant"] if len(rest.image_points) else np.zeros((0, 2)),
+    )
+
+
+def _refraction(
+    problem: Problem,
+    iterate: Callable[..., Solved],
+    solved: Solved,
+    levels: tuple[Level, ...],
+    messages: list[Message],
+) -> tuple[Solved, tuple[Level, ...]]:
+    """Estimate the coefficients of refraction, unless the camera has diverged."""
+    if not solved.converged:
+        messages.append(Message("REFRACTION SOLUTION ELIMINATED FROM PROBLEM"))
+        return solved, levels
+    free = solved.free.copy()
+    free[22:] = ~problem.fixed[22:]
+    once = {"once": True} if problem.options.as_published else {}
+    again = iterate(
+        problem, solved.parameters, free, solution="refraction", limit=problem.options.max_iterations, **once
+    )
+    return again, (*levels, *again.levels)
+
+
+def _result(
+    problem: Problem,
+    solved_problem: Problem,
+    solved: Solved,
+    messages: list[Message],
+    pre_run: PreRun | None = None,
+) -> Result:
+    counts = degrees_of_freedom(solved_problem, solved.free)
+    messages = messages + [Message(text) for text in solved.remarks]
+    if not solved.converged:
+        messages.insert(0, Message(f"the solution has not converged: {solved.stop}"))
+    result = Result(solved_problem, solved, counts, tuple(messages), problem, pre_run)
+    named = [Message(text) for text in result.doubtful()]
+    return replace(result, messages=(*result.messages, *named))
+
+
+def _combined(result: Result) -> Result:
+    """Test the camera for movement; combine the attitudes whose directions do not differ."""
+    test = movement(result)
+    pairs = pairs_to_combine(test, result.problem.options.movement_factor)
+    result = replace(result, movement=test)
+    if not pairs:
+        return replace(result, messages=(*result.messages, Message("NO COMBINED SOLUTION")))
+    return replace(result, combined=combine(result, pairs))

@@ -1,0 +1,173 @@
+"""Curves of distortion and refraction, histogram of residuals (NOAA TR NOS 55, equations 79 to 87)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.stellar.parameters import INDEX
+from photogram.stellar.sky import TAU, refraction
+
+if TYPE_CHECKING:
+    from photogram.stellar.result import Result
+
+__all__ = [
+    "DistortionCurves",
+    "Histogram",
+    "RefractionCurves",
+    "distortion_curves",
+    "histogram",
+    "refraction_curves",
+]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class DistortionCurves:
+    """Distortion over the distance from its centre; metres.
+
+    Attributes
+    ----------
+    distance
+        (n,) from the centre of distortion.
+    radial, transformed, decentering
+        (n,) radial distortion, the same with the calibrated principal distance (it vanishes at the
+        crossover), and the profile of the decentering distortion.
+    radial_error, transformed_error, decentering_error
+        (n,) their mean errors.
+    scale
+        K0, the linear term of the transformation.
+    calibrated, calibrated_error
+        Calibrated principal distance c (1 - K0) and its mean error.
+    """
+
+    distance: Floats
+    radial: Floats
+    transformed: Floats
+    decentering: Floats
+    radial_error: Floats
+    transformed_error: Floats
+    decentering_error: Floats
+    scale: float
+    calibrated: float
+    calibrated_error: float
+
+
+def distortion_curves(result: Result) -> DistortionCurves:
+    """Compute the curves at the step, to the end and with the crossover of the options.
+
+    The mean error of the calibrated principal distance has +c d^n for the radial coefficients: equation 86
+    prints minus, although K0 itself has it.
+    """
+    options, values, covariance = result.problem.options, result.parameters, result.covariance
+    count = int(np.floor(options.extent / options.interval + 1e-9)) + 1
+    d = np.asarray(options.interval * np.arange(count), float)
+    odd = np.column_stack([d**3, d**5, d**7])
+    crossing = options.crossover ** np.array([2, 4, 6])
+    radial_terms = np.array([values[name] for name in ("K1", "K2", "K3")])
+    scale = -float(crossing @ radial_terms)
+    across = d[:, None] * (d[:, None] ** np.array([2, 4, 6]) - crossing)
+    decentering = np.column_stack([d**2, d**4])
+    c = values["cx"] if options.common_scale else 0.5 * (values["cx"] + values["cy"])
+    names = ["cx", "cy", "K1", "K2", "K3"]
+    halves = [1 - scale, 0.0] if options.common_scale else [0.5 * (1 - scale)] * 2
+    gradient = np.concatenate([halves, c * crossing])
+    return DistortionCurves(
+        distance=d,
+        radial=odd @ radial_terms,
+        transformed=across @ radial_terms,
+        decentering=decentering @ np.array([values["K4"], values["K5"]]),
+        radial_error=_errors(odd, covariance, names[2:]),
+        transformed_error=_errors(across, covariance, names[2:]),
+        decentering_error=_errors(decentering, covariance, ["K4", "K5"]),
+        scale=scale,
+        calibrated=c * (1 - scale),
+        calibrated_error=float(_errors(gradient[None], covariance, names)[0]),
+    )
+
+
+def _errors(rows: Floats, covariance: Floats, names: list[str]) -> Floats:
+    chosen = [INDEX[name] for name in names]
+    variances = np.einsum("ni,ij,nj->n", rows, covariance[np.ix_(chosen, chosen)], rows)
+    return np.asarray(np.sqrt(np.maximum(variances, 0)), float)
+
+
+@dataclass(frozen=True, eq=False)
+class RefractionCurves:
+    """Refraction around the axis of an attitude; radians.
+
+    Attributes
+    ----------
+    zenith_distance
+        (21,) observed, from ten degrees above to ten below the axis; never negative.
+    given, corrected, error
+        (21,) refraction with the given and the estimated coefficients, and the mean error of the latter.
+    """
+
+    zenith_distance: Floats
+    given: Floats
+    corrected: Floats
+    error: Floats
+
+
+def refraction_curves(result: Result, group: int) -> RefractionCurves:
+    """Compute refraction around the axis of a group (0 pre, 1 post, 2 event)."""
+    alpha, omega, _ = result.solved.parameters[3 * group : 3 * group + 3]
+    axis = float(np.arccos(np.cos(alpha) * np.cos(omega)))
+    z = axis + np.radians(np.arange(-10.0, 11.0))
+    z = z[(z >= 0) & (z < np.pi / 2)]
+    air = result.problem.site.air
+    tau = result.solved.parameters[22:]
+    basis = np.column_stack([refraction(z, air, tau=row, observed=True) for row in np.eye(4)])
+    return RefractionCurves(
+        zenith_distance=z,
+        given=refraction(z, air, tau=TAU, observed=True),
+        corrected=refraction(z, air, tau=tau, observed=True),
+        error=_errors(basis, result.covariance, ["tau1", "tau2", "tau3", "tau4"]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Histogram:
+    """A histogram with the normal curve.
+
+    Attributes
+    ----------
+    edges
+        (k + 1,) of the classes: equal, from 3.25 standard deviations below the mean to as much above.
+    counts, expected
+        (k,) residuals in each class, and as many as the normal distribution puts there.
+    mean, sd
+        Of all residuals.
+    """
+
+    edges: Floats
+    counts: NDArray[np.int64]
+    expected: Floats
+    mean: float
+    sd: float
+
+
+def histogram(values: Floats) -> Histogram:
+    """Sort residuals into the report's classes: as many as leave one expected residual in the last.
+
+    The count starts at 31 and falls by two.
+    """
+    number, classes = len(values), 31
+
+    def last(n: int) -> float:
+        return 6.5 * number * float(np.exp(-0.5 * (3.25 * (1 - 1 / n)) ** 2)) / (n * math.sqrt(2 * math.pi))
+
+    while classes > 3 and last(classes) <= 1:
+        classes -= 2
+    mean, sd = float(values.mean()), float(values.std())
+    edges = mean + 3.25 * sd * np.linspace(-1, 1, classes + 1)
+    counts = np.histogram(values, edges)[0]
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    density = np.exp(-0.5 * ((middle - mean) / sd) ** 2) / (sd * np.sqrt(2 * np.pi))
+    return Histogram(edges, counts, number * density * np.diff(edges), mean, sd)

@@ -1,0 +1,372 @@
+"""The card deck of the 1967 program (NOAA TR NOS 55, figure 21; section 7 of its specification).
+
+Where the columns of a card cannot be read in the report, what is done here is said in `docs/stellar-
+camera.md`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.errors import InputError
+from photogram.stellar.cards import Card, Cards
+from photogram.stellar.options import Options
+from photogram.stellar.parameters import ARCSEC, GRAD, NAMES
+from photogram.stellar.problem import Axis, Problem, default_parameters
+from photogram.stellar.rejection import rejected
+from photogram.stellar.sky import Air, Site
+
+__all__ = ["read_deck"]
+
+Floats = NDArray[np.float64]
+
+_DEGREE = np.pi / 180.0
+_HOUR = np.pi / 12.0
+_FULL = 52
+"""Cards of a full weight matrix of 22 parameters: every row starts a card."""
+_MOST_STARS, _MOST_POINTS, _FIRST_POINT = 100, 200, 10000
+
+
+@dataclass
+class _Descriptors:
+    """Card 3."""
+
+    options: list[int]
+    mean_error: float
+    reject: bool
+    histogram: bool
+
+    def __getitem__(self, number: int) -> int:
+        return self.options[number - 1]
+
+
+@dataclass
+class _Common:
+    """What the cards before the data say and the data need."""
+
+    post: int
+    event: int
+    corrections: tuple[float, float, float]
+    star_weight: Floats | None
+    plate_weight: Floats | None
+
+
+@dataclass
+class _Data:
+    """Star and image cards."""
+
+    ids: list[str] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    places: list[list[float]] = field(default_factory=list)
+    weights: list[Floats] = field(default_factory=list)
+    points: list[str] = field(default_factory=list)
+    stars: list[int] = field(default_factory=list)
+    groups: list[int] = field(default_factory=list)
+    xy: list[list[float]] = field(default_factory=list)
+    image_weights: list[Floats] = field(default_factory=list)
+    times: list[float] = field(default_factory=list)
+
+
+def read_deck(path: Path) -> list[Problem]:
+    """Read all problems of a deck.
+
+    Parameters
+    ----------
+    path
+        The deck, a card a line.
+
+    Raises
+    ------
+    InputError
+        A card that cannot be used, with its number and text: errors 1 and 3 of the report and all others.
+    OSError
+        The file cannot be read.
+    """
+    cards = Cards(path.read_text(encoding="utf-8", errors="replace"), path)
+    problems = []
+    while True:
+        problem, last = _problem(cards)
+        problems.append(problem)
+        if last or cards.at_end:
+            return problems
+
+
+def _problem(cards: Cards) -> tuple[Problem, bool]:
+    first = cards.take("card 1 (problem number)")
+    title = cards.take("card 2 (title)")
+    descriptors = _descriptors(cards.take("card 3 (options)"))
+    constants = cards.take("card 4 (problem constants)")
+    values = constants.reals(1, 10, 8, 6)
+    event, plate, comparator = (
+        cards.take(what) for what in ("card 5 (event)", "card 6 (plate)", "card 7 (comparator)")
+    )
+    site = _site(cards.take("card 8 (station)"), Air(values[2], values[3]))
+    if not values[2] > 0 or values[3] < 0:
+        raise constants.error("the temperature in kelvin must be positive, the pressure not negative")
+    reference, pole = None, (0.0, 0.0)
+    if descriptors[9]:
+        reference = _site(cards.take("card 9 (reference station)"), site.air)
+        card = cards.take("card 10 (pole)")
+        pole = (card.real(1, 8, 4) * ARCSEC, card.real(9, 16, 4) * ARCSEC)
+    axis = _axis(cards) if descriptors[2] else None
+    initial = _initial(cards)
+    weights = _weights(cards, descriptors[10]) if descriptors[10] else np.zeros((len(NAMES), len(NAMES)))
+    star_weight = _matrix(cards.take("card 20 (weight of the stars)"), 1, 12) if descriptors[3] else None
+    plate_weight = _matrix(cards.take("card 21 (weight of the plate)"), 1, 12) if descriptors[4] else None
+    stars, points = _rejections(cards) if descriptors.reject else (set(), set())
+    minimum = _minimum(cards, descriptors[6]) if descriptors[6] else ()
+    if descriptors[7] and not minimum:
+        raise InputError("option 7 (pre-run) needs option 6 (minimum solution)")
+    corrections = tuple(_sidereal(plate, column) for column in (37, 51, 65))
+    common = _Common(
+        post=comparator.integer(72, 74) or 500,
+        event=comparator.integer(75, 77) or 900,
+        corrections=(corrections[0], corrections[1], corrections[2]),
+        star_weight=star_weight,
+        plate_weight=plate_weight,
+    )
+    data = _data(cards, common)
+    options = Options(
+        common_scale=bool(descriptors[1]),
+        refraction=bool(descriptors[5]),
+        minimum_stars=minimum,
+        pre_run=bool(descriptors[7]),
+        curves=bool(descriptors[8]),
+        reference=reference,
+        pole=pole,
+        plate_list=bool(descriptors[11]),
+        max_iterations_minimum=descriptors[12],
+        max_iterations=descriptors[13],
+        mean_error=descriptors.mean_error,
+        histogram=descriptors.histogram,
+        tolerance=values[0],
+        refraction_tolerance=values[1] * ARCSEC,
+        crossover=values[4],
+        interval=values[5] or 0.005,
+        extent=values[6],
+        distortion_tolerance=values[7],
+        movement_factor=_factor(comparator),
+        movement_time=plate.real(26, 36),
+    )
+    labels = {
+        "title": title.name(1, 80),
+        "problem": first.name(1, 4),
+        "date of computation": first.name(7, 25),
+        "event": event.name(1, 4),
+        "date of observation": event.name(7, 25),
+        "plate": plate.name(1, 4),
+        "camera": plate.name(7, 14),
+        "tracking unit": plate.name(17, 19),
+        "comparator": comparator.name(1, 8),
+        "operator": comparator.name(9, 32),
+    }
+    problem = Problem(
+        site=site,
+        star_ids=tuple(data.ids),
+        star_names=tuple(data.names),
+        star_places=np.array(data.places).reshape(-1, 2),
+        star_weights=np.array(data.weights).reshape(-1, 2, 2),
+        image_points=tuple(data.points),
+        image_stars=np.array(data.stars, np.int64),
+        image_groups=np.array(data.groups, np.int64),
+        image_xy=np.array(data.xy).reshape(-1, 2),
+        image_weights=np.array(data.image_weights).reshape(-1, 2, 2),
+        image_times=np.array(data.times),
+        initial=initial,
+        parameter_weights=weights,
+        axis=axis,
+        options=options,
+        labels={name: value for name, value in labels.items() if value},
+    )
+    return rejected(problem, stars, points), bool(first.integer(80, 80))
+
+
+def _descriptors(card: Card) -> _Descriptors:
+    """Read the options: separated by blanks, or one after the other without any."""
+    words = card.text[:76].split()
+    if len(words) >= 13:
+        try:
+            numbers = [int(word) for word in words[:13]]
+            mean_error = float(words[13].upper().replace("D", "E")) if len(words) > 13 else 0.0
+        except ValueError as error:
+            raise card.error(f"options: {error}") from None
+    else:
+        widths = [1, 1, 1, 1, 1, 2, 1, 1, 1, 2, 1, 2, 2]
+        ends = np.cumsum(widths)
+        numbers = [
+            card.integer(int(end) - width + 1, int(end)) for width, end in zip(widths, ends, strict=True)
+        ]
+        mean_error = card.real(18, 31)
+    if min(numbers) < 0 or mean_error < 0:
+        raise card.error("an option cannot be negative")
+    # The listing has the limit of the minimum solution first.
+    return _Descriptors(
+        numbers, mean_error, card.name(77, 77) not in ("", "0"), card.name(78, 80) not in ("", "0")
+    )
+
+
+def _site(card: Card, air: Air) -> Site:
+    south = card.real(33, 33, 0) != 0
+    latitude = abs(card.real(36, 38, 0)) + card.real(40, 41, 0) / 60 + card.real(43, 49, 4) / 3600
+    longitude = card.real(53, 55, 0) + card.real(57, 58, 0) / 60 + card.real(60, 66, 4) / 3600
+    if latitude > 90:
+        raise card.error("the latitude exceeds 90 degrees")
+    return Site(
+        latitude=(-latitude if south else latitude) * _DEGREE,
+        longitude_west=longitude * _DEGREE,
+        elevation=card.real(70, 80, 4),
+        air=air,
+        number=card.name(1, 4),
+        name=card.name(7, 30),
+    )
+
+
+def _axis(cards: Cards) -> Axis:
+    card = cards.take("card 11 (azimuth and zenith distance)")
+    azimuth = card.real(36, 38, 0) + card.real(40, 41, 0) / 60 + card.real(43, 46, 1) / 3600
+    zenith = card.real(53, 55, 0) + card.real(57, 58, 0) / 60 + card.real(60, 63, 1) / 3600
+    card = cards.take("card 12 (plate coordinates of the axis)")
+    x, y, *weight = card.reals(13, 12, 5)
+    return Axis(azimuth * _DEGREE, zenith * _DEGREE, np.array([x, y]), _symmetric(card, weight))
+
+
+def _initial(cards: Cards) -> Floats:
+    """Cards 13 to 18: alpha, omega, kappa of the event in grads, epsilon (grads), and the camera."""
+    values: list[float] = []
+    for number in range(13, 19):
+        card = cards.take(f"card {number} (initial parameters)")
+        values += [card.real(start, start + 13) for start in (2, 17, 32)]
+    parameters = default_parameters(values[6])
+    for group in range(3):
+        parameters[3 * group : 3 * group + 3] = np.array(values[:3]) * GRAD
+    parameters[9:22] = values[3:16]
+    parameters[9] *= GRAD
+    parameters[21] *= GRAD
+    if not (parameters[12] > 0 and parameters[13] > 0):
+        raise card.error("the principal distances of cards 13 to 18 must be positive")
+    return parameters
+
+
+def _weights(cards: Cards, count: int) -> Floats:
+    weights = np.zeros((len(NAMES), len(NAMES)))
+    if count >= _FULL:
+        sizes = [(0, 22)] + ([(22, 26)] if count > _FULL else [])
+        for first, end in sizes:
+            for row in range(first, end):
+                weights[row, row:end] = _row(cards, end - row)
+    else:
+        for _ in range(count):
+            card = cards.take("card 19 (weights of parameters)")
+            for start in range(1, 80, 16):
+                row, column = card.integer(start, start + 1), card.integer(start + 2, start + 3)
+                if row == column == 0:
+                    continue
+                if not (1 <= row <= 26 and 1 <= column <= 26):
+                    raise card.error(f"there is no weight ({row}, {column}) of 26 parameters")
+                weights[min(row, column) - 1, max(row, column) - 1] = card.real(start + 4, start + 15)
+    return np.triu(weights) + np.triu(weights, 1).T
+
+
+def _row(cards: Cards, count: int) -> list[float]:
+    values: list[float] = []
+    while len(values) < count:
+        values += cards.take("card 19 (weights of parameters)").reals(1, 12, 6)
+    return values[:count]
+
+
+def _matrix(card: Card, first: int, width: int) -> Floats:
+    return _symmetric(card, card.reals(first, width, 3))
+
+
+def _symmetric(card: Card, values: list[float]) -> Floats:
+    first, second, cross = values
+    if not (first > 0 and second > 0 and first * second > cross * cross):
+        raise card.error("the weight matrix is not positive definite")
+    return np.array([[first, cross], [cross, second]])
+
+
+def _rejections(cards: Cards) -> tuple[set[str], set[str]]:
+    stars: set[str] = set()
+    points: set[str] = set()
+    while True:
+        card = cards.take("a rejection card")
+        number = card.integer(1, 6)
+        (stars if number < _FIRST_POINT else points).add(str(number))
+        if len(stars) > _MOST_STARS:
+            raise card.error(f"too many rejected stars: {_MOST_STARS} at the most")
+        if len(points) > _MOST_POINTS:
+            raise card.error(f"too many rejected plate points: {_MOST_POINTS} at the most")
+        if card.integer(18, 18):
+            return stars, points
+
+
+def _minimum(cards: Cards, count: int) -> tuple[str, ...]:
+    numbers: list[int] = []
+    while len(numbers) < count:
+        card = cards.take("the stars of the minimum solution")
+        numbers += [card.integer(start, start + 3) for start in range(1, 80, 4)]
+    if 0 in numbers[:count]:
+        raise card.error("incorrect stars specified for minimum solution: a star without a number")
+    return tuple(str(number) for number in numbers[:count])
+
+
+def _sidereal(card: Card, column: int) -> float:
+    hours, minutes = card.real(column, column + 2, 0), card.real(column + 3, column + 5, 0)
+    return (hours + minutes / 60 + card.real(column + 6, column + 13, 4) / 3600) * _HOUR
+
+
+def _factor(card: Card) -> float:
+    words = card.text[32:71].split()
+    try:
+        return float(words[-1]) if words else 0.0
+    except ValueError:
+        raise card.error(f"the factor of the movement test is not a number: {words[-1]!r}") from None
+
+
+def _data(cards: Cards, common: _Common) -> _Data:
+    data, last = _Data(), False
+    while not last:
+        card = cards.take("a star card")
+        number, count = card.integer(61, 66), card.integer(69, 71)
+        star = str(abs(number))
+        if star in data.ids:
+            raise card.error(f"star {star} is in the deck twice")
+        if count < 1:
+            raise card.error(f"star {star} has no images")
+        data.ids.append(star)
+        data.names.append(card.name(72, 77) or star)
+        data.places.append([card.real(1, 14), card.real(15, 28)])
+        data.weights.append(np.zeros((2, 2)) if number < 0 else _star_weight(card, common))
+        for _ in range(count):
+            last = _image(cards.take(f"an image of star {star}"), star, data, common)
+            if last and _ + 1 < count:
+                raise InputError(f"the last image of the deck is flagged, but star {star} has {count} images")
+    return data
+
+
+def _star_weight(card: Card, common: _Common) -> Floats:
+    if common.star_weight is not None:
+        return common.star_weight
+    weight = card.reals(29, 10, 3, 4)
+    # A weight that is not positive is what the program took for an unknown direction.
+    return _symmetric(card, weight) if weight[0] > 0 else np.zeros((2, 2))
+
+
+def _image(card: Card, star: str, data: _Data, common: _Common) -> bool:
+    if str(abs(card.integer(61, 66))) != star:
+        raise card.error(f"ERROR 1: star numbers disagree: the star card has {star}")
+    point = card.integer(55, 60)
+    trail = abs(point) % 1000
+    group = 0 if trail < common.post else 1 if trail < common.event else 2
+    weight = common.plate_weight
+    data.points.append(str(point))
+    data.stars.append(len(data.ids) - 1)
+    data.groups.append(group)
+    data.xy.append([card.real(1, 12, 10), card.real(13, 24, 10)])
+    data.image_weights.append(_symmetric(card, card.reals(25, 10, 3, 4)) if weight is None else weight)
+    data.times.append(card.real(67, 77, 8) + common.corrections[group])
+    return card.integer(80, 80) != 0

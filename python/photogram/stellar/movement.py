@@ -1,0 +1,168 @@
+"""Whether the camera has moved: plate points under its attitudes (NOAA TR NOS 55, equations 99 to 103)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram import _photocore
+from photogram.stellar.parameters import GROUPS
+
+if TYPE_CHECKING:
+    from photogram.stellar.result import Result
+
+__all__ = ["Movement", "movement", "pairs_to_combine"]
+
+Floats = NDArray[np.float64]
+
+_DIAGONAL = np.arange(9) * 0.01
+"""x = y of the fictitious points, metres."""
+PAIRS = ((0, 1), (1, 2), (0, 2))
+"""Post minus pre, event minus post, event minus pre."""
+
+
+@dataclass(frozen=True)
+class Movement:
+    """A fictitious point under two attitudes.
+
+    Attributes
+    ----------
+    first, second
+        The groups.
+    xy
+        x = y of the point, metres.
+    angle, mean_error
+        Angle between its two directions and its mean error, radians.
+    differences
+        Second minus first: right ascension times cos(declination), declination, azimuth times sin(zenith
+        distance), elevation; radians.
+    """
+
+    first: str
+    second: str
+    xy: float
+    angle: float
+    mean_error: float
+    differences: tuple[float, float, float, float]
+
+
+def movement(result: Result) -> tuple[Movement, ...]:
+    """Compare the directions of nine points on the diagonal under every two attitudes.
+
+    The mean error rests on the covariance of all parameters, in which both attitudes share the camera.
+    """
+    solved = [g for g in range(3) if result.solved.free[3 * g : 3 * g + 3].all()]
+    directions = {g: _directions(result, g) for g in solved}
+    cofactors = result.solved.cofactors
+    found = []
+    for first, second in PAIRS:
+        if first not in directions or second not in directions:
+            continue
+        (a, local_a, by_a), (b, local_b, by_b) = directions[first], directions[second]
+        for k, xy in enumerate(_DIAGONAL):
+            angle, row = _angle(a[k], b[k])
+            total = row @ np.vstack([by_a[k], by_b[k]])
+            error = result.mean_error * float(np.sqrt(total @ cofactors @ total))
+            found.append(
+                Movement(
+                    GROUPS[first],
+                    GROUPS[second],
+                    float(xy),
+                    angle,
+                    error,
+                    _differences(a[k], b[k], local_a[k], local_b[k]),
+                )
+            )
+    return tuple(found)
+
+
+def pairs_to_combine(test: tuple[Movement, ...], factor: float) -> tuple[tuple[str, str], ...]:
+    """Name the pairs whose directions of the plate's centre differ by less than `factor` mean errors."""
+    return tuple((m.first, m.second) for m in test if m.xy == 0 and m.angle < factor * m.mean_error)
+
+
+def _directions(result: Result, group: int) -> tuple[Floats, Floats, Floats]:
+    """Return places, azimuths and elevations of the points, and partials of the places by the parameters."""
+    problem, parameters = result.problem, result.solved.parameters
+    count = len(_DIAGONAL)
+    xy = np.column_stack([_DIAGONAL, _DIAGONAL])
+    time = np.full(count, problem.options.movement_time)
+    found = _photocore.plate_directions(
+        xy,
+        parameters[3 * group : 3 * group + 3],
+        parameters[9:22],
+        problem.options.camera_kind,
+        tolerance=1e-15,
+        passes=100,
+    )
+    standard = found[:, :2]
+    places = problem.site.places(standard, time, parameters[22:])
+    azimuth = np.arctan2(-standard[:, 1], -standard[:, 0])
+    elevation = np.arctan2(1.0, np.hypot(standard[:, 0], standard[:, 1]))
+    equations = _equations(result, group, xy, places, time)
+    rows = np.zeros((count, 2, len(parameters)))
+    rows[:, :, 3 * group : 3 * group + 3] = equations["pointing"]
+    rows[:, :, 9:] = equations["common"]
+    # The image stays where it is: B_x d(place) = -B_o d(parameters).
+    local = np.column_stack([azimuth, elevation])
+    return places, local, np.asarray(-np.linalg.solve(equations["star"], rows), float)
+
+
+def _equations(result: Result, group: int, xy: Floats, places: Floats, time: Floats) -> dict[str, Floats]:
+    parameters, count = result.solved.parameters, len(xy)
+    unit = np.broadcast_to(np.eye(2), (count, 2, 2)).copy()
+    index = np.arange(count)
+    return _photocore.StellarProblem(
+        station=result.problem.site.core,
+        camera=result.problem.options.camera_kind,
+        pointings=parameters[:9].reshape(3, 3),
+        common=parameters[9:],
+        fixed=[False] * len(parameters),
+        weighted=np.zeros(0, np.int64),
+        weighted_values=np.zeros(0),
+        weight_root=np.zeros((0, 0)),
+        star_places=places,
+        star_catalogue=places,
+        star_weights=np.zeros((count, 2, 2)),
+        star_fixed=[False] * count,
+        image_stars=index,
+        image_pointings=np.full(count, group),
+        image_xy=xy,
+        image_weights=unit,
+        image_times=time,
+        image_shifts=np.zeros((count, 2)),
+        axis=None,
+    ).equations()
+
+
+def _angle(a: Floats, b: Floats) -> tuple[float, Floats]:
+    """Return the angle between two directions, and its partials by both (equations 100 and 102).
+
+    Directions that coincide have no partials; those of a movement along the meridian stand for them.
+    """
+    (sa, ca), (sb, cb) = (np.sin(a[1]), np.cos(a[1])), (np.sin(b[1]), np.cos(b[1]))
+    sd, cd = np.sin(b[0] - a[0]), np.cos(b[0] - a[0])
+    across, along = cb * sd, ca * sb - sa * cb * cd
+    sine = float(np.hypot(across, along))
+    angle = float(np.arctan2(sine, sa * sb + ca * cb * cd))
+    if sine < 0.5e-11:
+        return angle, np.array([0.0, -1.0, 0.0, 1.0])
+    # d cos(angle) = -sin(angle) d angle
+    by_ra = ca * cb * sd / sine
+    return angle, np.array([-by_ra, (sa * cb * cd - ca * sb) / sine, by_ra, (cb * -sa + sb * ca * cd) / sine])
+
+
+def _differences(a: Floats, b: Floats, local_a: Floats, local_b: Floats) -> tuple[float, float, float, float]:
+    def turn(angle: float) -> float:
+        return float(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
+
+    zenith = np.cos(local_a[1])
+    return (
+        turn(b[0] - a[0]) * float(np.cos(a[1])),
+        float(b[1] - a[1]),
+        turn(local_b[0] - local_a[0]) * float(zenith),
+        float(local_b[1] - local_a[1]),
+    )

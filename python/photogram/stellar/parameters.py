@@ -1,0 +1,38 @@
+"""The parameters of a calibration: names, units, order (NOAA TR NOS 55, section 4 of its specification)."""
+
+from __future__ import annotations
+
+import math
+
+__all__ = ["ARCSEC", "COMMON", "GRAD", "GROUPS", "INDEX", "NAMES", "TAU", "UNITS"]
+
+ARCSEC = math.pi / 648000.0
+"""One second of arc in radians."""
+GRAD = math.pi / 200.0
+"""One grad in radians."""
+
+GROUPS = ("pre", "post", "event")
+"""The groups of images of one plate, each with an attitude of its own."""
+
+_INTERIOR = ("epsilon", "xp", "yp", "cx", "cy", "dx", "dy", "K1", "K2", "K3", "K4", "K5", "phi_T")
+TAU = ("tau1", "tau2", "tau3", "tau4")
+COMMON = (*_INTERIOR, *TAU)
+"""What all images share, in the order of the numerical core."""
+
+NAMES = (*(f"{angle}_{group}" for group in GROUPS for angle in ("alpha", "omega", "kappa")), *COMMON)
+"""All parameters in order: 22 of orientation and camera, 4 of refraction."""
+
+INDEX = {name: index for index, name in enumerate(NAMES)}
+"""Place of each parameter."""
+
+UNITS = {
+    **dict.fromkeys([*NAMES[:9], "epsilon", "phi_T"], "rad"),
+    **dict.fromkeys(["xp", "yp", "cx", "cy", "dx", "dy"], "m"),
+    "K1": "m^-2",
+    "K2": "m^-4",
+    "K3": "m^-6",
+    "K4": "m^-1",
+    "K5": "m^-3",
+    **dict.fromkeys(TAU, "arcsec"),
+}
+"""Unit of each parameter."""

@@ -1,0 +1,93 @@
+"""Apparent places and sidereal time of today's skies, by `pyerfa` (extra `stars`)."""
+
+from __future__ import annotations
+
+import re
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.errors import InputError
+from photogram.stellar.catalogue import Catalogue
+from photogram.stellar.parameters import ARCSEC
+from photogram.stellar.sky import Site
+
+__all__ = ["apparent_places", "sidereal_time"]
+
+Floats = NDArray[np.float64]
+
+_UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:\.\d*)?)Z?")
+
+
+def _utc(text: str) -> tuple[float, float]:
+    import erfa
+
+    match = _UTC.fullmatch(text.strip())
+    if match is None:
+        raise InputError(f"{text!r} is not a UTC time such as 2024-03-01T21:03:05.25")
+    year, month, day, hour, minute = (int(part) for part in match.groups()[:5])
+    first, second = erfa.dtf2d("UTC", year, month, day, hour, minute, float(match[6]))
+    return float(first), float(second)
+
+
+def apparent_places(catalogue: Catalogue, utc: str) -> Floats:
+    """Return geocentric apparent places of a catalogue (true equator and equinox of date).
+
+    Proper motion, parallax, light deflection, annual aberration, precession and nutation (IAU 2006/2000A).
+
+    Parameters
+    ----------
+    catalogue
+        The stars.
+    utc
+        Such as 2024-03-01T21:03:05.25.
+
+    Returns
+    -------
+    (N, 2) right ascension and declination, radians.
+    """
+    import erfa
+
+    tt = erfa.taitt(*erfa.utctai(*_utc(utc)))
+    ra, dec = catalogue.places.T
+    pm_ra = catalogue.proper_motions[:, 0] / np.cos(dec)
+    # erfa.atciq takes places of 2000.0 and parallaxes in seconds of arc.
+    epoch = erfa.epj2jd(catalogue.epoch)
+    with warnings.catch_warnings():
+        # Parallaxes of zero stand for stars that are far; erfa remarks on each.
+        warnings.simplefilter("ignore", erfa.ErfaWarning)
+        moved = erfa.pmsafe(
+            ra,
+            dec,
+            pm_ra,
+            catalogue.proper_motions[:, 1],
+            catalogue.parallaxes / ARCSEC,
+            0.0,
+            *epoch,
+            2451545.0,
+            0.0,
+        )
+    # Precession and nutation once for all stars.
+    astrometry, origins = erfa.apci13(*tt)
+    right, declination = erfa.atciq(*moved, astrometry)
+    return np.column_stack([erfa.anp(right - origins), declination])
+
+
+def sidereal_time(site: Site, utc: str, dut1: float = 0.0) -> float:
+    """Return local apparent sidereal time in radians.
+
+    Parameters
+    ----------
+    site
+        The station; its west longitude counts.
+    utc
+        Such as 2024-03-01T21:03:05.25.
+    dut1
+        UT1 - UTC in seconds; one second is 15 arcsec of attitude, the same for all exposures of a night.
+    """
+    import erfa
+
+    time = _utc(utc)
+    tt = erfa.taitt(*erfa.utctai(*time))
+    return float(erfa.anp(erfa.gst06a(*erfa.utcut1(*time, dut1), *tt) - site.longitude_west))

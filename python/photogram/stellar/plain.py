@@ -1,0 +1,261 @@
+"""The plain form of a calibration: options in TOML, stars and images in CSV (`docs/stellar-camera.md`)."""
+
+from __future__ import annotations
+
+import csv
+import math
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.errors import InputError
+from photogram.stellar.options import Options
+from photogram.stellar.parameters import ARCSEC, GRAD, GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.problem import Axis, Problem, default_parameters
+from photogram.stellar.rejection import rejected
+from photogram.stellar.sky import ABERRATION, Air, Site
+
+__all__ = ["read_plain"]
+
+Floats = NDArray[np.float64]
+
+_OPTIONS: dict[str, Callable[[Any], Any]] = {
+    "common_scale": bool,
+    "refraction": bool,
+    "minimum_stars": lambda value: tuple(str(star) for star in value),
+    "pre_run": bool,
+    "curves": bool,
+    "plate_list": bool,
+    "max_iterations_minimum": int,
+    "max_iterations": int,
+    "mean_error": float,
+    "histogram": bool,
+    "tolerance": float,
+    "refraction_tolerance_arcsec": float,
+    "distortion_tolerance": float,
+    "movement_factor": float,
+    "movement_time": float,
+    "crossover": float,
+    "interval": float,
+    "extent": float,
+    "distortion_first": float,
+    "as_published": bool,
+}
+_TABLES = {
+    "labels",
+    "station",
+    "reference",
+    "pole",
+    "camera",
+    "weights",
+    "axis",
+    "options",
+    "stars",
+    "images",
+    "reject",
+}
+
+
+def read_plain(path: Path) -> Problem:
+    """Read a calibration in plain form.
+
+    Parameters
+    ----------
+    path
+        The TOML file; it names the CSV files of stars and images, relative to itself.
+
+    Raises
+    ------
+    InputError
+        What cannot be used, with the file, and the record of a CSV file.
+    OSError
+        A file cannot be read.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(error), file=path) from None
+    unknown = sorted(set(document) - _TABLES)
+    if unknown:
+        raise InputError(f"there is no table {', '.join(unknown)}", file=path)
+    try:
+        return _problem(document, path)
+    except KeyError as error:
+        raise InputError(f"{error.args[0]} is missing", file=path) from None
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(str(error), file=path) from None
+
+
+def _problem(document: dict[str, Any], path: Path) -> Problem:
+    site = _site(document["station"])
+    initial, fixed = _camera(document["camera"])
+    stars, images = document["stars"], document["images"]
+    star_rows = _rows(path.parent / stars["file"], {"star", "ra_rad", "dec_rad"})
+    image_rows = _rows(path.parent / images["file"], {"star", "point", "x_m", "y_m", "sidereal_time_rad"})
+    ids = tuple(row["star"] for row in star_rows)
+    place = {star: i for i, star in enumerate(ids)}
+    if len(place) != len(ids):
+        raise InputError("a star is listed twice", file=path.parent / stars["file"])
+    for number, row in enumerate(image_rows, 2):
+        if row["star"] not in place:
+            raise InputError(
+                f"ERROR 1: star {row['star']} is not listed",
+                file=path.parent / images["file"],
+                record=number,
+                text=",".join(row.values()),
+            )
+    problem = Problem(
+        site=site,
+        star_ids=ids,
+        star_names=tuple(row.get("name") or row["star"] for row in star_rows),
+        star_places=np.array([[float(row["ra_rad"]), float(row["dec_rad"])] for row in star_rows]).reshape(
+            -1, 2
+        ),
+        star_weights=np.array([_star_weight(row, stars.get("weight")) for row in star_rows]).reshape(
+            -1, 2, 2
+        ),
+        image_points=tuple(row["point"] for row in image_rows),
+        image_stars=np.array([place[row["star"]] for row in image_rows], np.int64),
+        image_groups=np.array([_group(row, images) for row in image_rows], np.int64),
+        image_xy=np.array([[float(row["x_m"]), float(row["y_m"])] for row in image_rows]).reshape(-1, 2),
+        image_weights=np.array([_weight(row, images.get("weight")) for row in image_rows]).reshape(-1, 2, 2),
+        image_times=np.array([_time(row, images) for row in image_rows]),
+        initial=initial,
+        parameter_weights=_parameter_weights(document.get("weights", {})),
+        fixed=fixed,
+        axis=_axis(document["axis"]) if "axis" in document else None,
+        options=_options(document),
+        labels={name: str(value) for name, value in document.get("labels", {}).items()},
+    )
+    reject = document.get("reject", {})
+    return rejected(
+        problem, {str(s) for s in reject.get("stars", [])}, {str(p) for p in reject.get("points", [])}
+    )
+
+
+def _rows(path: Path, needed: set[str]) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        reader = csv.DictReader(file)
+        missing = sorted(needed - set(reader.fieldnames or []))
+        if missing:
+            raise InputError(f"the columns {', '.join(missing)} are missing", file=path, record=1)
+        rows = list(reader)
+    for number, row in enumerate(rows, 2):
+        for name, value in row.items():
+            if name.endswith(("_rad", "_m")) or name.startswith("weight_"):
+                try:
+                    float(value or "0")
+                except ValueError:
+                    raise InputError(
+                        f"{name}: {value!r} is not a number",
+                        file=path,
+                        record=number,
+                        text=",".join(row.values()),
+                    ) from None
+    return rows
+
+
+def _site(table: dict[str, Any]) -> Site:
+    return Site(
+        latitude=math.radians(table["latitude_deg"]),
+        longitude_west=math.radians(table.get("longitude_west_deg", 0.0)),
+        elevation=table.get("elevation_m", 0.0),
+        air=Air(table.get("temperature_K", 273.15), table.get("pressure_mmHg", 760.0)),
+        aberration=table["aberration_arcsec"] * ARCSEC if "aberration_arcsec" in table else ABERRATION,
+        number=str(table.get("number", "")),
+        name=str(table.get("name", "")),
+    )
+
+
+def _camera(table: dict[str, Any]) -> tuple[Floats, NDArray[np.bool_]]:
+    """Read initial values: angles in grads, all else in the units of the parameters."""
+    table = dict(table)
+    fixed = np.zeros(len(NAMES), bool)
+    for name in table.pop("fixed", []):
+        fixed[_index(name)] = True
+    parameters = default_parameters(float(table["cx"]))
+    for angle in ("alpha", "omega", "kappa"):
+        if angle in table:
+            value = table.pop(angle)
+            for group in GROUPS:
+                table.setdefault(f"{angle}_{group}", value)
+    for name, value in table.items():
+        parameters[_index(name)] = float(value) * (GRAD if UNITS[name] == "rad" else 1.0)
+    return parameters, fixed
+
+
+def _index(name: str) -> int:
+    if name not in INDEX:
+        raise ValueError(f"there is no parameter {name!r}; there are {', '.join(NAMES)}")
+    return INDEX[name]
+
+
+def _parameter_weights(table: dict[str, Any]) -> Floats:
+    """Read weights, angles in radians: `name = w`, or `pairs = [[name, name, w], ...]`."""
+    table = dict(table)
+    weights = np.zeros((len(NAMES), len(NAMES)))
+    for first, second, value in table.pop("pairs", []):
+        weights[_index(first), _index(second)] = weights[_index(second), _index(first)] = value
+    for name, value in table.items():
+        weights[_index(name), _index(name)] = value
+    return weights
+
+
+def _weight(row: dict[str, str], common: list[float] | None) -> Floats:
+    names = ("weight_xx", "weight_yy", "weight_xy")
+    xx, yy, xy = common if common is not None else [float(row.get(name) or 0) for name in names]
+    return np.array([[xx, xy], [xy, yy]])
+
+
+def _star_weight(row: dict[str, str], common: list[float] | None) -> Floats:
+    if row.get("unknown", "").strip() in ("1", "true", "yes"):
+        return np.zeros((2, 2))
+    names = ("weight_ra", "weight_dec", "weight_cross")
+    aa, dd, ad = common if common is not None else [float(row.get(name) or 0) for name in names]
+    return np.array([[aa, ad], [ad, dd]])
+
+
+def _group(row: dict[str, str], images: dict[str, Any]) -> int:
+    """Take the column `orientation`, else the number of the point as in the deck."""
+    if row.get("orientation"):
+        return GROUPS.index(row["orientation"])
+    trail = abs(int(row["point"])) % 1000
+    return 0 if trail < images.get("first_post", 500) else 1 if trail < images.get("first_event", 900) else 2
+
+
+def _time(row: dict[str, str], images: dict[str, Any]) -> float:
+    corrections = images.get("time_corrections_rad", [0.0, 0.0, 0.0])
+    return float(row["sidereal_time_rad"]) + float(corrections[_group(row, images)])
+
+
+def _axis(table: dict[str, Any]) -> Axis:
+    xx, yy, xy = table["weight"]
+    return Axis(
+        azimuth=math.radians(table["azimuth_deg"]),
+        zenith_distance=math.radians(table["zenith_distance_deg"]),
+        xy=np.array([table.get("x_m", 0.0), table.get("y_m", 0.0)]),
+        weight=np.array([[xx, xy], [xy, yy]]),
+        group=GROUPS.index(table.get("orientation", "event")),
+    )
+
+
+def _options(document: dict[str, Any]) -> Options:
+    table = document.get("options", {})
+    unknown = sorted(set(table) - set(_OPTIONS))
+    if unknown:
+        raise ValueError(f"there is no option {', '.join(unknown)}")
+    values = {name: _OPTIONS[name](value) for name, value in table.items()}
+    if "refraction_tolerance_arcsec" in values:
+        values["refraction_tolerance"] = values.pop("refraction_tolerance_arcsec") * ARCSEC
+    pole = document.get("pole", {})
+    return Options(
+        reference=_site(document["reference"]) if "reference" in document else None,
+        pole=(pole.get("x_arcsec", 0.0) * ARCSEC, pole.get("y_arcsec", 0.0) * ARCSEC),
+        **values,
+    )

@@ -1,0 +1,218 @@
+"""A calibration as it is known beforehand: stars, images, parameters and their weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram import _photocore
+from photogram.errors import InputError
+from photogram.stellar.options import Options
+from photogram.stellar.parameters import INDEX, NAMES
+from photogram.stellar.sky import TAU, Site
+
+__all__ = ["Axis", "Problem", "default_parameters"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+def default_parameters(principal_distance: float) -> Floats:
+    """Return parameters of an undistorted camera that looks at the zenith, (26,)."""
+    parameters = np.zeros(len(NAMES))
+    parameters[[INDEX["cx"], INDEX["cy"]]] = principal_distance
+    parameters[-4:] = TAU
+    return parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """A direction of the camera known from outside (option 2, equation 72).
+
+    Attributes
+    ----------
+    azimuth
+        From south, positive west; radians.
+    zenith_distance
+        Radians, neither refracted nor aberrated.
+    xy
+        (2,) plate coordinates of its image, metres.
+    weight
+        (2, 2) weight matrix of these.
+    group
+        0 pre, 1 post, 2 event.
+    """
+
+    azimuth: float
+    zenith_distance: float
+    xy: Floats
+    weight: Floats
+    group: int = 2
+
+    @property
+    def standard(self) -> tuple[float, float]:
+        """Xi and eta."""
+        tangent = np.tan(self.zenith_distance)
+        return (-tangent * np.cos(self.azimuth), -tangent * np.sin(self.azimuth))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A calibration of S stars and m images.
+
+    Angles are radians, lengths metres; weights are for one unit weight (m0^2 times the inverse covariance).
+
+    Attributes
+    ----------
+    site
+        Where the camera stands.
+    star_ids, star_places, star_weights
+        (S,) numbers, (S, 2) apparent right ascension and declination, (S, 2, 2) weights: zero for directions
+        that are not known, infinite for places that are held.
+    image_points, image_stars, image_groups, image_xy, image_weights, image_times
+        (m,) point numbers, (m,) index of the star, (m,) 0 pre, 1 post, 2 event, (m, 2) plate coordinates of
+        the diapositive, (m, 2, 2) weights, (m,) local apparent sidereal time.
+    initial
+        (26,) parameters in the order of :data:`photogram.stellar.parameters.NAMES`.
+    parameter_weights
+        (26, 26) weights of these values.
+    fixed
+        (26,) which parameters are held.
+    axis
+        Direction of the axis, if known.
+    star_names
+        (S,) catalogue numbers.
+    options
+        How to adjust and what to compute.
+    labels
+        What a listing says at its head: title, problem, event, camera, plate and so on.
+    """
+
+    site: Site
+    star_ids: tuple[str, ...]
+    star_places: Floats
+    star_weights: Floats
+    image_points: tuple[str, ...]
+    image_stars: Indices
+    image_groups: Indices
+    image_xy: Floats
+    image_weights: Floats
+    image_times: Floats
+    initial: Floats
+    parameter_weights: Floats = field(default_factory=lambda: np.zeros((len(NAMES), len(NAMES))))
+    fixed: Bools = field(default_factory=lambda: np.zeros(len(NAMES), bool))
+    axis: Axis | None = None
+    star_names: tuple[str, ...] = ()
+    options: Options = field(default_factory=Options)
+    labels: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        stars, images = len(self.star_ids), len(self.image_points)
+        shapes = {
+            "star_places": (stars, 2),
+            "star_weights": (stars, 2, 2),
+            "image_stars": (images,),
+            "image_groups": (images,),
+            "image_xy": (images, 2),
+            "image_weights": (images, 2, 2),
+            "image_times": (images,),
+            "initial": (len(NAMES),),
+            "parameter_weights": (len(NAMES), len(NAMES)),
+            "fixed": (len(NAMES),),
+        }
+        for name, shape in shapes.items():
+            array = getattr(self, name)
+            if array.shape != shape:
+                raise InputError(f"{name} has the shape {array.shape}, not {shape}")
+            if name not in ("star_weights", "fixed") and not np.isfinite(array).all():
+                raise InputError(f"{name} holds what is not a number")
+        if images and not (
+            self.image_stars.min() >= 0
+            and self.image_stars.max() < stars
+            and set(self.image_groups) <= {0, 1, 2}
+        ):
+            raise InputError("an image names a star or a group that is not there")
+        if np.isnan(self.star_weights).any():
+            raise InputError("star_weights holds what is not a number")
+
+    @property
+    def known(self) -> Bools:
+        """(S,) which stars have a place of the catalogue."""
+        return self.star_weights[:, 0, 0] > 0
+
+    @property
+    def held(self) -> Bools:
+        """(S,) which stars are held at their places."""
+        return np.isinf(self.star_weights[:, 0, 0])
+
+    @property
+    def weighted(self) -> Bools:
+        """(26,) which parameters have weight."""
+        return np.diag(self.parameter_weights) > 0
+
+    def without(self, stars: Bools, images: Bools) -> Problem:
+        """Return the problem without some stars and images, and without stars that have no image left."""
+        keep_images = ~(images | stars[self.image_stars])
+        keep = ~stars & np.isin(np.arange(len(self.star_ids)), self.image_stars[keep_images])
+        place = np.cumsum(keep) - 1
+        names = self.star_names or self.star_ids
+        return replace(
+            self,
+            star_ids=_chosen(self.star_ids, keep),
+            star_names=_chosen(names, keep),
+            star_places=self.star_places[keep],
+            star_weights=self.star_weights[keep],
+            image_points=_chosen(self.image_points, keep_images),
+            image_stars=place[self.image_stars[keep_images]],
+            image_groups=self.image_groups[keep_images],
+            image_xy=self.image_xy[keep_images],
+            image_weights=self.image_weights[keep_images],
+            image_times=self.image_times[keep_images],
+        )
+
+    def core(self, parameters: Floats, places: Floats, fixed: Bools) -> _photocore.StellarProblem:
+        """Return the problem as the core takes it, at given values."""
+        weighted = np.flatnonzero(self.weighted & ~fixed)
+        block = self.parameter_weights[np.ix_(weighted, weighted)]
+        held = self.held
+        weights = np.where(held[:, None, None], 0.0, self.star_weights)
+        return _photocore.StellarProblem(
+            station=self.site.core,
+            camera=self.options.camera_kind,
+            pointings=parameters[:9].reshape(3, 3),
+            common=parameters[9:],
+            fixed=fixed.tolist(),
+            weighted=weighted.astype(np.int64),
+            weighted_values=self.initial[weighted],
+            weight_root=weight_root(block, [NAMES[i] for i in weighted]),
+            star_places=places,
+            star_catalogue=self.star_places,
+            star_weights=weights,
+            star_fixed=held.tolist(),
+            image_stars=self.image_stars,
+            image_pointings=self.image_groups,
+            image_xy=self.image_xy,
+            image_weights=self.image_weights,
+            image_times=self.image_times,
+            image_shifts=np.zeros_like(self.image_xy),
+            axis=None
+            if self.axis is None
+            else (self.axis.group, self.axis.standard, self.axis.xy.tolist(), self.axis.weight.tolist()),
+        )
+
+
+def weight_root(weights: Floats, names: list[str]) -> Floats:
+    """Return R of P = R^T R, scaled on the way because parameters differ by many orders of magnitude."""
+    scale = np.sqrt(np.diag(weights))
+    try:
+        lower = np.linalg.cholesky(weights / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        raise InputError(f"the weight matrix of {', '.join(names)} is not positive definite") from None
+    return np.ascontiguousarray(lower.T * scale)
+
+
+def _chosen(names: tuple[str, ...], keep: Bools) -> tuple[str, ...]:
+    return tuple(name for name, kept in zip(names, keep, strict=True) if kept)

@@ -1,0 +1,206 @@
+"""A calibrated camera with its covariance, and what the stars and their images say about it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.messages import Message
+from photogram.stellar.combination import Combined
+from photogram.stellar.counts import Counts
+from photogram.stellar.movement import Movement
+from photogram.stellar.parameters import INDEX, NAMES
+from photogram.stellar.problem import Problem
+from photogram.stellar.state import Level, Solved
+
+__all__ = ["Ellipse", "PreRun", "Result", "ellipse"]
+
+Floats = NDArray[np.float64]
+
+CORRELATED = 0.95
+"""Correlations above this are named."""
+SIGNIFICANT = 1.96
+"""Distortion terms below this multiple of their mean error are named (5 % of error)."""
+DISTORTION = ("K1", "K2", "K3", "K4", "K5")
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """A mean error ellipse on the sphere.
+
+    Attributes
+    ----------
+    major, minor
+        Half axes, radians.
+    direction
+        Of the major axis, from increasing right ascension towards increasing declination, radians.
+    """
+
+    major: float
+    minor: float
+    direction: float
+
+
+def ellipse(covariance: Floats, declination: float) -> Ellipse:
+    """Return the mean error ellipse of a covariance of right ascension and declination (section 5.7)."""
+    turned = np.diag([math.cos(declination), 1.0])
+    values, vectors = np.linalg.eigh(turned @ covariance @ turned)
+    minor, major = (math.sqrt(max(float(value), 0.0)) for value in values)
+    return Ellipse(major, minor, math.atan2(vectors[1, 1], vectors[0, 1]) % math.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class PreRun:
+    """Images that took no part in the minimum solution (option 7).
+
+    Attributes
+    ----------
+    points, stars
+        Their numbers, and those of their stars.
+    residuals
+        (m, 2) computed minus measured, metres.
+    """
+
+    points: tuple[str, ...]
+    stars: tuple[str, ...]
+    residuals: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A calibration.
+
+    Residuals are computed minus measured (the report's v), for stars adjusted minus catalogue: what has to be
+    added to an observation. Covariances are cofactors times the square of `mean_error`.
+
+    Attributes
+    ----------
+    problem
+        What was adjusted.
+    solved
+        Parameters, places, cofactors, residuals.
+    counts
+        Observations and unknowns.
+    messages
+        Remarks that did not stop the run.
+    given
+        The whole problem, where only the minimum solution was computed.
+    pre_run
+        Residuals of the images that took no part, if a pre-run was asked for.
+    movement
+        The movement test, if asked for.
+    combined
+        The combined solution, if attitudes do not differ.
+    """
+
+    problem: Problem
+    solved: Solved
+    counts: Counts
+    messages: tuple[Message, ...]
+    given: Problem
+    pre_run: PreRun | None = None
+    movement: tuple[Movement, ...] = ()
+    combined: Combined | None = None
+
+    @property
+    def converged(self) -> bool:
+        """Whether the last solution ended by its criterion."""
+        return self.solved.converged
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """The history."""
+        return self.solved.levels
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Observations minus unknowns."""
+        return self.counts.degrees_of_freedom
+
+    @property
+    def computed_mean_error(self) -> float:
+        """Mean error of unit weight from the residuals, metres for unit plate weight."""
+        return math.sqrt(sum(self.solved.sums) / self.counts.usable)
+
+    @property
+    def mean_error(self) -> float:
+        """Mean error of unit weight in use: the given one (option 14), or the computed one."""
+        return self.problem.options.mean_error or self.computed_mean_error
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Adjusted parameters by name; radians, metres, seconds of arc."""
+        return dict(zip(NAMES, self.solved.parameters.tolist(), strict=True))
+
+    @property
+    def estimated(self) -> list[str]:
+        """Names of the parameters that were estimated."""
+        return [name for name, free in zip(NAMES, self.solved.free, strict=True) if free]
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(26, 26) of all parameters; zero for what was not estimated."""
+        return self.mean_error**2 * self.solved.cofactors
+
+    @property
+    def mean_errors(self) -> dict[str, float]:
+        """Mean errors of the parameters by name."""
+        return dict(zip(NAMES, np.sqrt(np.maximum(np.diag(self.covariance), 0)).tolist(), strict=True))
+
+    @cached_property
+    def correlation(self) -> Floats:
+        """(26, 26) correlations; zero for what was not estimated."""
+        sd = np.sqrt(np.maximum(np.diag(self.covariance), 0))
+        scale = np.where(sd > 0, 1.0 / np.where(sd > 0, sd, 1.0), 0.0)
+        return np.asarray(self.covariance * np.outer(scale, scale), float)
+
+    @property
+    def star_residuals(self) -> Floats:
+        """(S, 2) adjusted minus catalogue right ascension and declination, radians."""
+        return self.solved.places - self.problem.star_places
+
+    @property
+    def star_covariances(self) -> Floats:
+        """(S, 2, 2) of the adjusted places, radians squared, scaled by `mean_error`."""
+        return self.mean_error**2 * self.solved.star_cofactors
+
+    @property
+    def standardized(self) -> Floats:
+        """(m, 2) residuals over their mean errors."""
+        return self.solved.standardized / self.mean_error
+
+    @property
+    def star_standardized(self) -> Floats:
+        """(S, 2) residuals of the catalogue places over their mean errors."""
+        return self.solved.star_standardized / self.mean_error
+
+    def ellipses(self) -> list[Ellipse]:
+        """Return the mean error ellipse of every star."""
+        pairs = zip(self.star_covariances, self.solved.places, strict=True)
+        return [ellipse(covariance, place[1]) for covariance, place in pairs]
+
+    def correlated(self) -> list[tuple[str, str, float]]:
+        """Name pairs of parameters whose correlation exceeds 0.95."""
+        rows, columns = np.nonzero(np.triu(np.abs(self.correlation) > CORRELATED, 1))
+        return [
+            (NAMES[i], NAMES[j], float(self.correlation[i, j])) for i, j in zip(rows, columns, strict=True)
+        ]
+
+    def significance(self) -> dict[str, float]:
+        """Return each estimated distortion coefficient over its mean error."""
+        errors = self.mean_errors
+        return {
+            name: abs(self.parameters[name]) / errors[name]
+            for name in DISTORTION
+            if self.solved.free[INDEX[name]] and errors[name] > 0
+        }
+
+    def doubtful(self) -> list[str]:
+        """Name what the stars hardly determine: correlations, distortion terms that are not significant."""
+        found = [f"correlation of {a} and {b}: {r:+.4f}" for a, b, r in self.correlated()]
+        weak = [f"{name} ({t:.1f} mean errors)" for name, t in self.significance().items() if t < SIGNIFICANT]
+        return found + ([f"distortion terms that are not significant: {', '.join(weak)}"] if weak else [])

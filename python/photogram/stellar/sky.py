@@ -1,0 +1,132 @@
+"""The sky over a station: refraction, aberration, standard coordinates (NOAA TR NOS 55, equations 1 to 18).
+
+Local coordinates are left-handed: xi north, eta east, zenith. Azimuths count from south, positive west; hour
+angles are positive west; longitudes are positive west.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram import _photocore
+from photogram.stellar.parameters import ARCSEC
+
+__all__ = ["ABERRATION", "TAU", "Air", "Site", "refraction"]
+
+Floats = NDArray[np.float64]
+
+TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)
+"""Coefficients of refraction in seconds of arc, the report's fit to Garfinkel's tables."""
+ABERRATION = 0.320 * ARCSEC
+"""Constant of diurnal aberration at the equator as the report has it, in radians; 0.3192 arcsec is nearer."""
+
+
+@dataclass(frozen=True)
+class Air:
+    """Air at the station.
+
+    Attributes
+    ----------
+    temperature
+        Kelvin.
+    pressure
+        Millimetres of mercury; 0 for no refraction.
+    """
+
+    temperature: float = 273.15
+    pressure: float = 760.0
+
+
+def refraction(
+    zenith_distances: ArrayLike, air: Air | None = None, *, tau: ArrayLike = TAU, observed: bool = False
+) -> Floats:
+    """Return refraction (true minus observed zenith distance; equations 7 to 11).
+
+    Parameters
+    ----------
+    zenith_distances
+        (n,) radians.
+    air
+        Of the station; 0 degrees Celsius and one atmosphere when None.
+    tau
+        (4,) coefficients in seconds of arc.
+    observed
+        Whether the zenith distances are observed ones; else they are true.
+
+    Returns
+    -------
+    (n,) radians.
+    """
+    air = air or Air()
+    return _photocore.refraction(
+        np.atleast_1d(np.asarray(zenith_distances, float)),
+        air.temperature,
+        air.pressure,
+        np.asarray(tau, float),
+        observed,
+    )
+
+
+@dataclass(frozen=True)
+class Site:
+    """A station under the sky.
+
+    Attributes
+    ----------
+    latitude
+        Radians, positive north.
+    longitude_west
+        Radians, positive west.
+    elevation
+        Metres.
+    air
+        Its air.
+    aberration
+        Constant of diurnal aberration at the equator, radians.
+    number, name
+        As the station is called.
+    """
+
+    latitude: float
+    longitude_west: float = 0.0
+    elevation: float = 0.0
+    air: Air = field(default_factory=Air)
+    aberration: float = ABERRATION
+    number: str = ""
+    name: str = ""
+
+    @property
+    def core(self) -> tuple[float, float, float, float]:
+        """Latitude, aberration, temperature and pressure as the core takes them."""
+        return (self.latitude, self.aberration, self.air.temperature, self.air.pressure)
+
+    def standard_coordinates(
+        self, places: ArrayLike, sidereal_times: ArrayLike, tau: ArrayLike = TAU
+    ) -> Floats:
+        """Return refracted standard coordinates xi, eta of apparent places.
+
+        Parameters
+        ----------
+        places
+            (n, 2) right ascension and declination, radians.
+        sidereal_times
+            (n,) local apparent sidereal time, radians.
+        tau
+            (4,) coefficients of refraction in seconds of arc.
+
+        Returns
+        -------
+        (n, 2) xi (north), eta (east); NaN at and below the horizon.
+        """
+        places = np.asarray(places, float)
+        times = np.ascontiguousarray(np.broadcast_to(np.asarray(sidereal_times, float), len(places)))
+        return _photocore.standard_coordinates(places, times, self.core, np.asarray(tau, float))
+
+    def places(self, standard: ArrayLike, sidereal_times: ArrayLike, tau: ArrayLike = TAU) -> Floats:
+        """Return apparent places of refracted standard coordinates, the inverse of `standard_coordinates`."""
+        standard = np.asarray(standard, float)
+        times = np.ascontiguousarray(np.broadcast_to(np.asarray(sidereal_times, float), len(standard)))
+        return _photocore.star_places(standard, times, self.core, np.asarray(tau, float))

@@ -1,0 +1,88 @@
+"""Values that an iteration has reached, and how it got there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Level", "Solved"]
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Level:
+    """One pass of an iteration.
+
+    Attributes
+    ----------
+    solution
+        `minimum`, `maximum` or `refraction`.
+    number
+        From 1.
+    level
+        Level of discrepancies before its correction, metres. As published: root of the sum of squares of the
+        plate discrepancies over the degrees of freedom, stars at their catalogue places. Else: root of the
+        whole weighted sum of squares over the degrees of freedom.
+    """
+
+    solution: str
+    number: int
+    level: float
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What an iteration returns.
+
+    Attributes
+    ----------
+    parameters
+        (26,) values.
+    places
+        (S, 2) adjusted places of the stars.
+    free
+        (26,) which parameters were estimated.
+    cofactors
+        (26, 26) for unit weight; zero for what was not.
+    star_cofactors
+        (S, 2, 2).
+    residuals
+        (m, 2) computed minus measured plate coordinates, metres.
+    redundancy, standardized
+        (m, 2) of the images.
+    star_redundancy, star_standardized
+        (S, 2) of the catalogue places; NaN where there is none.
+    axis_residual
+        Computed minus measured plate coordinates of the axis.
+    sums
+        Weighted sums of squares of plate, stars, parameters (with the axis).
+    stop
+        Why the iteration stopped.
+    converged
+        Whether by its criterion.
+    levels
+        The history.
+    remarks
+        What went on.
+    """
+
+    parameters: Floats
+    places: Floats
+    free: Bools
+    cofactors: Floats
+    star_cofactors: Floats
+    residuals: Floats
+    redundancy: Floats
+    standardized: Floats
+    star_redundancy: Floats
+    star_standardized: Floats
+    axis_residual: Floats | None
+    sums: tuple[float, float, float]
+    stop: str
+    converged: bool
+    levels: tuple[Level, ...]
+    remarks: tuple[str, ...] = field(default=())

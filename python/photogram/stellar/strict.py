@@ -1,0 +1,174 @@
+"""The strict iteration: exact partials, on the engine that serves all programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram import _photocore
+from photogram.errors import AdjustmentError
+from photogram.stellar.counts import degrees_of_freedom
+from photogram.stellar.parameters import NAMES
+from photogram.stellar.problem import Problem
+from photogram.stellar.reduction import reduce, undetermined
+from photogram.stellar.state import Level, Solved
+
+__all__ = ["iterate"]
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_EXPECTED = 1e-6
+"""Mean error of a direction to begin with, radians."""
+_ROUGH, _FINE = 1e-3, 1e-4
+_LIMIT = 100
+
+
+def iterate(
+    problem: Problem,
+    initial: Floats,
+    free: Bools,
+    *,
+    solution: str,
+    limit: int,
+    threads: int | None = None,
+    progress: Callable[..., None] | None = None,
+) -> Solved:
+    """Iterate to the least-squares solution.
+
+    Parameters that the initial values leave without effect (the centre of a distortion that is zero) join in
+    once the others have given them one. Weights are only known up to a factor, so a first solution finds the
+    mean error of unit weight, and a second one ends when no unknown changes by more than a ten-thousandth of
+    its standard deviation.
+
+    Raises
+    ------
+    AdjustmentError
+        Stars or parameters are not determined, or the initial values give no image.
+    """
+    parameters, places = initial.copy(), _first_places(problem, initial, free)
+    dof = degrees_of_freedom(problem, free).usable
+    unit = _EXPECTED * parameters[12] * float(np.sqrt(np.median(problem.image_weights[:, 0, 0])))
+    run = _Run(problem, solution, limit or _LIMIT, dof, threads or 0, progress)
+    for _ in range(3):
+        active = free & run.effective(parameters, places, free)
+        found = run.adjust(parameters, places, active, unit, _ROUGH)
+        parameters, places = found["parameters"], found["places"]
+        if (active == free).all() or found["status"] != "converged":
+            break
+    mean_error = float(np.sqrt(sum(found["sums_of_squares"]) / dof))
+    unit = max(mean_error, 1e-9 * unit)
+    found = run.adjust(parameters, places, free, unit, _FINE, covariance=True)
+    return run.solved(found, free, unit)
+
+
+def _first_places(problem: Problem, parameters: Floats, free: Bools) -> Floats:
+    places = problem.star_places.copy()
+    unknown = ~problem.known
+    if unknown.any():
+        directions = problem.core(parameters, places, ~free).directions()
+        first = {int(star): i for i, star in reversed(list(enumerate(problem.image_stars)))}
+        for star in np.flatnonzero(unknown):
+            places[star] = directions[first[int(star)]]
+    return places
+
+
+class _Run:
+    """A problem, its history, and how the engine is called."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        solution: str,
+        limit: int,
+        dof: int,
+        threads: int,
+        progress: Callable[..., None] | None,
+    ) -> None:
+        self.problem, self.solution, self.limit = problem, solution, limit
+        self.dof, self.threads, self.progress = dof, threads, progress
+        self.levels: list[float] = []
+
+    def effective(self, parameters: Floats, places: Floats, free: Bools) -> Bools:
+        """Find the parameters that have an effect at some values, or a weight."""
+        core = self.problem.core(parameters, places, ~free)
+        normal = reduce(self.problem, core, core.equations(), places).normal
+        return (np.diag(normal + self.problem.parameter_weights) > 0) | ~free
+
+    def adjust(
+        self,
+        parameters: Floats,
+        places: Floats,
+        free: Bools,
+        unit: float,
+        fraction: float,
+        covariance: bool = False,
+    ) -> dict[str, Any]:
+        core = self.problem.core(parameters, places, ~free)
+        try:
+            found = core.adjust(
+                unit=unit,
+                fraction=fraction,
+                max_iterations=self.limit,
+                covariance=covariance,
+                threads=self.threads,
+                progress=self.progress,
+            )
+        except _photocore.StellarError as error:
+            raise self._named(core, places, free, *error.args) from None
+        # A sum of squares of the engine counts in units of the expected mean error.
+        sums = [found["initial_sum_of_squares"], *(row[1] for row in found["iterations"])]
+        levels = [math.sqrt(value / self.dof) * unit for value in sums]
+        self.levels += levels[1:] if self.levels else levels
+        if self.problem.options.common_scale:
+            found["parameters"][13] = found["parameters"][12]
+        return dict(found)
+
+    def _named(
+        self, core: Any, places: Floats, free: Bools, kind: str, message: str, stars: list[int]
+    ) -> AdjustmentError:
+        if kind == "undetermined stars":
+            names = ", ".join(self.problem.star_ids[i] for i in stars)
+            return AdjustmentError(f"ERROR 2: no inverse for the submatrix of star {names}")
+        if kind == "undetermined":
+            normal = reduce(self.problem, core, core.equations(), places).normal
+            names = ", ".join(undetermined(normal + self.problem.parameter_weights, free, 1e-10))
+            return AdjustmentError(
+                f"ERROR 4: no inverse for the reduced normal equations: the stars do not determine {names}"
+            )
+        return AdjustmentError(message)
+
+    def solved(self, found: dict[str, Any], free: Bools, unit: float) -> Solved:
+        problem = self.problem
+        plate, stars, weighted, axis = found["sums_of_squares"]
+        status = found["status"]
+        count = len(self.levels) - 1
+        stops = {
+            "converged": "NO UNKNOWN CHANGES BY MORE THAN 1E-4 OF ITS MEAN ERROR",
+            "diverged": "NO STEP LOWERS THE SUM OF SQUARES",
+        }
+        cofactors = found["cofactors"].reshape(len(NAMES), len(NAMES)) if len(found["cofactors"]) else None
+        tested = (problem.known & ~problem.held)[:, None]
+        axis_residual = found["axis_residual"]
+        return Solved(
+            parameters=found["parameters"],
+            places=found["places"],
+            free=free,
+            cofactors=np.full((len(NAMES), len(NAMES)), np.nan) if cofactors is None else cofactors,
+            star_cofactors=found["place_cofactors"],
+            residuals=-found["residuals"],
+            redundancy=found["image_redundancy"],
+            # The engine's residuals are observed minus computed, in units of the expected mean error.
+            standardized=-unit * found["image_standardized"],
+            star_redundancy=np.where(tested, found["place_redundancy"], np.nan),
+            star_standardized=np.where(tested, -unit * found["place_standardized"], np.nan),
+            axis_residual=None if axis_residual is None else -np.array(axis_residual),
+            sums=(plate, stars, weighted + axis),
+            stop=stops.get(status, f"{count} ITERATIONS COMPLETED"),
+            converged=status == "converged",
+            levels=tuple(Level(self.solution, i + 1, level) for i, level in enumerate(self.levels)),
+        )
