@@ -11,7 +11,7 @@ import orjson
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.absolute_orientation.orientation import Orientation
+from photogram.absolute_orientation.oriented import OrientedModel
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.errors import InputError
 
@@ -20,12 +20,12 @@ __all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
 Floats = NDArray[np.float64]
 
 
-def to_json(result: Orientation) -> bytes:
+def to_json(result: OrientedModel) -> bytes:
     """Return the whole result as JSON (UTF-8); its points are the stations without control."""
     return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}"])
 
 
-def without_points(result: Orientation) -> Iterator[bytes]:
+def without_points(result: OrientedModel) -> Iterator[bytes]:
     """Return the document up to the first of its points, so that any number of them can follow."""
     head = orjson.dumps(_head(result), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
     yield head.removesuffix(b"\n}")
@@ -42,7 +42,7 @@ def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> by
     return b"\n    " + b",\n    ".join(objects) if len(positions) else b""
 
 
-def _head(result: Orientation) -> dict[str, Any]:
+def _head(result: OrientedModel) -> dict[str, Any]:
     similarity = result.similarity
     return {
         "program": f"photogram {_photocore.__version__} absolute-orientation",
@@ -83,7 +83,7 @@ def _head(result: Orientation) -> dict[str, Any]:
     }
 
 
-def _units(result: Orientation) -> dict[str, str]:
+def _units(result: OrientedModel) -> dict[str, str]:
     ground, model = result.stations.ground_unit, result.stations.model_unit
     return {
         "scale": f"{model} / {ground}",
@@ -101,7 +101,7 @@ def _units(result: Orientation) -> dict[str, str]:
     }
 
 
-def _control(result: Orientation) -> Iterator[dict[str, Any]]:
+def _control(result: OrientedModel) -> Iterator[dict[str, Any]]:
     for row in np.flatnonzero(result.took_part).tolist():
         yield {
             "id": result.stations.ids[row],
@@ -115,7 +115,7 @@ def _control(result: Orientation) -> Iterator[dict[str, Any]]:
         }
 
 
-def _rejected(result: Orientation) -> Iterator[dict[str, Any]]:
+def _rejected(result: OrientedModel) -> Iterator[dict[str, Any]]:
     left_out = result.stations.given & ~result.used
     differences = np.where(left_out, result.differences, np.nan)
     for row in np.flatnonzero(left_out.any(axis=1)).tolist():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.absolute_orientation.orientation import Orientation
+from photogram.absolute_orientation.oriented import OrientedModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""
 
 
-def plot(result: Orientation) -> bytes:
+def plot(result: OrientedModel) -> bytes:
     """Draw plan residuals as arrows and those of elevations as bars, given minus transformed; return a PNG.
 
     Needs matplotlib (`pip install 'photogram[plots]'`).
@@ -55,7 +55,7 @@ def plot(result: Orientation) -> bytes:
     return picture.getvalue()
 
 
-def _stations(axes: Axes, result: Orientation, rows: NDArray[np.intp], plan: Floats) -> None:
+def _stations(axes: Axes, result: OrientedModel, rows: NDArray[np.intp], plan: Floats) -> None:
     used = result.used[rows]
     kinds = (
         ("full control", used[:, 0] & used[:, 2], "^"),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.absolute_orientation.cards import restart_record, transformation_records
-from photogram.absolute_orientation.orientation import Orientation
+from photogram.absolute_orientation.oriented import OrientedModel
 
 __all__ = ["report", "summary"]
 
@@ -22,7 +22,7 @@ TEST = 3.0
 """Standardized residuals beyond this are marked."""
 
 
-def report(result: Orientation) -> str:
+def report(result: OrientedModel) -> str:
     """Return the listing of an orientation."""
     sections = [
         *summary(result),
@@ -38,7 +38,7 @@ def report(result: Orientation) -> str:
     return "\n\n".join([head, *parts]) + "\n"
 
 
-def summary(result: Orientation) -> list[tuple[str, list[str]]]:
+def summary(result: OrientedModel) -> list[tuple[str, list[str]]]:
     """Return what a reader wants first, as titled sections: problems, figures, parameters, control."""
     return [
         ("Problems", _problems(result)),
@@ -48,14 +48,14 @@ def summary(result: Orientation) -> list[tuple[str, list[str]]]:
     ]
 
 
-def _problems(result: Orientation) -> list[str]:
+def _problems(result: OrientedModel) -> list[str]:
     problems = [str(message) for message in result.messages]
     if not result.converged:
         problems.insert(0, f"the orientation has {result.status}: do not use these values")
     return problems or ["none"]
 
 
-def _figures(result: Orientation) -> list[str]:
+def _figures(result: OrientedModel) -> list[str]:
     stations = result.stations
     given = result.used.sum(axis=0)
     sigma0 = "undefined"
@@ -88,7 +88,7 @@ def _figures(result: Orientation) -> list[str]:
     return [f"{name:<36}{value}" for name, value in rows]
 
 
-def _parameters(result: Orientation) -> list[str]:
+def _parameters(result: OrientedModel) -> list[str]:
     similarity, stations = result.similarity, result.stations
     covariance = similarity.covariance
     sd = np.full(7, np.nan) if covariance is None else np.sqrt(np.diag(covariance))
@@ -109,7 +109,7 @@ def _row(values: Floats) -> str:
     return "".join(f"{value:>20.12f}" for value in values)
 
 
-def _control(result: Orientation) -> list[str]:
+def _control(result: OrientedModel) -> list[str]:
     unit, ground = result.stations.model_unit, result.stations.ground_unit
     lines = [
         f"{'station':<12}   {unit:>14} {ground:>14} {'redundancy':>11} {'standardized':>13}",
@@ -126,7 +126,7 @@ def _control(result: Orientation) -> list[str]:
     return lines
 
 
-def _model_residuals(result: Orientation) -> list[str]:
+def _model_residuals(result: OrientedModel) -> list[str]:
     unit = result.stations.model_unit
     lines = [f"{'station':<12}" + "".join(f"{f'v{axis} {unit}':>16}" for axis in "xyz")]
     for row in np.flatnonzero(result.took_part).tolist():
@@ -135,7 +135,7 @@ def _model_residuals(result: Orientation) -> list[str]:
     return lines
 
 
-def _rejected(result: Orientation) -> list[str]:
+def _rejected(result: OrientedModel) -> list[str]:
     left_out = result.stations.given & ~result.used
     if not left_out.any():
         return []
@@ -150,7 +150,7 @@ def _rejected(result: Orientation) -> list[str]:
     return lines
 
 
-def _iterations(result: Orientation) -> list[str]:
+def _iterations(result: OrientedModel) -> list[str]:
     if result.cycles is not None:
         head = f"{'cycle':>6} {'largest correction of an angle, rad':>36}"
         return [head, *(f"{k:>6} {value:>36.3e}" for k, value in enumerate(result.cycles, 1))]
@@ -161,7 +161,7 @@ def _iterations(result: Orientation) -> list[str]:
     ]
 
 
-def _points(result: Orientation) -> list[str]:
+def _points(result: OrientedModel) -> list[str]:
     ids, positions, covariances = result.transform_points()
     if not ids:
         return []

@@ -2,44 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.stellar.moved import Combined
 from photogram.stellar.parameters import GROUPS
 from photogram.stellar.published import residual_cycle
-from photogram.stellar.state import Solved
 
 if TYPE_CHECKING:
     from photogram.stellar.result import Result
 
-__all__ = ["Combined", "combine", "constraints", "modify"]
+__all__ = ["combine", "constraints", "modify"]
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Combined:
-    """A solution whose attitudes are constrained to common values, not iterated again.
-
-    Attributes
-    ----------
-    pairs
-        The pairs that the movement test found equal.
-    solved
-        Parameters, cofactors and residuals.
-    constraints
-        Number of constraints, which join the degrees of freedom.
-    mean_error
-        Of unit weight, with these degrees of freedom.
-    """
-
-    pairs: tuple[tuple[str, str], ...]
-    solved: Solved
-    constraints: int
-    mean_error: float
 
 
 def constraints(pairs: tuple[tuple[str, str], ...], parameters: int) -> Floats:

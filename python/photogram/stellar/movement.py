@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.stellar.moved import Movement
 from photogram.stellar.parameters import GROUPS
 
 if TYPE_CHECKING:
     from photogram.stellar.result import Result
 
-__all__ = ["Movement", "movement", "pairs_to_combine"]
+__all__ = ["movement", "pairs_to_combine"]
 
 Floats = NDArray[np.float64]
 
@@ -22,31 +22,6 @@ _DIAGONAL = np.arange(9) * 0.01
 """x = y of the fictitious points, metres."""
 PAIRS = ((0, 1), (1, 2), (0, 2))
 """Post minus pre, event minus post, event minus pre."""
-
-
-@dataclass(frozen=True)
-class Movement:
-    """A fictitious point under two attitudes.
-
-    Attributes
-    ----------
-    first, second
-        The groups.
-    xy
-        x = y of the point, metres.
-    angle, mean_error
-        Angle between its two directions and its mean error, radians.
-    differences
-        Second minus first: right ascension times cos(declination), declination, azimuth times sin(zenith
-        distance), elevation; radians.
-    """
-
-    first: str
-    second: str
-    xy: float
-    angle: float
-    mean_error: float
-    differences: tuple[float, float, float, float]
 
 
 def movement(result: Result) -> tuple[Movement, ...]:

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.messages import Message
-from photogram.stellar.combination import Combined
 from photogram.stellar.counts import Counts
-from photogram.stellar.movement import Movement
+from photogram.stellar.moved import Combined, Movement
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.problem import Problem
 from photogram.stellar.state import Level, Solved

@@ -1,0 +1,159 @@
+"""An absolutely oriented model: arrays with their covariances."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.absolute_orientation.similarity import Similarity
+from photogram.absolute_orientation.stations import Stations
+from photogram.adjusted import Iteration
+from photogram.messages import Message
+
+__all__ = ["OrientedModel"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class OrientedModel:
+    """An absolutely oriented model; arrays in the order of the n stations, NaN for what took no part.
+
+    Covariances are cofactors times `covariance_scale`.
+
+    Attributes
+    ----------
+    stations
+        What was oriented.
+    used
+        (n, 3) which control coordinates took part.
+    rejected
+        Identifiers of the stations that were rejected by name.
+    similarity, initial
+        The parameters with their covariance, and the initial ones.
+    started
+        Where the initial values are from: `restart`, `report` (first two stations) or `closed-form`.
+    alternatives
+        Other orientations that fit as well.
+    method
+        `rigorous`, `report` or `fill-in`.
+    status
+        `converged`, `not converged` or `diverged`.
+    iterations
+        Of the rigorous method.
+    cycles
+        Largest correction of an angle (rad) in each cycle of the report's methods, else None.
+    residuals
+        (n, 3) u = s X - A^T (x - B) of the components that took part, control axes, model units.
+    model_residuals
+        (n, 3) v = s A X + B - x with the adjusted X (TB 19, equation 5.1), model axes, model units.
+    adjusted_control, control_covariances
+        (n, 3) adjusted control coordinates in ground units, unknown ones included, and (n, 3, 3) their
+        covariances.
+    redundancy
+        (n, 3) redundancy numbers of the residuals; they sum to the degrees of freedom.
+    standardized
+        (n, 3) residuals divided by their own standard deviations: by the a priori ones with standard
+        deviations given (Baarda's w), else by sigma0's; NaN where no other component checks them.
+    weighted_sum_of_squares
+        Of both systems; without standard deviations the sum of the squared residuals.
+    covariance_scale
+        sigma0 squared, or 1; None when it is unknown.
+    condition
+        Condition number of the linearized residuals: rotations in radians, relative scale, translations in
+        sizes of the model.
+    messages
+        Remarks that did not stop the orientation.
+    """
+
+    stations: Stations
+    used: NDArray[np.bool_]
+    rejected: tuple[str, ...]
+    similarity: Similarity
+    initial: Similarity
+    started: str
+    alternatives: list[Similarity]
+    method: str
+    status: str
+    iterations: list[Iteration]
+    cycles: list[float] | None
+    residuals: Floats
+    model_residuals: Floats
+    adjusted_control: Floats
+    control_covariances: Floats
+    redundancy: Floats
+    standardized: Floats
+    weighted_sum_of_squares: float
+    covariance_scale: float | None
+    condition: float
+    messages: list[Message]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the values can be used."""
+        return self.status == "converged"
+
+    @property
+    def weighted(self) -> bool:
+        """Whether standard deviations were given."""
+        return self.stations.model_sd is not None
+
+    @property
+    def known(self) -> int:
+        """Number n of control coordinates that took part."""
+        return int(self.used.sum())
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Control coordinates that took part, minus seven."""
+        return self.known - 7
+
+    @property
+    def rms(self) -> float:
+        """Root of sum u^2 / n, model units (TB 19, equation 5.2)."""
+        return math.sqrt(float(np.nansum(self.residuals**2)) / self.known)
+
+    @property
+    def sigma0(self) -> float | None:
+        """Standard deviation of unit weight, of a model coordinate (model units) when no others were given.
+
+        None without degrees of freedom.
+        """
+        if self.degrees_of_freedom == 0:
+            return None
+        return math.sqrt(self.weighted_sum_of_squares / self.degrees_of_freedom)
+
+    @property
+    def residuals_ground(self) -> Floats:
+        """(n, 3) u / s: given minus transformed control coordinates, ground units."""
+        ground: Floats = self.residuals / self.similarity.scale
+        return ground
+
+    @property
+    def differences(self) -> Floats:
+        """(n, 3) given minus transformed coordinates of all control, rejected too, ground units."""
+        positions, _ = self.similarity.transform(self.stations.model)
+        differences: Floats = self.stations.control - positions
+        return differences
+
+    @property
+    def took_part(self) -> NDArray[np.bool_]:
+        """(n,) whether a station took part with any coordinate."""
+        part: NDArray[np.bool_] = np.any(self.used, axis=1)
+        return part
+
+    @property
+    def points(self) -> NDArray[np.bool_]:
+        """(n,) whether a station has no control coordinate at all: a point to be transformed."""
+        without: NDArray[np.bool_] = ~np.any(self.stations.given, axis=1)
+        return without
+
+    def transform_points(self) -> tuple[list[str], Floats, Floats]:
+        """Transform the points among the stations: identifiers, (m, 3) positions, (m, 3, 3) covariances."""
+        rows = np.flatnonzero(self.points)
+        sd = 0.0 if self.stations.model_sd is None else self.stations.model_sd[rows]
+        positions, covariances = self.similarity.transform(self.stations.model[rows], sd)
+        return [self.stations.ids[row] for row in rows.tolist()], positions, covariances
