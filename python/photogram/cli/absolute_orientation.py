@@ -13,6 +13,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+from photogram.cli.options import JsonFile, Quiet
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity, Stations
@@ -85,10 +86,7 @@ def absolute_orientation(
             show_default=False,
         ),
     ] = None,
-    json: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
-    ] = None,
+    json: JsonFile = None,
     listing: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the listing as text.", show_default=False)
     ] = None,
@@ -136,7 +134,7 @@ def absolute_orientation(
     ] = False,
     ground_unit: Annotated[str, typer.Option(help="Name of the unit of the control.")] = "ground unit",
     model_unit: Annotated[str, typer.Option(help="Name of the unit of the model.")] = "model unit",
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Orient a model absolutely: s, A, B of x = s A X + B from full, horizontal and height control.
 
@@ -193,7 +191,7 @@ def transform(
         float, typer.Option(min=0.0, help="Standard deviation of the points' own coordinates, model units.")
     ] = 0.0,
     decimals: Annotated[int, typer.Option(min=0, max=15, help="Decimals of transformed points.")] = 6,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Transform any number of model points by a former orientation (part II)."""
     with failures():

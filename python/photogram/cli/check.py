@@ -10,6 +10,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+from photogram.cli.options import JsonFile, Quiet
 
 __all__ = ["check"]
 
@@ -18,10 +19,7 @@ def check(
     directory: Annotated[
         Path, typer.Argument(metavar="DIR", help="Directory of the five files, as for adjusting.")
     ],
-    json: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the findings as a JSON document.", show_default=False),
-    ] = None,
+    json: JsonFile = None,
     limits: Annotated[
         str | None,
         typer.Option(metavar="N1=..,N6=..", help="Limits of the 1987 program.", show_default=False),
@@ -29,7 +27,7 @@ def check(
     threads: Annotated[
         int | None, typer.Option(min=1, help="Threads. Default: all.", show_default=False)
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Look for errors in a GIANT project: blunders, wrong names, stations and control that do not fit.
 

@@ -14,6 +14,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import errors, failures, output
+from photogram.cli.options import Quiet
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, Options
@@ -91,7 +92,7 @@ def comparator(
         typer.Option("--estimate-grid", help="Estimate the accuracy of the grid in the joint adjustment."),
     ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Remarks on the measurements are errors.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Calibrate a comparator from measurements of a grid plate.
 

@@ -15,6 +15,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+from photogram.cli.options import JsonFile, Quiet
 from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
@@ -68,10 +69,7 @@ def giant(
             show_default=False,
         ),
     ] = None,
-    json: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
-    ] = None,
+    json: JsonFile = None,
     listing: Annotated[
         Path | None,
         typer.Option(
@@ -125,7 +123,7 @@ def giant(
             show_default=False,
         ),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    quiet: Quiet = False,
     overwrite: Annotated[
         bool,
         typer.Option("--overwrite", help="Allow OUT to be a directory with another GIANT project in it."),

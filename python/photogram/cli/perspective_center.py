@@ -12,6 +12,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+from photogram.cli.options import JsonFile, Quiet
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
@@ -37,10 +38,7 @@ def perspective_center(
     example: Annotated[
         bool, typer.Option("--example", help="Run the packaged example instead: a grid at two heights.")
     ] = False,
-    json: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the results as a JSON document.", show_default=False),
-    ] = None,
+    json: JsonFile = None,
     listing: Annotated[
         Path | None,
         typer.Option(
@@ -67,7 +65,7 @@ def perspective_center(
         Weights,
         typer.Option(help="Of the points: equal, number of readings, or standard deviations of readings."),
     ] = Weights.EQUAL,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Determine perspective centre, attitude and distortion of projectors from grid measurements.
 

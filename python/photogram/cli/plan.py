@@ -12,6 +12,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import errors, failures, output
+from photogram.cli.options import JsonFile
 from photogram.cli.simulated import Control, NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -46,10 +47,7 @@ def plan(
         float | None,
         typer.Option(help="As --position-sd, for the second pattern. Default: the same.", show_default=False),
     ] = None,
-    json: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the figures as a JSON document.", show_default=False),
-    ] = None,
+    json: JsonFile = None,
     plot: Annotated[
         Path | None,
         typer.Option(

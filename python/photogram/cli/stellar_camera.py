@@ -11,6 +11,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, failures, output
+from photogram.cli.options import JsonFile, Quiet
 
 if TYPE_CHECKING:
     from photogram.stellar.problem import Problem
@@ -43,15 +44,12 @@ def stellar_camera(
             show_default=False,
         ),
     ] = None,
-    json: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
-    ] = None,
+    json: JsonFile = None,
     as_published: Annotated[
         bool, typer.Option("--as-published", help="Iterate with the report's partials and stop rules.")
     ] = False,
     plots: Annotated[bool, typer.Option("--plots", help="Draw the plots (needs matplotlib).")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Calibrate a camera by its images of stars (NOAA Technical Report NOS 55)."""
     if example == (deck is not None):
