@@ -330,3 +330,25 @@ def test_weights_too_weak_for_a_datum_are_an_error_with_the_remark_that_explains
     assert "GROUND holds no component of a photographed point" in result.stderr
     assert "the standard deviations of the photos are too large to give a datum" in result.stderr
     assert names(tmp_path) == {"block"}
+
+
+@pytest.mark.parametrize(
+    ("command", "package", "extra"),
+    [
+        (["perspective-center", "--example", "--plot", "p.png"], "matplotlib", "plots"),
+        (["absolute-orientation", "--example", "--plot", "p.png"], "matplotlib", "plots"),
+        (["stellar-camera", "--example", "--plots"], "matplotlib", "plots"),
+    ],
+)
+def test_a_package_of_an_extra_that_is_not_there_is_named(
+    run, tmp_path, monkeypatch, command, package, extra
+):
+    loaded = [name for name in sys.modules if name.partition(".")[0] == package]
+    for name in loaded:
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.delitem(sys.modules, "photogram.perspective_center.plot", raising=False)
+    result = run(*command)
+    assert result.exit_code == 1
+    assert f"{package} is needed: pip install 'photogram[{extra}]'" in result.stderr
+    assert not list(tmp_path.iterdir())

