@@ -15,6 +15,7 @@ from photogram.giant.fields import (
     format_name,
     format_principal_distance,
     format_real,
+    natural_order,
     parse_angle,
     parse_integer,
     parse_name,
@@ -244,3 +245,8 @@ def test_names_are_written_as_they_are_read():
     for name in ("123456789", " A", "A ", "A\tB", "****", "****1"):
         with pytest.raises(ValueError, match="name"):
             format_name(name)
+
+
+def test_natural_order_takes_digits_as_numbers():
+    names = ["P", "9", "P10", "P2a", "10", "P9", "!3"]
+    assert sorted(names, key=natural_order) == ["9", "10", "!3", "P", "P2a", "P9", "P10"]

@@ -422,10 +422,18 @@ def test_section_2_2_adjusted_ground_is_sorted_too(example, adjusted):
     from photogram.giant.export import adjusted_ground
 
     block, result = adjusted
-    for sort in (True, False):
-        ground = adjusted_ground(changed(example, sort_points=sort), block, result.point_positions)
-        names = [point.name for point in ground]
-        assert names == (sorted(names, key=lambda name: name.rjust(8)) if sort else block.point_ids)
+
+    def names(sort, as_published):
+        project, positions = changed(example, sort_points=sort), result.point_positions
+        return [point.name for point in adjusted_ground(project, block, positions, as_published=as_published)]
+
+    published, natural = names(True, True), names(True, False)
+    assert published == sorted(block.point_ids, key=lambda name: name.rjust(8))
+    assert natural[:3] == ["59!", "60!", "61!"]
+    assert natural.index("126!") == natural.index("80!") + 1
+    assert natural.index("126!") < natural.index("S001") < natural.index("SH944201")
+    assert sorted(natural) == sorted(published)
+    assert names(False, True) == names(False, False) == block.point_ids
 
 
 @pytest.mark.giant("10", "camera stations corrections")

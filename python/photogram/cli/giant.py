@@ -157,7 +157,7 @@ def giant(
             for message in project.messages[:SHOWN]:
                 errors.print(escape(str(message)))
             raise
-        written = _result_files(project, block, result, out)
+        written = _result_files(project, block, result, out, as_published)
         if json is not None:
             written[json] = result.to_json()
         if listing is not None:
@@ -258,7 +258,9 @@ def _progress(status: Status) -> Callable[[Progress], None]:
     return show
 
 
-def _result_files(project: Project, block: Block, result: Result, out: Path) -> dict[Path, bytes]:
+def _result_files(
+    project: Project, block: Block, result: Result, out: Path, as_published: bool
+) -> dict[Path, bytes]:
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.giant.export import adjusted_records
     from photogram.giant.files import to_bytes
@@ -271,6 +273,7 @@ def _result_files(project: Project, block: Block, result: Result, out: Path) -> 
         photo_attitudes=result.photo_attitudes,
         point_positions=result.point_positions,
         converged=result.converged,
+        as_published=as_published,
     )
     if "RESTART" not in records:
         result.messages.append(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from photogram.block import Block
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
-from photogram.giant.fields import printed_order
+from photogram.giant.fields import natural_order, printed_order
 from photogram.giant.files import written
 from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
@@ -170,11 +171,13 @@ def adjusted_frames(project: Contents, block: Block, positions: Floats, attitude
     ]
 
 
-def adjusted_ground(project: Contents, block: Block, positions: Floats) -> list[GroundPoint]:
+def adjusted_ground(
+    project: Contents, block: Block, positions: Floats, *, as_published: bool = False
+) -> list[GroundPoint]:
     """Return the points for unit 9: every point on two or more photographs.
 
     Control keeps its standard deviations and type code. Pass points get the type code 7, so that the file can
-    be read as GROUND without turning them into control. They are sorted as the printout is, unless COMMON
+    be read as GROUND without turning them into control. They are sorted, P9 before P10, unless COMMON
     (column 13) says not to.
 
     Parameters
@@ -183,12 +186,16 @@ def adjusted_ground(project: Contents, block: Block, positions: Floats) -> list[
         What was adjusted: `block` is `project.to_block()`.
     positions
         (n, 3) adjusted positions in the units and the order of the block; NaN for points that were not used.
+    as_published
+        Sort as the 1987 program did and the printout does: names right-justified.
     """
     control = {point.name: point for point in project.ground}
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     rows = np.flatnonzero((rays >= 2) & np.isfinite(positions).all(axis=1)).tolist()
     if project.common.sort_points:
-        rows.sort(key=lambda row: printed_order(block.point_ids[row]))
+        key: Callable[[str], tuple[int, str] | list[tuple[int, str]]]
+        key = printed_order if as_published else natural_order
+        rows.sort(key=lambda row: key(block.point_ids[row]))
     names = [block.point_ids[row] for row in rows]
     return [
         dataclasses.replace(
@@ -207,6 +214,7 @@ def adjusted_records(
     photo_attitudes: Floats,
     point_positions: Floats,
     converged: bool,
+    as_published: bool = False,
 ) -> dict[str, list[str]]:
     """Return the records of the output files by name (GIANT guide, section II.A).
 
@@ -222,6 +230,8 @@ def adjusted_records(
         :func:`adjusted_ground`.
     converged
         Whether they are the solution.
+    as_published
+        Whether GROUND is sorted as in 1987; see :func:`adjusted_ground`.
 
     Raises
     ------
@@ -239,6 +249,6 @@ def adjusted_records(
     if converged and project.common.save_stations:
         records["FRAMES"] = records["RESTART"]
     if converged and project.common.save_points:
-        ground = adjusted_ground(project, block, point_positions)
+        ground = adjusted_ground(project, block, point_positions, as_published=as_published)
         records["GROUND"] = written("GROUND", lambda: ground_records(ground, geographic))
     return records

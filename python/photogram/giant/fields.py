@@ -19,6 +19,7 @@ __all__ = [
     "format_name",
     "format_principal_distance",
     "format_real",
+    "natural_order",
     "pack_dms",
     "parse_angle",
     "parse_integer",
@@ -38,6 +39,7 @@ LARGEST_PACKED = 10**8
 """Far beyond every angle, and well within what decimal arithmetic divides."""
 
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d{1,2}))?", re.ASCII)
+_DIGITS = re.compile(r"(\d+)", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 
 
@@ -226,6 +228,12 @@ def printed_order(name: str) -> tuple[int, str]:
     A blank sorts before every character that a name begins with, so that the shorter name comes first.
     """
     return len(name), name
+
+
+def natural_order(name: str) -> list[tuple[int, str]]:
+    """Return the key by which people sort names: character by character, but runs of digits as numbers."""
+    parts = _DIGITS.split(name)
+    return [(int(part), "") if place % 2 else (-1, part) for place, part in enumerate(parts)]
 
 
 def format_principal_distance(value: float) -> str:
