@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use photocore::adjustment;
 use photocore::geometry::{self, ObjectSpace, RotationSense};
-use photocore::normals::{Equations, Factor, GroupRows, Layout, Normals, Ordering, Prior, System};
+use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, System};
 use photocore::programs::block::{Block, Image, Options, Photo, Point, UnitVariance};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -144,12 +144,8 @@ impl Phases {
         Self { pool: pool(), system: System::new(layout, Ordering::Auto), equations, prior }
     }
 
-    fn form(&self) -> Normals {
-        done(self.system.form(&self.pool, &self.equations, &self.prior, 0.0, &mut go))
-    }
-
     fn factor(&self) -> Factor {
-        self.form().factor(&self.pool).expect("a determined block")
+        done(self.system.factor(&self.pool, &self.equations, &self.prior, 0.0, &mut go))
     }
 }
 
@@ -195,21 +191,14 @@ fn phases(criterion: &mut Criterion) {
         let layout = || system.layout().clone();
         bencher.iter_batched(layout, |layout| System::new(layout, Ordering::Auto), BatchSize::PerIteration);
     });
-    group.bench_function("form", |bencher| bencher.iter(|| phases.form()));
-    group.bench_function("factor", |bencher| {
-        bencher.iter_batched(|| phases.form(), |normals| normals.factor(pool), BatchSize::PerIteration);
-    });
+    group.bench_function("factor", |bencher| bencher.iter(|| phases.factor()));
     let factor = phases.factor();
     group.bench_function("solve", |bencher| {
         bencher.iter(|| done(system.solve(pool, &factor, equations, prior, 0.0, &mut go)));
     });
     group.bench_function("invert", |bencher| {
-        let invert = |factor: Factor| factor.into_selected_inverse(pool);
+        let invert = |factor: Factor| done(system.invert(pool, factor, equations, prior, &mut go));
         bencher.iter_batched(|| phases.factor(), invert, BatchSize::PerIteration);
-    });
-    let inverse = phases.factor().into_selected_inverse(pool);
-    group.bench_function("cofactors", |bencher| {
-        bencher.iter(|| done(system.cofactors(pool, &inverse, equations, prior, &mut go)));
     });
     group.finish();
 }

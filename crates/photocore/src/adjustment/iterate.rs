@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::problem::{Linearized, Model, Problem};
 use super::statistics::Counts;
-use crate::normals::{Cofactors, Factor, Normals, Operations, Ordering, Prior};
+use crate::normals::{Cofactors, Factor, Inversion, Operations, Ordering, Prior};
 
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -212,12 +212,12 @@ pub fn adjust<M: Model>(
     run.finish(end, initial_sum_of_squares)
 }
 
-/// The problem linearized at some values, and its normal equations.
+/// The problem linearized at some values, and its normal equations factored.
 struct State<'a, M: Model> {
     unknowns: Vec<f64>,
     equations: Linearized<'a, M>,
     prior: Prior,
-    normals: Normals,
+    factor: Factor,
     damping: f64,
     sum_of_squares: f64,
 }
@@ -301,7 +301,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let negligible = damping == 0.0 && solved.change <= NEGLIGIBLE;
             let highest = if negligible { f64::MAX } else { best * (1.0 + ROUNDING) };
             // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
-            if next.sum_of_squares <= highest && next.normals.deficient_locals.is_empty() {
+            if next.sum_of_squares <= highest && next.factor.deficient_locals.is_empty() {
                 best = next.sum_of_squares;
                 self.accept(Iteration { sum_of_squares: best, ..iteration }, &unknowns, &next.unknowns)?;
                 state = next;
@@ -385,11 +385,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
     fn stay(&mut self, state: State<'a, M>, status: Status) -> Result<End<'a, M>, AdjustError> {
         let unknowns = state.unknowns.clone();
         let state = if state.damping == 0.0 { state } else { self.form(state.unknowns, 0.0)? };
-        let basis = match self.factor(state.normals) {
-            Ok(factor) => Some(Basis { equations: state.equations, prior: state.prior, factor }),
-            Err(AdjustError::Interrupted) => return Err(AdjustError::Interrupted),
-            Err(_) => None,
-        };
+        let determined = self.determined(&state.factor).is_ok();
+        let State { equations, prior, factor, .. } = state;
+        let basis = determined.then_some(Basis { equations, prior, factor });
         let status = if basis.is_some() { status } else { Status::Diverged };
         Ok(End { status, unknowns, basis, last: None })
     }
@@ -413,40 +411,35 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let prior = self.problem.prior_equations(&unknowns);
         let total = self.problem.layout().locals();
         let mut between = between(&mut *self.watch, Phase::Form, total);
-        let formed = self.problem.system.form(self.pool, &equations, &prior, damping, &mut between);
-        let ControlFlow::Continue(normals) = formed else { return Err(AdjustError::Interrupted) };
-        let sum_of_squares = normals.sum_of_squares + self.problem.prior_sum_of_squares(&unknowns);
-        self.seconds.form += start.elapsed().as_secs_f64();
+        let factored = self.problem.system.factor(self.pool, &equations, &prior, damping, &mut between);
+        let ControlFlow::Continue(factor) = factored else { return Err(AdjustError::Interrupted) };
+        let sum_of_squares = factor.sum_of_squares + self.problem.prior_sum_of_squares(&unknowns);
+        let seconds = start.elapsed().as_secs_f64();
+        self.seconds.form += seconds * factor.formation_share;
+        self.seconds.factor += seconds * (1.0 - factor.formation_share);
         self.formations += 1;
-        Ok(State { unknowns, equations, prior, normals, damping, sum_of_squares })
+        Ok(State { unknowns, equations, prior, factor, damping, sum_of_squares })
     }
 
-    fn factor(&mut self, normals: Normals) -> Result<Factor, AdjustError> {
-        let start = Instant::now();
-        self.enter(Phase::Factor)?;
-        if !normals.deficient_locals.is_empty() {
-            return Err(AdjustError::UndeterminedLocals(normals.deficient_locals));
+    /// Whether everything is determined.
+    fn determined(&self, factor: &Factor) -> Result<(), AdjustError> {
+        if !factor.deficient_locals.is_empty() {
+            return Err(AdjustError::UndeterminedLocals(factor.deficient_locals.clone()));
         }
-        let factor = normals.factor(self.pool).map_err(|found| AdjustError::Undetermined(found.blocks()))?;
-        self.seconds.factor += start.elapsed().as_secs_f64();
-        Ok(factor)
+        factor.deficiency().map_or(Ok(()), |found| Err(AdjustError::Undetermined(found.blocks())))
     }
 
     fn solve(&mut self, state: State<'a, M>) -> Result<Solved<'a, M>, AdjustError> {
-        let local_decrease = state.normals.local_decrease;
-        let factor = self.factor(state.normals)?;
+        self.determined(&state.factor)?;
+        let State { equations, prior, factor, damping, .. } = state;
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
         let system = &self.problem.system;
-        let solved =
-            system.solve(self.pool, &factor, &state.equations, &state.prior, state.damping, &mut between);
-        let ControlFlow::Continue(solution) = solved else { return Err(AdjustError::Interrupted) };
+        let solved = system.solve(self.pool, &factor, &equations, &prior, damping, &mut between);
+        let ControlFlow::Continue(step) = solved else { return Err(AdjustError::Interrupted) };
         self.seconds.solve += start.elapsed().as_secs_f64();
-        Ok(Solved {
-            basis: Basis { equations: state.equations, prior: state.prior, factor },
-            step: solution.values,
-            change: (local_decrease + solution.decrease).sqrt(),
-        })
+        let change = factor.decrease.sqrt();
+        Ok(Solved { basis: Basis { equations, prior, factor }, step, change })
     }
 
     fn finish(mut self, end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
@@ -492,21 +485,16 @@ impl<'a, M: Model> Run<'a, '_, M> {
     fn cofactors(&mut self, basis: Basis<'a, M>) -> Result<(Cofactors, Vec<f64>), AdjustError> {
         let Basis { equations, prior, factor } = basis;
         let start = Instant::now();
-        self.enter(Phase::Invert)?;
-        let inverse = factor.into_selected_inverse(self.pool);
-        self.seconds.invert = start.elapsed().as_secs_f64();
-        let start = Instant::now();
-        let mut between = between(&mut *self.watch, Phase::Cofactors, self.problem.layout().locals());
-        let found = self.problem.system.cofactors(self.pool, &inverse, &equations, &prior, &mut between);
-        let ControlFlow::Continue(mut cofactors) = found else { return Err(AdjustError::Interrupted) };
+        let mut between = between(&mut *self.watch, Phase::Invert, self.problem.layout().locals());
+        let found = self.problem.system.invert(self.pool, factor, &equations, &prior, &mut between);
+        let ControlFlow::Continue(Inversion { mut cofactors, inversion_share, .. }) = found else {
+            return Err(AdjustError::Interrupted);
+        };
         let prior_redundancy = self.problem.finish_cofactors(&mut cofactors);
-        self.seconds.cofactors = start.elapsed().as_secs_f64();
+        let seconds = start.elapsed().as_secs_f64();
+        self.seconds.invert = seconds * inversion_share;
+        self.seconds.cofactors = seconds * (1.0 - inversion_share);
         Ok((cofactors, prior_redundancy))
-    }
-
-    fn enter(&mut self, phase: Phase) -> Result<(), AdjustError> {
-        let total = self.problem.layout().locals();
-        stopped((self.watch)(Event::Progress { phase, done: 0, total }))
     }
 
     /// Keeps an iteration that stands, with its corrections, and tells of it.
