@@ -13,8 +13,9 @@ use crate::normals::{Cofactors, Factor, Inversion, Operations, Ordering, Prior};
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Criterion {
-    /// When no unknown changes by more than this fraction of its standard deviation (a priori unit weight). Steps that
-    /// raise the sum of squares are damped (Levenberg-Marquardt).
+    /// When no unknown changes by more than this fraction of its standard deviation (a priori unit weight), or when the rate of
+    /// convergence shows that none would in the next iteration. Steps that raise the sum of squares are damped
+    /// (Levenberg-Marquardt).
     Fraction(f64),
     /// When the weighted sum of squares changes by less than this percentage from one iteration to the next, as in the
     /// 1987 program (GIANT guide, section 6); no damping.
@@ -290,7 +291,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let number = self.iterations.len() + 1;
             let iteration =
                 Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
-            if damping == 0.0 && solved.change <= fraction {
+            if damping == 0.0 && (solved.change <= fraction || self.leaves_less_than(fraction, solved.change)) {
                 let last = Some((iteration, solved.step));
                 return Ok(End { status: Status::Converged, unknowns, basis: Some(solved.basis), last });
             }
@@ -311,6 +312,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
         let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
         self.stay(state, status)
+    }
+
+    /// Whether a step is negligible itself and, the steps falling at the rate of the last two, all further ones together would be
+    /// well below a limit (Hairer and Wanner 1996, section IV.8).
+    fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
+        let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
+        let rate = before.map_or(1.0, |iteration| change / iteration.largest_change);
+        change <= NEGLIGIBLE && rate < 1.0 && rate / (1.0 - rate) * change <= limit / 10.0
     }
 
     /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.

@@ -6,6 +6,7 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use super::equations::{Equations, Prior};
+use super::incidence::Stacks;
 use super::invert::SelectedInverse;
 use super::layout::Layout;
 use super::stack::{Slot, Stack, dot};
@@ -81,11 +82,11 @@ impl AtHome {
     ) -> Self {
         let start = Instant::now();
         let layout = &system.layout;
-        let locals = system.incidence.locals_at(index);
-        let part = |locals: &[u32]| {
+        let stacks = system.incidence.stacks_at(index);
+        let part = |stacks: Stacks<'_>| {
             let (mut stack, mut ties) = (Stack::default(), Ties::default());
             let mut part = Self { local: Vec::new(), equations: Vec::new(), seconds: 0.0 };
-            for run in system.incidence.stacks(layout, locals).take_while(|_| !control.stopped()) {
+            for run in stacks.iter().take_while(|_| !control.stopped()) {
                 stack.gather(system, equations, run);
                 stack.eliminate(layout, prior, 0.0);
                 ties.gather(&stack, front, height, system.border_row(index));
@@ -94,14 +95,12 @@ impl AtHome {
             }
             part
         };
-        let mut found = if locals.len() < MANY {
-            part(locals)
+        let mut found = if stacks.locals() < MANY {
+            part(stacks)
         } else {
-            // Parts of a fixed size: which local blocks are stacked together does not depend on the number of threads.
-            let parts: Vec<Self> = locals.par_chunks(MANY / 4).map(part).collect();
-            let mut parts = parts.into_iter();
-            let first = parts.next();
-            parts.fold(first.unwrap_or_else(|| part(&[])), |mut all, part| {
+            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map(part).collect();
+            let empty = Self { local: Vec::new(), equations: Vec::new(), seconds: 0.0 };
+            parts.into_iter().fold(empty, |mut all, part| {
                 all.local.extend(part.local);
                 all.equations.extend(part.equations);
                 all

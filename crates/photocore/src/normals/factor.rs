@@ -174,12 +174,11 @@ impl<E: Equations> Formation<'_, E> {
     /// Adds what the local blocks at home in a supernode leave, in their order.
     fn assemble(&self, front: &mut Front<'_>, index: usize) -> Sums {
         let Self { system, control, .. } = self;
-        let locals = system.incidence.locals_at(index);
-        let stacks = system.incidence.stacks(&system.layout, locals);
+        let stacks = system.incidence.stacks_at(index);
         let mut sums = Sums::default();
-        if locals.len() < MANY || rayon::current_num_threads() == 1 {
+        if stacks.locals() < MANY || rayon::current_num_threads() == 1 {
             let mut stack = Stack::default();
-            for run in stacks {
+            for run in stacks.iter() {
                 if !control.stopped() {
                     self.fill(&mut stack, run);
                     stack.add_to(&mut front.columns(), &system.layout, system.border_row(index));
@@ -188,12 +187,12 @@ impl<E: Equations> Formation<'_, E> {
             }
             return sums;
         }
-        let runs: Vec<&[u32]> = stacks.collect();
         let mut filled: Vec<Stack> = (0..WAVE).map(|_| Stack::default()).collect();
         let starts = self.shares(index);
-        for wave in runs.chunks(WAVE).take_while(|_| !control.stopped()) {
-            let filled = &mut filled[..wave.len()];
-            filled.par_iter_mut().zip(wave).for_each(|(stack, run)| self.fill(stack, run));
+        for wave in stacks.parts(WAVE).into_iter().take_while(|_| !control.stopped()) {
+            let runs: Vec<&[u32]> = wave.iter().collect();
+            let filled = &mut filled[..runs.len()];
+            filled.par_iter_mut().zip(runs).for_each(|(stack, run)| self.fill(stack, run));
             front.parts(&starts).into_par_iter().for_each(|mut columns| {
                 for stack in &*filled {
                     stack.add_to(&mut columns, &system.layout, system.border_row(index));

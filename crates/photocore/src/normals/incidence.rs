@@ -17,6 +17,8 @@ pub(super) struct Incidence {
     by_home: Vec<u32>,
     /// Where those of each supernode start; then those that have no equations.
     home_ptr: Vec<usize>,
+    /// Where each stack starts: a run of blocks of one home whose equations touch the same unknowns in the same way.
+    stack_ptr: Vec<usize>,
 }
 
 impl Incidence {
@@ -44,7 +46,23 @@ impl Incidence {
         for index in 1..home_ptr.len() {
             home_ptr[index] += home_ptr[index - 1];
         }
-        Self { groups, positions, by_home, home_ptr }
+        let mut incidence = Self { groups, positions, by_home, home_ptr, stack_ptr: vec![0] };
+        let runs = incidence.by_home.chunk_by(|&a, &b| incidence.alike(layout, a as usize, b as usize));
+        let lengths: Vec<usize> = runs.flat_map(|run| run.chunks(MOST)).map(<[u32]>::len).collect();
+        let mut end = 0;
+        incidence.stack_ptr.extend(lengths.into_iter().map(|length| {
+            end += length;
+            end
+        }));
+        incidence
+    }
+
+    /// Whether the equations of two local blocks touch the same unknowns in the same way.
+    fn alike(&self, layout: &Layout, a: usize, b: usize) -> bool {
+        let border = |group: &u32| layout.border_of(*group as usize);
+        let borders = |local: usize| self.groups_of(layout, local).iter().map(border);
+        self.positions_of(layout, a) == self.positions_of(layout, b)
+            && (layout.border_dim() == 0 || borders(a).eq(borders(b)))
     }
 
     /// The groups of a local block, by position.
@@ -67,16 +85,40 @@ impl Incidence {
         &self.by_home[self.home_ptr[supernode]..self.home_ptr[supernode + 1]]
     }
 
-    /// Cuts local blocks of one home into stacks: runs of blocks whose equations touch the same unknowns in the same way.
-    pub fn stacks<'a>(&'a self, layout: &'a Layout, locals: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
-        let borders = |local: u32| {
-            let groups = self.groups_of(layout, local as usize).iter();
-            groups.map(|&group| layout.border_of(group as usize))
-        };
-        let alike = move |a: &u32, b: &u32| {
-            let positions = |local: u32| self.positions_of(layout, local as usize);
-            positions(*a) == positions(*b) && (layout.border_dim() == 0 || borders(*a).eq(borders(*b)))
-        };
-        locals.chunk_by(alike).flat_map(|run| run.chunks(MOST))
+    /// All stacks, by home.
+    pub fn stacks(&self) -> Stacks<'_> {
+        Stacks { locals: &self.by_home, ptr: &self.stack_ptr }
+    }
+
+    /// The stacks of a supernode; after the last supernode those of the local blocks without equations.
+    pub fn stacks_at(&self, supernode: usize) -> Stacks<'_> {
+        let place = |start: usize| self.stack_ptr.partition_point(|&end| end < start);
+        let (first, last) = (place(self.home_ptr[supernode]), place(self.home_ptr[supernode + 1]));
+        Stacks { locals: &self.by_home, ptr: &self.stack_ptr[first..=last] }
+    }
+}
+
+/// Consecutive stacks.
+#[derive(Clone, Copy)]
+pub(super) struct Stacks<'a> {
+    locals: &'a [u32],
+    ptr: &'a [usize],
+}
+
+impl<'a> Stacks<'a> {
+    /// Their local blocks, stack by stack.
+    pub fn iter(self) -> impl Iterator<Item = &'a [u32]> {
+        self.ptr.windows(2).map(move |ends| &self.locals[ends[0]..ends[1]])
+    }
+
+    /// How many local blocks they have.
+    pub fn locals(self) -> usize {
+        self.ptr[self.ptr.len() - 1] - self.ptr[0]
+    }
+
+    /// Parts of so many stacks at the most.
+    pub fn parts(self, most: usize) -> Vec<Self> {
+        let starts = (0..self.ptr.len() - 1).step_by(most);
+        starts.map(|first| Self { ptr: &self.ptr[first..=(first + most).min(self.ptr.len() - 1)], ..self }).collect()
     }
 }

@@ -7,12 +7,13 @@ use rayon::prelude::*;
 
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
+use super::incidence::Stacks;
 use super::stack::Stack;
 use super::system::System;
 use super::watch::{Between, watched};
 
-/// Local blocks that a thread takes at a time.
-const CHUNK: usize = 256;
+/// Stacks that a thread takes at a time.
+const CHUNK: usize = 64;
 
 impl System {
     /// Solves the normal equations for all unknowns, in the order of the layout: the kept blocks and the border from the factor, the
@@ -32,24 +33,25 @@ impl System {
         watched(pool, between, |control| {
             let mut others = factor.right.clone();
             factor.solve_backward(&mut others);
-            let solve = |locals: &[u32]| {
-                let (mut stack, mut found) = (Stack::default(), Vec::with_capacity(locals.len() * layout.local_dim()));
-                for run in self.incidence.stacks(layout, locals).take_while(|_| !control.stopped()) {
+            let solve = |stacks: Stacks<'_>| {
+                let mut stack = Stack::default();
+                let mut found = Vec::with_capacity(stacks.locals() * layout.local_dim());
+                for run in stacks.iter().take_while(|_| !control.stopped()) {
                     stack.gather(self, equations, run);
                     stack.solve(self, prior, damping, &others, &mut found);
                     control.count(run.len());
                 }
                 found
             };
-            let locals = self.incidence.locals();
-            let found: Vec<Vec<f64>> = locals.par_chunks(CHUNK).map(solve).collect();
+            let parts = self.incidence.stacks().parts(CHUNK);
+            let found: Vec<Vec<f64>> = parts.into_par_iter().map(solve).collect();
             let mut values = vec![0.0; layout.unknowns()];
             for position in 0..symbolic.blocks() {
                 let range = symbolic.unknowns_at(layout, position);
                 values[range].copy_from_slice(&others[symbolic.range(position)]);
             }
             let found = found.iter().flat_map(|part| part.chunks_exact(layout.local_dim()));
-            for (&local, x) in locals.iter().zip(found) {
+            for (&local, x) in self.incidence.locals().iter().zip(found) {
                 values[layout.local_range(local as usize)].copy_from_slice(x);
             }
             values
