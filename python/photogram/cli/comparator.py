@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import ExitStack
 from enum import StrEnum
 from importlib.resources import as_file, files
@@ -14,7 +13,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import errors, failures, output
-from photogram.cli.options import Quiet
+from photogram.cli.options import Quiet, default_out
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, Options
@@ -119,7 +118,7 @@ def comparator(
                 raise InputError(
                     message.text, file=message.file, record=message.record, text=message.record_text
                 )
-        folder = out or _beside((paths or [])[0])
+        folder = out or default_out((paths or [])[0], "-calibrated")
         written = _results(calibrations, folder, pdf=pdf, pictures=pictures, quiet=quiet)
         if json is not None:
             written[json] = _documents(calibrations)
@@ -134,13 +133,6 @@ def _with(options: Options, polynomial: bool, estimate_grid: bool) -> Options:
     from dataclasses import replace
 
     return replace(options, polynomial=polynomial, estimate_grid=estimate_grid)
-
-
-def _beside(path: Path) -> Path:
-    """Return the directory for the results: beside the input, or here where that is read-only."""
-    place = path.resolve()
-    parent = place.parent if os.access(place.parent, os.W_OK) else Path()
-    return parent / f"{place.stem}-calibrated"
 
 
 def _results(

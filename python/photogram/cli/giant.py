@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
@@ -15,7 +14,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, errors, failures, output
-from photogram.cli.options import JsonFile, Quiet
+from photogram.cli.options import JsonFile, Quiet, default_out
 from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
@@ -179,10 +178,7 @@ def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Pat
     from photogram.giant.files import present_files
 
     if out is None:
-        place = directory.resolve()
-        # Published data are often read-only: then the results go where the command is given.
-        parent = place.parent if os.access(place.parent, os.W_OK) else Path()
-        return parent / f"{place.name}-adjusted"
+        return default_out(directory, "-adjusted")
     if out.exists() and not out.is_dir():
         raise InputError("is not a directory", file=out)
     if out.exists() and out.samefile(directory):
