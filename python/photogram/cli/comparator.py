@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import errors, failures, output
+from photogram.cli.console import failures, output, print_remark, print_written
 from photogram.cli.options import Quiet, default_out
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def comparator(
         if not quiet:
             for calibration in calibrations:
                 _summarize(calibration)
-            output.print("written: " + escape(", ".join(str(path) for path in written)))
+            print_written(written)
 
 
 def _with(options: Options, polynomial: bool, estimate_grid: bool) -> Options:
@@ -145,7 +145,7 @@ def _results(
     if pictures and find_spec("matplotlib") is None:
         pictures = False
         if not quiet:
-            errors.print("[yellow]remark:[/] " + escape("no pictures: pip install 'photogram[plots]'"))
+            print_remark("no pictures: pip install 'photogram[plots]'")
     written: dict[Path, bytes] = {}
     for number, calibration in enumerate(calibrations, 1):
         place = folder if len(calibrations) == 1 else folder / str(number)

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import errors, failures, output
+from photogram.cli.console import errors, failures, output, print_remark, print_written
 from photogram.cli.options import JsonFile
 from photogram.cli.simulated import Control, NetworkOptions, takes_network
 
@@ -81,8 +80,7 @@ def plan(
         written = _documents(made, json, plot)
         write_whole(written)
         output.print(made.report(), markup=False, end="")
-        if written:
-            errors.print("written: " + escape(", ".join(str(path) for path in written)))
+        print_written(written, errors)
 
 
 def _simulated(*networks: NetworkOptions) -> dict[str, Block]:
@@ -126,7 +124,7 @@ def _adjusted(projects: list[Path]) -> dict[str, Block]:
         project = read_project(directory)
         block = project.to_block()
         for message in project.messages:
-            errors.print(f"[yellow]remark:[/] {escape(str(message))}")
+            print_remark(message)
         fixed = project.common.intersection_only
         patterns[name] = at_adjusted(adjust(block, covariance=False, fix_photos=fixed))
     return patterns
