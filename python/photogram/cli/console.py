@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import typer
 from rich.console import Console
 from rich.markup import escape
+
+if TYPE_CHECKING:
+    from photogram.sections import Section
 
 __all__ = [
     "NOT_CONVERGED",
@@ -34,7 +37,7 @@ errors = Console(stderr=True, highlight=False, soft_wrap=True)
 output = Console(highlight=False, soft_wrap=True)
 
 
-def print_sections(summary: Iterable[tuple[str, list[str]]], whole: str, most: int = SHOWN) -> None:
+def print_sections(summary: Iterable[Section], whole: str, most: int = SHOWN) -> None:
     """Print titled sections, of each at most `most` lines; `whole` says where the others are."""
     for title, lines in summary:
         output.print(f"[bold]{escape(title)}[/]")
