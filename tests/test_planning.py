@@ -471,7 +471,7 @@ def test_plan_writes_a_document_and_a_picture(run, tmp_path):
 
     result = run("plan", *SMALL, "--json", "other.json", "--plot", "plan.xyz")
     assert result.exit_code == 1
-    assert "plan.xyz: a picture is one of" in result.stderr
+    assert "plan.xyz: matplotlib draws no 'xyz'" in result.stderr
     assert not (tmp_path / "other.json").exists()
 
 

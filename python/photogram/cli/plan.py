@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -142,12 +141,7 @@ def _names(projects: list[Path]) -> dict[str, Path]:
 def _documents(made: Plan, json: Path | None, plot: Path | None) -> dict[Path, bytes]:
     documents = {json: made.to_json()} if json else {}
     if plot:
-        from photogram.errors import InputError
+        from photogram.pictures import drawn
 
-        figure, picture, kind = made.plot(), BytesIO(), plot.suffix.removeprefix(".")
-        known = figure.canvas.get_supported_filetypes()
-        if kind not in known:
-            raise InputError(f"a picture is one of {', '.join(sorted(known))}", file=plot)
-        figure.savefig(picture, format=kind)
-        documents[plot] = picture.getvalue()
+        documents[plot] = drawn(made.plot(), plot)
     return documents
