@@ -37,12 +37,14 @@ class Problem:
     priors: list[pyceres.CostFunction]  # kept alive while the adjuster points to them
 
 
-def problem(block: Block, points: Floats) -> Problem:
+def problem(block: Block, points: Floats, *, own_solver: bool = False) -> Problem:
     """Translate a block whose points start from `points`, (n, 3).
 
-    Held components of control are priors of their standard deviations. Raises ValueError for what the
-    translation does not cover: geographic space, weighted or fixed photographs, fixed control, several
-    cameras or several standard deviations of image coordinates.
+    The linear solver is SPARSE_SCHUR, or with `own_solver` the one that COLMAP chooses: ITERATIVE_SCHUR from
+    1,000 photographs on. Held components of control are priors of their standard deviations.
+
+    Raises ValueError for what the translation does not cover: geographic space, weighted or fixed
+    photographs, fixed control, several cameras or several standard deviations of image coordinates.
     """
     free = np.isinf(block.photo_position_sd).all() and np.isinf(block.photo_attitude_sd).all()
     if block.geographic or not free or (block.point_sd == 0).any():
@@ -55,8 +57,7 @@ def problem(block: Block, points: Floats) -> Problem:
     ]
     options = pycolmap.BundleAdjustmentOptions(print_summary=False)
     options.refine_focal_length = options.refine_extra_params = False
-    # COLMAP's own choice beyond 1,000 photographs, ITERATIVE_SCHUR, does not converge on aerial blocks.
-    options.ceres.auto_select_solver_type = False
+    options.ceres.auto_select_solver_type = own_solver
     options.ceres.solver_options.linear_solver_type = pyceres.LinearSolverType.SPARSE_SCHUR
     config = pycolmap.BundleAdjustmentConfig()
     for image in images:

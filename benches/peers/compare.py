@@ -80,7 +80,7 @@ def _arguments() -> argparse.Namespace:
         "--sides",
         nargs="+",
         default=list(SIDES),
-        help="photogram first; gtsam:SETTING for other settings (gtsam_block.py)",
+        help=f"photogram first; side.py says more (default: {' '.join(SIDES)})",
     )
     parser.add_argument(
         "--peers-up-to",

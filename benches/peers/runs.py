@@ -248,7 +248,8 @@ def main() -> None:
         "images": len(block.image_photos),
     }
     stem.with_suffix(".json").write_text(json.dumps(counts))
-    stem.with_suffix(".pickle").write_bytes(pickle.dumps((block, intersections(block))))
+    with stem.with_suffix(".pickle").open("wb") as file:
+        pickle.dump((block, intersections(block)), file)
 
 
 if __name__ == "__main__":

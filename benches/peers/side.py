@@ -1,6 +1,7 @@
 """One side of the comparison, alone in its process: python benches/peers/side.py SIDE STEM OUTPUT SECONDS.
 
-SIDE is photogram (photogram:1 on one thread), gtsam (gtsam:SETTING for another than its fastest) or pycolmap.
+SIDE is photogram (photogram:1 on one thread), gtsam (gtsam:SETTING for another than its fastest) or pycolmap
+(pycolmap:own-solver with the linear solver that it chooses).
 STEM.pickle holds the block with the initial points; what the side found is written to OUTPUT.json and
 OUTPUT.npz. A process of its own makes the peak of its memory its own. SECONDS limit gtsam's marginals;
 0 leaves the covariances of the peers out.
@@ -105,11 +106,12 @@ def run_gtsam(
     keys = np.random.default_rng(0).permutation(keys).tolist()
 
     def compute() -> int:
-        start, done = time.perf_counter(), 0
-        while done < len(keys) and time.perf_counter() - start < limit:
-            marginals.marginalCovariance(keys[done])
-            done += 1
-        return done
+        end = time.perf_counter() + limit
+        for done, key in enumerate(keys):
+            if done and time.perf_counter() > end:
+                return done
+            marginals.marginalCovariance(key)
+        return len(keys)
 
     done = record.time("marginals", compute)
     record.values["marginals"] = [done, len(keys)]
@@ -120,11 +122,14 @@ def run_gtsam(
     }
 
 
-def run_pycolmap(block: photogram.Block, points: Floats, record: Record, limit: float) -> dict[str, Floats]:
+def run_pycolmap(
+    block: photogram.Block, points: Floats, record: Record, limit: float, setting: str
+) -> dict[str, Floats]:
     """Solve; then the covariances of poses, and of points with the poses held."""
     import colmap_block
 
-    problem = record.time("building", lambda: colmap_block.problem(block, points))
+    own = setting == "own-solver"
+    problem = record.time("building", lambda: colmap_block.problem(block, points, own_solver=own))
     summary = record.time("solution", lambda: colmap_block.solve(problem))
     arrays = _arrays(colmap_block.read_out(block, problem, summary), record)
     if not limit:
@@ -146,12 +151,13 @@ def main() -> None:
     """Run one side once."""
     side, stem, output, limit = sys.argv[1:]
     package, _, setting = side.partition(":")
-    block, points = pickle.loads(Path(stem).with_suffix(".pickle").read_bytes())
+    with Path(stem).with_suffix(".pickle").open("rb") as file:
+        block, points = pickle.load(file)
     record = Record()
     sides: dict[str, Callable[[], dict[str, Floats]]] = {
         "photogram": lambda: run_photogram(block, record, int(setting) if setting else None),
         "gtsam": lambda: run_gtsam(block, points, record, float(limit), setting),
-        "pycolmap": lambda: run_pycolmap(block, points, record, float(limit)),
+        "pycolmap": lambda: run_pycolmap(block, points, record, float(limit), setting),
     }
     arrays = sides[package]()
     record.values["version"] = version(package)

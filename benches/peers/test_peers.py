@@ -29,7 +29,7 @@ SIDES: dict[str, Run] = {
         )
         for setting in gtsam_block.SETTINGS
     },
-    "pycolmap": lambda block, points, record: side.run_pycolmap(block, points, record, 60.0),
+    "pycolmap": lambda block, points, record: side.run_pycolmap(block, points, record, 60.0, ""),
 }
 
 
