@@ -14,7 +14,7 @@ from solution import Floats
 STANDARD_DEVIATIONS = 1e-3
 SUM_OF_SQUARES = 1e-8
 # COLMAP damps the normal equations by 1e-8 of their diagonal before it inverts them.
-COFACTORS = 1e-4
+COFACTORS = 1e-5
 
 
 @dataclass(frozen=True)
