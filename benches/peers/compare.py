@@ -41,9 +41,8 @@ def main() -> int:
     small = subprocess.run([sys.executable, HERE / "machine.py", "small"], check=True, capture_output=True)
     results = [Runs(plan, size).measured() for size in arguments.sizes]
 
-    command = shlex.join(["python", "benches/peers/compare.py", *sys.argv[1:]])
     about = (HERE / "performance.md").read_text()
-    text = page.page(results, json.loads(small.stdout), command, about, REASONS)
+    text = page.page(results, json.loads(small.stdout), _command(), about, REASONS)
     print(text)
     if arguments.write:
         arguments.write.write_text(text)
@@ -109,6 +108,14 @@ def _arguments() -> argparse.Namespace:
     if arguments.sides[0] != "photogram":
         parser.error("photogram is the side that all others are compared with")
     return arguments
+
+
+def _command() -> str:
+    """Return the command as it was given, but for where and when results are kept."""
+    words = [word for word in sys.argv[1:] if word != "--fresh"]
+    if "--work" in words:
+        del words[words.index("--work") : words.index("--work") + 2]
+    return shlex.join(["python", "benches/peers/compare.py", *words])
 
 
 def _replace(path: Path, text: str) -> None:
