@@ -203,7 +203,7 @@ class Runs:
         try:
             done = subprocess.run([sys.executable, *map(str, command)], timeout=self.plan.limit, check=False)
         except subprocess.TimeoutExpired:
-            return {"failed": f"more than {self.plan.limit:.0f} s"}
+            return {"failed": f"more than {self.plan.limit:g} s"}
         if done.returncode:
             return {"failed": f"exit status {done.returncode}"}
         return dict(json.loads(output.with_suffix(".json").read_text()))
