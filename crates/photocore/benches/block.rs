@@ -30,6 +30,8 @@ const BASE: f64 = 2710.0;
 const SEPARATION: f64 = 4743.0;
 /// Between ground points: four columns to a base, seven rows to a separation.
 const SPACING: f64 = 677.5;
+/// No photograph sees a point farther away than this along or across the strip.
+const REACH: f64 = 1.2 * FLYING_HEIGHT * HALF_FRAME / -PRINCIPAL_DISTANCE;
 const IMAGE_SD: f64 = 0.01;
 /// One point in so many is control.
 const CONTROL: usize = 50;
@@ -82,6 +84,10 @@ fn strips(strips: usize, photos_per_strip: usize) -> Block {
         let images: Vec<Image> = cameras
             .iter()
             .enumerate()
+            .filter(|&(photo, _)| {
+                let position = true_photos[photo].0;
+                (0..2).all(|k| (position[k] - coordinates[k]).abs() < REACH)
+            })
             .map(|(photo, camera)| Image { photo, point, xy: camera.project(&at), sd: [IMAGE_SD; 2] })
             .filter(|image| image.xy.iter().all(|value| value.abs() < HALF_FRAME))
             .collect();
