@@ -247,8 +247,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
         let factor = done(system.factor(&pool, &dense, &dense.prior, 0.0, &mut go));
         let solution = done(system.solve(&pool, &factor, &dense, &dense.prior, 0.0, &mut go));
         let cofactors = done(system.invert(&pool, factor, &dense, &dense.prior, &mut go)).cofactors;
-        let numbers =
-            [solution, cofactors.local, cofactors.kept, cofactors.border, cofactors.equations];
+        let numbers = [solution, cofactors.local, cofactors.kept, cofactors.border, cofactors.equations];
         numbers.concat().into_iter().map(f64::to_bits).collect::<Vec<u64>>()
     };
     let one = run(1);

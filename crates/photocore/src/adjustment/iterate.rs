@@ -70,16 +70,12 @@ pub struct Iteration {
 /// What the adjustment is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// Forming the normal equations.
+    /// Forming the normal equations and factoring them, which go together.
     Form,
-    /// Factoring them.
-    Factor,
     /// Solving them.
     Solve,
-    /// Inverting them.
+    /// Inverting them, with cofactors and redundancy numbers.
     Invert,
-    /// Computing cofactors and redundancy numbers.
-    Cofactors,
 }
 
 /// What is told while the adjustment runs.
@@ -291,7 +287,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let number = self.iterations.len() + 1;
             let iteration =
                 Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
-            if damping == 0.0 && (solved.change <= fraction || self.leaves_less_than(fraction, solved.change)) {
+            if damping == 0.0 && (solved.change <= fraction || self.leaves_less_than(fraction, solved.change))
+            {
                 let last = Some((iteration, solved.step));
                 return Ok(End { status: Status::Converged, unknowns, basis: Some(solved.basis), last });
             }

@@ -42,7 +42,9 @@ impl Cofactors {
             let blocks = at_home.local.chunks_exact(l * l);
             for (&block, cofactors) in system.incidence.locals_at(index).iter().zip(blocks) {
                 local[block as usize * l * l..][..l * l].copy_from_slice(cofactors);
-                for (&group, values) in system.incidence.groups_of(layout, block as usize).iter().zip(&mut values) {
+                for (&group, values) in
+                    system.incidence.groups_of(layout, block as usize).iter().zip(&mut values)
+                {
                     equations[group as usize * rows..][..rows].copy_from_slice(values);
                 }
             }
@@ -184,7 +186,14 @@ impl Ties {
         for (slot, &(_, start, _)) in stack.slots.iter().zip(&self.parts) {
             for (k, p) in slot.groups.clone().enumerate() {
                 for row in 0..size::<R>(rows) {
-                    found.equations.push(self.equation::<R, L, D>(stack, slot, start, (t, k, p, row), rows, &own));
+                    found.equations.push(self.equation::<R, L, D>(
+                        stack,
+                        slot,
+                        start,
+                        (t, k, p, row),
+                        rows,
+                        &own,
+                    ));
                 }
             }
         }

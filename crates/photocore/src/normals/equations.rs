@@ -37,7 +37,11 @@ impl Prior {
     /// The normal equations of the unknowns of one local block themselves: diagonal, with the damping still to come, and
     /// right-hand side.
     #[inline(always)]
-    pub(super) fn of_local<const L: usize>(&self, layout: &Layout, local: usize) -> ([[f64; L]; L], [f64; L]) {
+    pub(super) fn of_local<const L: usize>(
+        &self,
+        layout: &Layout,
+        local: usize,
+    ) -> ([[f64; L]; L], [f64; L]) {
         let first = layout.local_range(local).start;
         let mut normal = [[0.0; L]; L];
         (0..L).for_each(|d| normal[d][d] = self.weight[first + d]);

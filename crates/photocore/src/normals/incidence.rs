@@ -119,6 +119,8 @@ impl<'a> Stacks<'a> {
     /// Parts of so many stacks at the most.
     pub fn parts(self, most: usize) -> Vec<Self> {
         let starts = (0..self.ptr.len() - 1).step_by(most);
-        starts.map(|first| Self { ptr: &self.ptr[first..=(first + most).min(self.ptr.len() - 1)], ..self }).collect()
+        starts
+            .map(|first| Self { ptr: &self.ptr[first..=(first + most).min(self.ptr.len() - 1)], ..self })
+            .collect()
     }
 }

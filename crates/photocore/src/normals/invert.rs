@@ -39,7 +39,11 @@ impl SelectedInverse {
         // The lower triangle, that is the row later in the order of elimination, carries the values.
         let value = |i: usize, j: usize| {
             let (high, low) = if p > q { (at + i, left + j) } else { (at + j, left + i) };
-            if first == last { panel[low.min(high) * height + low.max(high)] } else { panel[low * height + high] }
+            if first == last {
+                panel[low.min(high) * height + low.max(high)]
+            } else {
+                panel[low * height + high]
+            }
         };
         let columns = symbolic.dim(q);
         Some((0..symbolic.dim(p) * columns).map(|k| value(k / columns, k % columns)).collect())

@@ -101,7 +101,10 @@ impl Layout {
             local_dim,
             locals,
             kept_offset,
-            common_kept_dim: kept_dims.first().copied().filter(|first| kept_dims.iter().all(|dim| dim == first)),
+            common_kept_dim: kept_dims
+                .first()
+                .copied()
+                .filter(|first| kept_dims.iter().all(|dim| dim == first)),
             border_dim: 0,
             group_ptr,
             group_kept,

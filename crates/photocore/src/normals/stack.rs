@@ -156,7 +156,9 @@ impl Stack {
         parts.sort_unstable_by_key(|part| part.start);
         for part in parts {
             match self.segments.last_mut() {
-                Some(last) if part.start <= last.border.end => last.border.end = last.border.end.max(part.end),
+                Some(last) if part.start <= last.border.end => {
+                    last.border.end = last.border.end.max(part.end)
+                }
                 _ => self.segments.push(Segment { border: part, coupling: 0 }),
             }
         }
@@ -190,7 +192,8 @@ impl Stack {
     ) {
         for slot in &self.slots {
             for (k, p) in slot.groups.clone().enumerate() {
-                let constants = &self.constants[slot.constants + (t * slot.groups.len() + k) * rows..][..rows];
+                let constants =
+                    &self.constants[slot.constants + (t * slot.groups.len() + k) * rows..][..rows];
                 let own = &self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L];
                 for (row, constant) in own.as_chunks::<L>().0.iter().zip(constants) {
                     for a in 0..L {
@@ -311,9 +314,16 @@ impl Stack {
 
     /// Adds the part of the border itself.
     #[inline(always)]
-    fn add_border<S: Simd, const L: usize>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, border: usize) {
+    fn add_border<S: Simd, const L: usize>(
+        &self,
+        simd: S,
+        columns: &mut Columns<'_>,
+        rows: usize,
+        border: usize,
+    ) {
         for slot in &self.slots {
-            for (k, p) in slot.groups.clone().enumerate().filter(|&(_, p)| !self.places[p].border.is_empty()) {
+            for (k, p) in slot.groups.clone().enumerate().filter(|&(_, p)| !self.places[p].border.is_empty())
+            {
                 for t in 0..self.locals.len() {
                     let own = self.border_strip(t, p, rows, border);
                     let at = slot.constants + (t * slot.groups.len() + k) * rows;
@@ -334,14 +344,7 @@ impl Stack {
 
     /// Solves for the local blocks with the others in place: N x = A^T (l - A_other x_other). `others` are the unknowns that are
     /// not local, in the order of elimination; the solutions are added to `found`, one after the other.
-    pub fn solve(
-        &self,
-        system: &System,
-        prior: &Prior,
-        damping: f64,
-        others: &[f64],
-        found: &mut Vec<f64>,
-    ) {
+    pub fn solve(&self, system: &System, prior: &Prior, damping: f64, others: &[f64], found: &mut Vec<f64>) {
         run(&system.layout, Solve { stack: self, system, prior, damping, others, found });
     }
 
@@ -490,7 +493,8 @@ impl Kernel for Solve<'_> {
         let kept = |slot: &Slot| &others[self.system.symbolic.range(slot.position)];
         for t in 0..self.stack.locals.len() {
             let start = self.prior.of_local::<L>(layout, self.stack.locals[t] as usize);
-            let x = self.stack.solve_one::<L, D>(t, size::<R>(layout.rows()), start, self.damping, kept, border);
+            let x =
+                self.stack.solve_one::<L, D>(t, size::<R>(layout.rows()), start, self.damping, kept, border);
             self.found.extend_from_slice(&x);
         }
     }

@@ -23,7 +23,8 @@ impl System {
         let symbolic = Arc::new(Symbolic::new(&layout, ordering));
         let incidence = Incidence::new(&layout, &symbolic);
         let work = |(index, supernode): (usize, &super::symbolic::Supernode)| {
-            let formation = incidence.locals_at(index).iter().map(|&local| formation_work(&layout, local as usize));
+            let formation =
+                incidence.locals_at(index).iter().map(|&local| formation_work(&layout, local as usize));
             supernode.operations() + formation.sum::<f64>()
         };
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());

@@ -51,7 +51,8 @@ impl Tree {
 
     /// Visits every supernode after all those below it.
     pub fn upward(&self, visit: impl Fn(usize) + Sync) {
-        let waiting: Vec<AtomicUsize> = self.below.iter().map(|units| AtomicUsize::new(units.len())).collect();
+        let waiting: Vec<AtomicUsize> =
+            self.below.iter().map(|units| AtomicUsize::new(units.len())).collect();
         let start = |unit: usize| {
             (self.first[unit]..unit).for_each(&visit);
             let mut index = unit;

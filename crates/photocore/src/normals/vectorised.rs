@@ -77,7 +77,14 @@ pub(super) struct Rows<'a> {
 
 /// target[i, j] += sign times the sum over rows of a[row][i] b[row][j]; the target is column by column with the given stride.
 #[inline(always)]
-pub(super) fn add_product<S: Simd>(simd: S, target: &mut [f64], stride: usize, sign: f64, a: Rows<'_>, b: Rows<'_>) {
+pub(super) fn add_product<S: Simd>(
+    simd: S,
+    target: &mut [f64],
+    stride: usize,
+    sign: f64,
+    a: Rows<'_>,
+    b: Rows<'_>,
+) {
     for i in (0..a.width).step_by(LANES) {
         let target = &mut target[i..];
         let mut j = 0;
@@ -125,9 +132,7 @@ fn add_columns<S: Simd, const C: usize>(
     for c in 0..C {
         let mut values = [0.0; LANES];
         let vectors = S::as_mut_simd_f64s(&mut values).0;
-        for k in 0..LANES / S::F64_LANES {
-            vectors[k] = sums[c][k];
-        }
+        vectors.copy_from_slice(&sums[c][..LANES / S::F64_LANES]);
         let column = &mut target[c * stride..][..height];
         for k in 0..height {
             column[k] += sign * values[k];
