@@ -41,6 +41,10 @@ pub(super) fn watched<T: Send>(
 ) -> ControlFlow<(), T> {
     between(0)?;
     let control = Control::default();
+    if rayon::current_thread_index().is_some() {
+        // A thread at work must not wait for another; whoever put it to work watches.
+        return ControlFlow::Continue(work(&control));
+    }
     let (sender, receiver) = channel();
     let mut flow = ControlFlow::Continue(());
     let result = pool.in_place_scope(|scope| {
