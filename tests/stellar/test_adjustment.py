@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from photogram import AdjustmentError, InputError
+from photogram.angles import ARCSEC
 from photogram.stellar import calibrate
-from photogram.stellar.parameters import ARCSEC, INDEX
+from photogram.stellar.parameters import INDEX
 from photogram.stellar.plain import read_plain
 from photogram.stellar.published import DIVERGED, SETTLED, stop_reason
 from photogram.stellar.reduction import columns, invert, reduce

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Self
@@ -10,8 +9,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.angles import ARCSEC
 from photogram.errors import InputError
-from photogram.stellar.parameters import ARCSEC
+from photogram.rows import read_rows
 
 __all__ = ["Catalogue"]
 
@@ -96,25 +96,13 @@ class Catalogue:
         Raises
         ------
         InputError
-            A column is missing, or a value is not a number; with the record.
-        OSError
-            The file cannot be read.
+            The file cannot be read, a column is missing, or a value is not a number; with the record.
         """
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(file)
-            missing = [name for name in _COLUMNS if name not in (reader.fieldnames or [])]
-            if missing:
-                raise InputError(f"the columns {', '.join(missing)} are missing", file=path, record=1)
-            names, values = [], []
-            for number, row in enumerate(reader, 2):
-                try:
-                    values.append([float(row[name]) for name in _COLUMNS[1:]])
-                except (TypeError, ValueError) as error:
-                    raise InputError(str(error), file=path, record=number) from None
-                names.append(row["id"])
+        rows = read_rows(path, _COLUMNS)
+        values = [[row.required(name) for name in _COLUMNS[1:]] for row in rows]
         table = np.array(values, float).reshape(-1, 6)
         return cls(
-            tuple(names),
+            tuple(row.cells["id"] for row in rows),
             np.radians(table[:, :2]),
             _MAS * table[:, 2:4],
             _MAS * table[:, 4],

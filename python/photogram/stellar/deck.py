@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.angles import ARCSEC
 from photogram.errors import InputError
 from photogram.stellar.cards import Card, Cards
 from photogram.stellar.options import Options
-from photogram.stellar.parameters import ARCSEC, GRAD, NAMES
+from photogram.stellar.parameters import GRAD, NAMES
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.rejection import rejected
 from photogram.stellar.sky import Air, Site
@@ -82,11 +83,10 @@ def read_deck(path: Path) -> list[Problem]:
     Raises
     ------
     InputError
-        A card that cannot be used, with its number and text: errors 1 and 3 of the report and all others.
-    OSError
-        The file cannot be read.
+        The file cannot be read; or a card cannot be used, with its number and text: error 1 of the report and
+        all others.
     """
-    cards = Cards(path.read_text(encoding="utf-8", errors="replace"), path)
+    cards = Cards(path)
     problems = []
     while True:
         problem, last = _problem(cards)
@@ -187,7 +187,7 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
 
 def _descriptors(card: Card) -> _Descriptors:
     """Read the options: separated by blanks, or one after the other without any."""
-    words = card.text[:76].split()
+    words = card.columns(1, 76).split()
     if len(words) >= 13:
         try:
             numbers = [int(word) for word in words[:13]]
@@ -320,7 +320,7 @@ def _sidereal(card: Card, column: int) -> float:
 
 
 def _factor(card: Card) -> float:
-    words = card.text[32:71].split()
+    words = card.columns(33, 71).split()
     try:
         return float(words[-1]) if words else 0.0
     except ValueError:

@@ -9,8 +9,9 @@ import numpy as np
 import orjson
 
 from photogram import _photocore
+from photogram.angles import ARCSEC
 from photogram.stellar.curves import distortion_curves, histogram, refraction_curves
-from photogram.stellar.parameters import ARCSEC, GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.result import Result
 from photogram.stellar.transformation import transformed_angles
 

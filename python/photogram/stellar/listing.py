@@ -9,8 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from photogram import _photocore
+from photogram.angles import ARCSEC, degrees_minutes_seconds
 from photogram.stellar.curves import distortion_curves, refraction_curves
-from photogram.stellar.parameters import ARCSEC, GRAD, GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.result import SIGNIFICANT, Result
 from photogram.stellar.transformation import transformed_angles
 
@@ -68,8 +69,8 @@ def _labels(result: Result) -> list[str]:
     rows = [
         *result.problem.labels.items(),
         ("station", f"{site.number} {site.name}".strip() or "-"),
-        ("latitude", _dms(math.degrees(site.latitude))),
-        ("longitude, west", _dms(math.degrees(site.longitude_west))),
+        ("latitude", _degrees(site.latitude)),
+        ("longitude, west", _degrees(site.longitude_west)),
         ("elevation", f"{site.elevation:.4f} m"),
         ("temperature, pressure", f"{site.air.temperature:.2f} K, {site.air.pressure:.2f} mm of mercury"),
     ]
@@ -277,8 +278,8 @@ def _directions(result: Result) -> list[str]:
         sd = np.sqrt(np.diag(result.star_covariances[i])) / ARCSEC * [math.cos(dec), 1.0]
         e = ellipses[i]
         lines.append(
-            f"{result.problem.star_ids[i]:<8}{_dms(math.degrees(ra % math.tau) / 15, 'h'):>18}"
-            f"{_dms(math.degrees(dec)):>18}"
+            f"{result.problem.star_ids[i]:<8}{_hours(ra % math.tau):>18}"
+            f"{_degrees(dec):>18}"
             f"{sd[0]:13.4f}{sd[1]:9.4f}{e.major / ARCSEC:9.4f}{e.minor / ARCSEC:9.4f}"
             f"{math.degrees(e.direction):15.2f}"
         )
@@ -306,7 +307,7 @@ def _images(result: Result) -> list[str]:
     for i, point in enumerate(problem.image_points):
         x, y = problem.image_xy[i] * 1e3
         vx, vy = result.solved.residuals[i] * 1e6
-        time = _dms(math.degrees(problem.image_times[i]) / 15, "h")
+        time = _hours(problem.image_times[i])
         lines.append(
             f"{problem.star_ids[problem.image_stars[i]]:<8}{point:<8}{GROUPS[problem.image_groups[i]]:<7}{x:13.5f}{y:13.5f}{time:>18}"
             f"{vx:9.3f}{vy:9.3f}"
@@ -432,9 +433,16 @@ def _head(*cells: str) -> str:
     return "".join(format(cell[1], cell[2]) for cell in named if cell)
 
 
-def _dms(value: float, unit: str = "d") -> str:
-    """Write degrees or hours with minutes and seconds."""
-    sign, total = ("-" if value < 0 else ""), round(abs(value) * 3600 * 1e4)
-    minutes, seconds = divmod(total, 600000)
-    whole, minutes = divmod(minutes, 60)
-    return f"{sign}{whole}{unit} {minutes:02d}m {seconds / 1e4:07.4f}s"
+def _degrees(angle: float) -> str:
+    """Write radians as degrees, minutes and seconds."""
+    return _sexagesimal(angle, "d")
+
+
+def _hours(angle: float) -> str:
+    """Write radians as hours, minutes and seconds of time."""
+    return _sexagesimal(angle / 15, "h")
+
+
+def _sexagesimal(angle: float, unit: str) -> str:
+    whole, minutes, seconds = degrees_minutes_seconds(angle, 4)
+    return f"{'-' if angle < 0 else ''}{whole}{unit} {minutes:02d}m {seconds:07.4f}s"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from photogram.stellar.parameters import ARCSEC
+from photogram.angles import ARCSEC
 from photogram.stellar.sky import Site
 
 __all__ = ["Options"]

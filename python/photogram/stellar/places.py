@@ -8,9 +8,9 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.angles import ARCSEC
 from photogram.errors import InputError
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.parameters import ARCSEC
 from photogram.stellar.sky import Site
 
 __all__ = ["apparent_places", "sidereal_time"]

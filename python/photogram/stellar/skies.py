@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.errors import AdjustmentError, InputError
+from photogram.files import read_bytes
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import match
 from photogram.stellar.places import apparent_places, sidereal_time
@@ -85,10 +86,10 @@ class BrownCamera:
         Raises
         ------
         InputError
-            Another document.
+            The file cannot be read, or is another document.
         """
         try:
-            document = orjson.loads(path.read_bytes())
+            document = orjson.loads(read_bytes(path))
             values = np.array([document["parameters"][name] for name in NAMES], float)
             covariance = np.array(document["covariance"]["matrix"], float).reshape(9, 9)
         except (KeyError, TypeError, ValueError) as error:
