@@ -47,6 +47,9 @@ class Options:
         Sidereal time of the fictitious points, radians.
     crossover, interval, extent
         Radius at which the transformed distortion vanishes; step and end of the curves; metres.
+    comparator_angle
+        From the axes of the plate coordinates to those of the comparator, from x towards y, radians: scales
+        and nonperpendicularity are given in the latter, too (equation 42). None where they are the same.
     distortion_first
         Scale after distortion, at this principal distance (metres), as the report prefers for calibration
         (equations 40 and 41); 0 for scale before distortion, as programmed.
@@ -74,6 +77,7 @@ class Options:
     crossover: float = 0.0
     interval: float = 0.005
     extent: float = 0.1
+    comparator_angle: float | None = None
     distortion_first: float = 0.0
     as_published: bool = False
 

@@ -8,93 +8,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import orjson
 from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.errors import AdjustmentError, InputError
-from photogram.files import read_bytes
+from photogram.stellar.cameras import BROWN_PLACE, COMMON, BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import match
 from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.sky import TAU, Site
+from photogram.stellar.sky import Site
 
 __all__ = ["BrownCamera", "Exposure", "SkyCalibration", "calibrate_exposures", "identify", "project_sky"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
-# Places of these among the common parameters of the core, whose P1 is the p2 of computer vision.
-_PLACE = (3, 4, 1, 2, 7, 8, 9, 11, 10)
-_COMMON = 17
-
-
-@dataclass(frozen=True, eq=False)
-class BrownCamera:
-    """A pinhole camera with Brown's distortion, in pixels, and its covariance.
-
-    With (u, v) = (X, Y) / Z and r^2 = u^2 + v^2,
-    x = fx (u (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 u v + p2 (r^2 + 2 u^2)) + cx,
-    and y likewise with fy, cy, and p1, p2 exchanged.
-
-    Attributes
-    ----------
-    values
-        (9,) fx, fy, cx, cy, k1, k2, k3, p1, p2.
-    covariance
-        (9, 9); zero for what was held.
-    """
-
-    values: Floats
-    covariance: Floats
-
-    @classmethod
-    def of_field(cls, width: float, height: float, field_of_view: float) -> BrownCamera:
-        """Return an ideal camera of a frame in pixels and a horizontal field of view in radians."""
-        f = 0.5 * width / math.tan(0.5 * field_of_view)
-        values = np.array([f, f, 0.5 * width, 0.5 * height, 0, 0, 0, 0, 0], float)
-        return cls(values, np.zeros((9, 9)))
-
-    @property
-    def common(self) -> Floats:
-        """(17,) as the core takes it."""
-        common = np.zeros(_COMMON)
-        common[list(_PLACE)] = self.values
-        common[13:] = TAU
-        return common
-
-    def to_json(self) -> bytes:
-        """Return the camera as a JSON document: a weighted prior of later adjustments."""
-        document = {
-            "program": f"photogram {_photocore.__version__}",
-            "kind": "brown camera",
-            "unit": "pixel",
-            "parameters": dict(zip(NAMES, self.values.tolist(), strict=True)),
-            "covariance": {"order": NAMES, "matrix": self.covariance},
-        }
-        return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
-
-    @classmethod
-    def read(cls, path: Path) -> BrownCamera:
-        """Read what `to_json` wrote.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read, or is another document.
-        """
-        try:
-            document = orjson.loads(read_bytes(path))
-            values = np.array([document["parameters"][name] for name in NAMES], float)
-            covariance = np.array(document["covariance"]["matrix"], float).reshape(9, 9)
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is not a camera: {error}", file=path) from None
-        return cls(values, covariance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,15 +185,18 @@ def calibrate_exposures(
     AdjustmentError
         The stars do not determine the camera.
     """
-    unknown = sorted(set(fixed) - set(NAMES))
+    unknown = sorted(set(fixed) - set(BrownCamera.NAMES))
     if unknown:
         raise InputError(f"there is no camera parameter {', '.join(unknown)}")
     images = _Images(exposures, site, catalogue, dut1)
     count = len(exposures)
-    held = np.ones(3 * count + _COMMON, bool)
+    held = np.ones(3 * count + COMMON, bool)
     held[: 3 * count] = False
     held[
-        3 * count + np.array([place for name, place in zip(NAMES, _PLACE, strict=True) if name not in fixed])
+        3 * count
+        + np.array(
+            [place for name, place in zip(BrownCamera.NAMES, BROWN_PLACE, strict=True) if name not in fixed]
+        )
     ] = False
     core = _core(images, exposures, camera, site, held, pixel_sd)
     try:
@@ -330,16 +263,16 @@ def _result(found: dict[str, Any], images: _Images, count: int, unknowns: int) -
     freedom = 2 * len(images.xy) - unknowns
     mean_error = math.sqrt(found["sums_of_squares"][0] / freedom) if freedom > 0 else 1.0
     cofactors = mean_error**2 * found["cofactors"]
-    place = list(_PLACE)
+    place = list(BROWN_PLACE)
     if count <= 3:
-        full = cofactors.reshape(3 * count + _COMMON, -1)
+        full = cofactors.reshape(3 * count + COMMON, -1)
         own = np.array([full[3 * e : 3 * e + 3, 3 * e : 3 * e + 3] for e in range(count)])
         cross = np.array([full[3 * e : 3 * e + 3, 3 * count :] for e in range(count)])
         common = full[3 * count :, 3 * count :]
     else:
-        rows = cofactors[: count * 3 * (3 + _COMMON)].reshape(count, 3, 3 + _COMMON)
+        rows = cofactors[: count * 3 * (3 + COMMON)].reshape(count, 3, 3 + COMMON)
         own, cross = rows[:, :, :3], rows[:, :, 3:]
-        common = cofactors[count * 3 * (3 + _COMMON) :].reshape(_COMMON, _COMMON)
+        common = cofactors[count * 3 * (3 + COMMON) :].reshape(COMMON, COMMON)
     parameters = found["parameters"]
     return SkyCalibration(
         camera=BrownCamera(parameters[3 * count :][place], common[np.ix_(place, place)]),
