@@ -35,7 +35,7 @@ COMMON = 17
 _FORMAT = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
 
 
-def inverse(covariance: Floats) -> Floats:
+def weight_of(covariance: Floats) -> Floats:
     """Return the weight matrix of a covariance whose rows differ by orders of magnitude.
 
     Raises
@@ -65,7 +65,7 @@ def _read(path: Path, kind: str, names: tuple[str, ...]) -> tuple[dict[str, Any]
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"is not a {kind}: {error}", file=path) from None
+        raise InputError(f"is not a camera: {error}", file=path) from None
     covariance = np.zeros((len(names), len(names)))
     covariance[np.ix_(order, order)] = matrix
     return document, found, covariance
@@ -132,7 +132,7 @@ class PlateCamera:
                 float(document["reference_principal_distance"] or 0.0),
             )
         except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is not a stellar camera: {error}", file=path) from None
+            raise InputError(f"is not a camera: {error}", file=path) from None
 
     def document(self) -> dict[str, Any]:
         """Return the camera as it is written."""
@@ -187,7 +187,7 @@ class PlateCamera:
         )
         weights[9:22, :] = weights[:, 9:22] = 0.0
         part = self.covariance[np.ix_(known, known)]
-        weights[np.ix_(place, place)] = (unit or self.mean_error) ** 2 * inverse(part)
+        weights[np.ix_(place, place)] = (unit or self.mean_error) ** 2 * weight_of(part)
         initial[9:22] = self.values
         fixed[9:22] |= ~known & (np.arange(13) != INDEX["cy"] - 9 if self.common_scale else True)
         return replace(problem, parameter_weights=weights, initial=initial, fixed=fixed)

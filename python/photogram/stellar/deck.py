@@ -98,7 +98,8 @@ def read_deck(path: Path) -> list[Problem]:
 def _problem(cards: Cards) -> tuple[Problem, bool]:
     first = cards.take("card 1 (problem number)")
     title = cards.take("card 2 (title)")
-    descriptors = _descriptors(cards.take("card 3 (options)"))
+    option_card = cards.take("card 3 (options)")
+    descriptors = _descriptors(option_card)
     constants = cards.take("card 4 (problem constants)")
     values = constants.reals(1, 10, 8, 6)
     event, plate, comparator = (
@@ -119,8 +120,6 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
     plate_weight = _matrix(cards.take("card 21 (weight of the plate)"), 1, 12) if descriptors[4] else None
     stars, points = _rejections(cards) if descriptors.reject else (set(), set())
     minimum = _minimum(cards, descriptors[6]) if descriptors[6] else ()
-    if descriptors[7] and not minimum:
-        raise InputError("option 7 (pre-run) needs option 6 (minimum solution)")
     corrections = tuple(_sidereal(plate, column) for column in (37, 51, 65))
     common = _Common(
         post=comparator.integer(72, 74) or 500,
@@ -130,28 +129,31 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
         plate_weight=plate_weight,
     )
     data = _data(cards, common)
-    options = Options(
-        common_scale=bool(descriptors[1]),
-        refraction=bool(descriptors[5]),
-        minimum_stars=minimum,
-        pre_run=bool(descriptors[7]),
-        curves=bool(descriptors[8]),
-        reference=reference,
-        pole=pole,
-        plate_list=bool(descriptors[11]),
-        max_iterations_minimum=descriptors[12],
-        max_iterations=descriptors[13],
-        mean_error=descriptors.mean_error,
-        histogram=descriptors.histogram,
-        tolerance=values[0],
-        refraction_tolerance=values[1] * ARCSEC,
-        crossover=values[4],
-        interval=values[5] or 0.005,
-        extent=values[6],
-        distortion_tolerance=values[7],
-        movement_factor=_factor(comparator),
-        movement_time=plate.real(26, 36),
-    )
+    try:
+        options = Options(
+            common_scale=bool(descriptors[1]),
+            refraction=bool(descriptors[5]),
+            minimum_stars=minimum,
+            pre_run=bool(descriptors[7]),
+            curves=bool(descriptors[8]),
+            reference=reference,
+            pole=pole,
+            plate_list=bool(descriptors[11]),
+            max_iterations_minimum=descriptors[12],
+            max_iterations=descriptors[13],
+            mean_error=descriptors.mean_error,
+            histogram=descriptors.histogram,
+            tolerance=values[0],
+            refraction_tolerance=(values[1] or 1e-4) * ARCSEC,
+            crossover=values[4],
+            interval=values[5] or 0.005,
+            extent=values[6],
+            distortion_tolerance=values[7],
+            movement_factor=_factor(comparator),
+            movement_time=plate.real(26, 36),
+        )
+    except InputError as error:
+        raise option_card.error(error.message) from None
     labels = {
         "title": title.name(1, 80),
         "problem": first.name(1, 4),
@@ -163,6 +165,9 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
         "tracking unit": plate.name(17, 19),
         "comparator": comparator.name(1, 8),
         "operator": comparator.name(9, 32),
+        "time corrections pre, post, event": ", ".join(f"{c / _HOUR * 3600:.4f} s" for c in corrections)
+        if any(corrections)
+        else "",
     }
     problem = Problem(
         site=site,

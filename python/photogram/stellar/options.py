@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from photogram.angles import ARCSEC
+from photogram.errors import InputError
 from photogram.stellar.sky import Site
 
 __all__ = ["Options"]
@@ -80,6 +81,26 @@ class Options:
     comparator_angle: float | None = None
     distortion_first: float = 0.0
     as_published: bool = False
+
+    def __post_init__(self) -> None:
+        if self.pre_run and not self.minimum_stars:
+            raise InputError("option 7 (pre-run) needs option 6 (minimum solution)")
+        positive = ("refraction_tolerance", "interval")
+        for name in positive:
+            if not getattr(self, name) > 0:
+                raise InputError(f"{name} is {getattr(self, name)}; it must be positive")
+        limits = (
+            "tolerance",
+            "distortion_tolerance",
+            "max_iterations_minimum",
+            "max_iterations",
+            "mean_error",
+            "crossover",
+            "extent",
+        )
+        for name in limits:
+            if not getattr(self, name) >= 0:
+                raise InputError(f"{name} is {getattr(self, name)}; it cannot be negative")
 
     @property
     def camera_kind(self) -> tuple[float | None, bool, bool]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,29 +12,37 @@ from numpy.typing import NDArray
 
 from photogram.angles import ARCSEC
 from photogram.errors import InputError
-from photogram.files import read_bytes
+from photogram.messages import listed
 from photogram.rows import Row, read_rows
+from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.rejection import rejected
-from photogram.stellar.sky import ABERRATION, Air, Site
+from photogram.stellar.tomlfile import read_document, site, usable
 
 __all__ = ["read_plain"]
 
 Floats = NDArray[np.float64]
 
+
+def _switch(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise InputError(f"{value!r} is neither true nor false")
+    return value
+
+
 _OPTIONS: dict[str, Callable[[Any], Any]] = {
-    "common_scale": bool,
-    "refraction": bool,
+    "common_scale": _switch,
+    "refraction": _switch,
     "minimum_stars": lambda value: tuple(str(star) for star in value),
-    "pre_run": bool,
-    "curves": bool,
-    "plate_list": bool,
+    "pre_run": _switch,
+    "curves": _switch,
+    "plate_list": _switch,
     "max_iterations_minimum": int,
     "max_iterations": int,
     "mean_error": float,
-    "histogram": bool,
+    "histogram": _switch,
     "tolerance": float,
     "refraction_tolerance_arcsec": float,
     "distortion_tolerance": float,
@@ -44,23 +51,24 @@ _OPTIONS: dict[str, Callable[[Any], Any]] = {
     "crossover": float,
     "interval": float,
     "extent": float,
+    "comparator_angle_deg": float,
     "distortion_first": float,
-    "as_published": bool,
+    "as_published": _switch,
 }
 _STAR_WEIGHT = ("weight_ra", "weight_dec", "weight_cross")
 _IMAGE_WEIGHT = ("weight_xx", "weight_yy", "weight_xy")
 _TABLES = {
-    "labels",
-    "station",
-    "reference",
-    "pole",
-    "camera",
-    "weights",
-    "axis",
-    "options",
-    "stars",
-    "images",
-    "reject",
+    "labels": None,
+    "station": None,
+    "reference": None,
+    "pole": ("x_arcsec", "y_arcsec"),
+    "camera": None,
+    "weights": None,
+    "axis": ("azimuth_deg", "zenith_distance_deg", "x_m", "y_m", "weight", "orientation"),
+    "options": None,
+    "stars": ("file", "weight"),
+    "images": ("file", "weight", "first_post", "first_event", "time_corrections_rad"),
+    "reject": ("stars", "points"),
 }
 
 
@@ -77,26 +85,16 @@ def read_plain(path: Path) -> Problem:
     InputError
         A file that cannot be read, and what cannot be used, with the file, and the record of a CSV file.
     """
-    try:
-        document = tomllib.loads(read_bytes(path).decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(error), file=path) from None
-    unknown = sorted(set(document) - _TABLES)
-    if unknown:
-        raise InputError(f"there is no table {', '.join(unknown)}", file=path)
-    try:
+    document = read_document(path, _TABLES)
+    with usable(path):
         return _problem(document, path)
-    except KeyError as error:
-        raise InputError(f"{error.args[0]} is missing", file=path) from None
-    except (TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(str(error), file=path) from None
 
 
 def _problem(document: dict[str, Any], path: Path) -> Problem:
-    site = _site(document["station"])
-    initial, fixed = _camera(document["camera"])
+    camera = dict(document["camera"])
+    prior, unit = camera.pop("prior", None), camera.pop("prior_unit_m", None)
+    known = None if prior is None else PlateCamera.read(path.parent / prior)
+    initial, fixed = _camera(camera, known)
     stars, images = document["stars"], document["images"]
     star_rows = read_rows(path.parent / stars["file"], ("star", "ra_rad", "dec_rad"))
     image_rows = read_rows(path.parent / images["file"], ("star", "point", "x_m", "y_m", "sidereal_time_rad"))
@@ -109,7 +107,7 @@ def _problem(document: dict[str, Any], path: Path) -> Problem:
         if row.cells["star"] not in place:
             raise row.place.error(f"ERROR 1: star {row.cells['star']} is not listed")
     problem = Problem(
-        site=site,
+        site=site(document["station"]),
         star_ids=ids,
         star_names=tuple(row.cells.get("name") or row.cells["star"] for row in star_rows),
         star_places=_pairs(star_rows, "ra_rad", "dec_rad"),
@@ -127,27 +125,18 @@ def _problem(document: dict[str, Any], path: Path) -> Problem:
         options=_options(document),
         labels={name: str(value) for name, value in document.get("labels", {}).items()},
     )
+    if known is not None:
+        problem = known.as_prior(problem, unit)
     reject = document.get("reject", {})
     return rejected(
         problem, {str(s) for s in reject.get("stars", [])}, {str(p) for p in reject.get("points", [])}
     )
 
 
-def _site(table: dict[str, Any]) -> Site:
-    return Site(
-        latitude=math.radians(table["latitude_deg"]),
-        longitude_west=math.radians(table.get("longitude_west_deg", 0.0)),
-        elevation=table.get("elevation_m", 0.0),
-        air=Air(table.get("temperature_K", 273.15), table.get("pressure_mmHg", 760.0)),
-        aberration=table["aberration_arcsec"] * ARCSEC if "aberration_arcsec" in table else ABERRATION,
-        number=str(table.get("number", "")),
-        name=str(table.get("name", "")),
-    )
-
-
-def _camera(table: dict[str, Any]) -> tuple[Floats, NDArray[np.bool_]]:
+def _camera(table: dict[str, Any], prior: PlateCamera | None) -> tuple[Floats, NDArray[np.bool_]]:
     """Read initial values: angles in grads, all else in the units of the parameters."""
-    table = dict(table)
+    if prior is not None:
+        table.setdefault("cx", float(prior.values[INDEX["cx"] - 9]))
     fixed = np.zeros(len(NAMES), bool)
     for name in table.pop("fixed", []):
         fixed[_index(name)] = True
@@ -201,8 +190,13 @@ def _star_weight(row: Row, common: list[float] | None) -> Floats:
 def _group(row: Row, images: dict[str, Any]) -> int:
     """Take the column `orientation`, else the number of the point as in the deck."""
     if row.cells.get("orientation"):
+        if row.cells["orientation"] not in GROUPS:
+            raise row.place.error(f"orientation {row.cells['orientation']!r} is not {', '.join(GROUPS)}")
         return GROUPS.index(row.cells["orientation"])
-    trail = abs(int(row.cells["point"])) % 1000
+    try:
+        trail = abs(int(row.cells["point"])) % 1000
+    except ValueError:
+        raise row.place.error(f"point {row.cells['point']!r} is not a number: name its orientation") from None
     return 0 if trail < images.get("first_post", 500) else 1 if trail < images.get("first_event", 900) else 2
 
 
@@ -226,13 +220,20 @@ def _options(document: dict[str, Any]) -> Options:
     table = document.get("options", {})
     unknown = sorted(set(table) - set(_OPTIONS))
     if unknown:
-        raise ValueError(f"there is no option {', '.join(unknown)}")
-    values = {name: _OPTIONS[name](value) for name, value in table.items()}
+        raise InputError(f"there is no option {listed(unknown)}")
+    values = {}
+    for name, value in table.items():
+        try:
+            values[name] = _OPTIONS[name](value)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"option {name}: {error}") from None
     if "refraction_tolerance_arcsec" in values:
         values["refraction_tolerance"] = values.pop("refraction_tolerance_arcsec") * ARCSEC
+    if "comparator_angle_deg" in values:
+        values["comparator_angle"] = math.radians(values.pop("comparator_angle_deg"))
     pole = document.get("pole", {})
     return Options(
-        reference=_site(document["reference"]) if "reference" in document else None,
+        reference=site(document["reference"]) if "reference" in document else None,
         pole=(pole.get("x_arcsec", 0.0) * ARCSEC, pole.get("y_arcsec", 0.0) * ARCSEC),
         **values,
     )
