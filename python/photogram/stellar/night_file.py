@@ -85,7 +85,7 @@ def read_night(path: Path) -> Night:
 
 
 def inputs(path: Path) -> list[Path]:
-    """Return the files that a night is read from: results must not overwrite them."""
+    """Return the files that a night is read from: results must not replace them."""
     document = read_document(path, _TABLES)
     named = [
         document.get(table, {}).get(key)
