@@ -137,6 +137,23 @@ class Problem:
             raise InputError("an image names a star or a group that is not there")
         if np.isnan(self.star_weights).any():
             raise InputError("star_weights holds what is not a number")
+        self._check_weights()
+
+    def _check_weights(self) -> None:
+        """Refuse weights that are not positive definite: of images, of known stars, of the axis."""
+        axis = np.eye(2)[None] if self.axis is None else self.axis.weight[None]
+        for name, weights in (
+            ("point", self.image_weights),
+            ("star", np.where((self.known & ~self.held)[:, None, None], self.star_weights, np.eye(2))),
+            ("the axis", axis),
+        ):
+            symmetric = weights[:, 0, 1] == weights[:, 1, 0]
+            determinant = weights[:, 0, 0] * weights[:, 1, 1] - weights[:, 0, 1] ** 2
+            wrong = np.flatnonzero(~((weights[:, 0, 0] > 0) & (determinant > 0) & symmetric))
+            if wrong.size:
+                names = {"point": self.image_points, "star": self.star_ids}.get(name)
+                whose = f"{name} {names[wrong[0]]}" if names else name
+                raise InputError(f"the weight of {whose} is not positive definite")
 
     @property
     def known(self) -> Bools:
