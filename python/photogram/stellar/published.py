@@ -72,14 +72,13 @@ def _form(problem: Problem, parameters: Floats, free: Bools) -> _Formed:
         for star in np.flatnonzero(unknown):
             places[star] = directions[np.flatnonzero(problem.image_stars == star)[0]]
     core = problem.core(parameters, places, ~free)
-    equations = _published(problem, core, np.zeros_like(places))
+    equations = _published(problem, core)
     return _Formed(equations, reduce(problem, core, equations, places), places)
 
 
-def _published(problem: Problem, core: Any, corrections: Floats) -> dict[str, Any]:
+def _published(problem: Problem, core: Any) -> dict[str, Any]:
     options = problem.options
     found: dict[str, Any] = core.published(
-        corrections,
         refraction=options.refraction_tolerance,
         distortion=options.distortion_tolerance,
         passes=PASSES,
@@ -151,6 +150,9 @@ def residual_cycle(
 ) -> Solved:
     """Compute star corrections, residuals and their tests at final parameters (the report's v-cycle).
 
+    Refraction is that of the corrected places; the report's listing keeps that of the catalogue's, which makes
+    two millionths of the mean error of unit weight.
+
     Parameters
     ----------
     problem, parameters, free
@@ -165,8 +167,8 @@ def residual_cycle(
     if cofactors is None:
         cofactors = invert(reduced.normal + problem.parameter_weights, free)
     corrections = reduced.star_corrections()
-    core = problem.core(parameters, formed.places, ~free)
-    final = _published(problem, core, corrections)
+    core = problem.core(parameters, formed.places + corrections, ~free)
+    final = _published(problem, core)
     residuals = -final["constant"]
     star_cofactors = reduced.star_inverse + _propagated(reduced, cofactors)
     redundancy, standardized = _image_tests(problem, reduced, cofactors, residuals)

@@ -33,29 +33,13 @@ pub struct PublishedRows {
 
 impl Calibration {
     /// The equations of all images at the initial values as the report's program formed them.
-    ///
-    /// `corrections` (right ascension, declination) are added to the refracted places of the stars, refraction as it was.
-    pub fn published(
-        &self,
-        corrections: &[[f64; 2]],
-        tolerances: &Tolerances,
-    ) -> Result<Vec<PublishedRows>, StellarError> {
+    pub fn published(&self, tolerances: &Tolerances) -> Result<Vec<PublishedRows>, StellarError> {
         self.check()?;
-        if corrections.len() != self.stars.len() {
-            return Err(StellarError::Index("a correction".into()));
-        }
         let sight = self.initial();
-        let rows = |image: &Image| self.published_image(&sight, image, corrections[image.star], tolerances);
-        Ok(self.images.iter().map(rows).collect())
+        Ok(self.images.iter().map(|image| self.published_image(&sight, image, tolerances)).collect())
     }
 
-    fn published_image(
-        &self,
-        sight: &Sight,
-        image: &Image,
-        correction: [f64; 2],
-        tolerances: &Tolerances,
-    ) -> PublishedRows {
+    fn published_image(&self, sight: &Sight, image: &Image, tolerances: &Tolerances) -> PublishedRows {
         let place = self.stars[image.star].place;
         let place = [place[0] + image.shift[0], place[1] + image.shift[1]];
         let (equatorial, _) = self.station.aberrated(place, image.sidereal_time);
@@ -66,8 +50,7 @@ impl Calibration {
         let tangent = (zenith_distance - angle).tan();
         let along = if sin > 0.0 { tangent / sin } else { 1.0 };
         let apparent = [direction[0] * along, direction[1] * along, 1.0];
-        let [hour, dec] = self.station.equatorial(&apparent);
-        let refracted = [hour - correction[0], dec + correction[1]];
+        let refracted = self.station.equatorial(&apparent);
         let direction = self.station.direction(refracted);
         let standard = [direction[0] / direction[2], direction[1] / direction[2]];
         let star = self.station.standard_by_refracted(refracted, direction[2], standard[0]);
