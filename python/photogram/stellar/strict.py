@@ -24,7 +24,8 @@ Bools = NDArray[np.bool_]
 
 _EXPECTED = 1e-6
 """Mean error of a direction to begin with, radians."""
-_ROUGH, _FINE = 1e-3, 1e-4
+_ROUGH, _FINE, _FINEST = 1e-3, 1e-4, 1e-9
+"""Largest changes in standard deviations: of a first solution, of one that has converged, of the best."""
 _LIMIT = 100
 
 
@@ -42,8 +43,9 @@ def iterate(
 
     Parameters that the initial values leave without effect (the centre of a distortion that is zero) join in
     once the others have given them one. Weights are only known up to a factor, so a first solution finds the
-    mean error of unit weight, and a second one ends when no unknown changes by more than a ten-thousandth of
-    its standard deviation.
+    mean error of unit weight. A second one goes on until its corrections are rounding errors, a billionth of
+    the standard deviations on an ordinary plate. The cofactors are those of one more correction, so that they
+    hold at the solution.
 
     Raises
     ------
@@ -61,9 +63,20 @@ def iterate(
         if (active == free).all() or found["status"] != "converged":
             break
     mean_error = float(np.sqrt(sum(found["sums_of_squares"]) / dof))
-    unit = max(mean_error, 1e-9 * unit)
-    found = run.adjust(parameters, places, free, unit, _FINE, covariance=True)
+    rounding = _rounding(problem, parameters)
+    unit = max(mean_error, rounding / _FINE)
+    found = run.adjust(parameters, places, free, unit, max(rounding / unit, _FINEST))
+    found = run.adjust(found["parameters"], found["places"], free, unit, _FINE, covariance=True)
     return run.solved(found, free, unit)
+
+
+def _rounding(problem: Problem, parameters: Floats) -> float:
+    """Return the root of the weighted sum of squares of what rounding alone may leave of all observations."""
+    plate = parameters[12] ** 2 * np.einsum("mii->", problem.image_weights)
+    tested = problem.known & ~problem.held
+    stars = np.einsum("sii,si->", problem.star_weights[tested], problem.star_places[tested] ** 2)
+    weighted = np.diag(problem.parameter_weights) @ parameters**2
+    return float(np.finfo(float).eps * np.sqrt(plate + stars + weighted))
 
 
 def _first_places(problem: Problem, parameters: Floats, free: Bools) -> Floats:
@@ -113,7 +126,7 @@ class _Run:
             found = core.adjust(
                 unit=unit,
                 fraction=fraction,
-                max_iterations=self.limit,
+                max_iterations=self.limit - max(len(self.levels) - 1, 0),
                 covariance=covariance,
                 threads=self.threads,
                 progress=self.progress,
