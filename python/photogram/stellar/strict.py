@@ -26,7 +26,7 @@ _EXPECTED = 1e-6
 """Mean error of a direction to begin with, radians."""
 _ROUGH, _FINE, _FINEST = 1e-3, 1e-4, 1e-9
 """Largest changes in standard deviations: of a first solution, of one that has converged, of the best."""
-_LIMIT = 100
+_LIMIT, _MORE = 100, 5
 
 
 def iterate(
@@ -44,8 +44,7 @@ def iterate(
     Parameters that the initial values leave without effect (the centre of a distortion that is zero) join in
     once the others have given them one. Weights are only known up to a factor, so a first solution finds the
     mean error of unit weight. A second one goes on until its corrections are rounding errors, a billionth of
-    the standard deviations on an ordinary plate. The cofactors are those of one more correction, so that they
-    hold at the solution.
+    the standard deviations on an ordinary plate. A few more corrections, and the cofactors hold where they end.
 
     Raises
     ------
@@ -66,8 +65,8 @@ def iterate(
     rounding = _rounding(problem, parameters)
     unit = max(mean_error, rounding / _FINE)
     found = run.adjust(parameters, places, free, unit, max(rounding / unit, _FINEST))
-    found = run.adjust(found["parameters"], found["places"], free, unit, _FINE, covariance=True)
-    return run.solved(found, free, unit)
+    last = run.adjust(found["parameters"], found["places"], free, unit, 0.0, most=_MORE, covariance=True)
+    return run.solved({**last, "status": found["status"]}, free, unit)
 
 
 def _rounding(problem: Problem, parameters: Floats) -> float:
@@ -119,6 +118,8 @@ class _Run:
         free: Bools,
         unit: float,
         fraction: float,
+        *,
+        most: int = _LIMIT,
         covariance: bool = False,
     ) -> dict[str, Any]:
         core = self.problem.core(parameters, places, ~free)
@@ -126,7 +127,7 @@ class _Run:
             found = core.adjust(
                 unit=unit,
                 fraction=fraction,
-                max_iterations=self.limit - max(len(self.levels) - 1, 0),
+                max_iterations=min(most, self.limit - max(len(self.levels) - 1, 0)),
                 covariance=covariance,
                 threads=self.threads,
                 progress=self.progress,
