@@ -84,7 +84,7 @@ def quiet(problem):
 
 
 def seen(problem, parameters):
-    """Return the problem without errors, as a camera of these parameters sees it; they are its initial values."""
+    """Return the problem without errors, as a camera of these parameters, its initial values, sees it."""
     return replace(
         problem, image_xy=images(problem, parameters, problem.star_places), initial=parameters.copy()
     )

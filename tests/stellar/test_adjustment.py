@@ -11,6 +11,7 @@ from photogram.stellar import calibrate
 from photogram.stellar.parameters import INDEX
 from photogram.stellar.published import DIVERGED, SETTLED, stop_reason
 
+
 @pytest.mark.parametrize("as_published", [False, True])
 def test_refraction_comes_back(truth, as_published):
     wrong = truth.initial.copy()

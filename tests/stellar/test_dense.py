@@ -1,4 +1,4 @@
-"""The star-eliminated adjustment against a dense one of all unknowns, and the model against one of its own."""
+"""The star-eliminated adjustment against a dense one, and the model against one of its own."""
 
 from dataclasses import replace
 
@@ -42,7 +42,9 @@ def pointed(truth, error):
     d, e, f = plates.matrix(truth.initial[6:9])[2]
     azimuth, zenith = np.arctan2(-e, -d), np.arctan2(np.hypot(d, e), f)
     epsilon, xp, yp = truth.initial[9:12]
-    return Axis(azimuth, zenith, np.array([xp - epsilon * yp, yp]) + error, np.array([[0.3, 0.1], [0.1, 0.4]]))
+    return Axis(
+        azimuth, zenith, np.array([xp - epsilon * yp, yp]) + error, np.array([[0.3, 0.1], [0.1, 0.4]])
+    )
 
 
 def correlated_weights(truth, generator):
@@ -164,8 +166,8 @@ def test_forms_of_the_model_differ_where_scales_differ(truth):
     assert one == pytest.approx(other, abs=1e-16)
 
 
-def test_the_axis_counts_two_observations_and_fixes_the_event(truth):
-    """Equation 72: without stars of the event its attitude would be free but for kappa; the axis determines it."""
+def test_the_axis_counts_two_observations_and_holds_the_event(truth):
+    """Equation 72, without distortion: a heavy axis keeps its image where it is."""
     made = plates.noisy(truth, np.random.default_rng(22))
     free = calibrate(made)
     given = pointed(truth, 0.0)

@@ -150,7 +150,7 @@ def residual_cycle(
 ) -> Solved:
     """Compute star corrections, residuals and their tests at final parameters (the report's v-cycle).
 
-    Refraction is that of the corrected places; the report's listing keeps that of the catalogue's, which makes
+    Refraction is that of the corrected places; the report's listing keeps that of the catalogue's, which is
     two millionths of the mean error of unit weight.
 
     Parameters

@@ -44,7 +44,7 @@ def iterate(
     Parameters that the initial values leave without effect (the centre of a distortion that is zero) join in
     once the others have given them one. Weights are only known up to a factor, so a first solution finds the
     mean error of unit weight. A second one goes on until its corrections are rounding errors, a billionth of
-    the standard deviations on an ordinary plate. A few more corrections, and the cofactors hold where they end.
+    the standard deviations on an ordinary plate; then a few more, so that the cofactors hold at the solution.
 
     Raises
     ------
