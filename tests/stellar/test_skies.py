@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photogram import InputError
-from photogram.stellar import Air, Site, refraction
+from photogram.stellar import Air, Site
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.parameters import ARCSEC
 from photogram.stellar.places import apparent_places, sidereal_time
@@ -39,16 +39,6 @@ def expose(catalogue, utc, attitude, generator, sd=0.1, places=None):
         seen = np.flatnonzero(((pixels > 0) & (pixels < FRAME)).all(axis=1))
     xy = pixels[seen] + sd * generator.standard_normal((len(seen), 2))
     return Exposure(utc, xy, attitude, seen)
-
-
-def test_refraction_agrees_with_erfa():
-    z = np.radians(np.arange(1.0, 75.5, 1.0))
-    a, b = erfa.refco(1013.25, 0.0, 0.0, 0.574)
-    expected = a * np.tan(z) + b * np.tan(z) ** 3
-    off = np.abs(refraction(z, Air(273.15, 760.0), observed=True) - expected) / ARCSEC
-    assert off[z < np.radians(74.5)].max() < 0.03
-    # The report's fit to Garfinkel: at 75 degrees a little more.
-    assert off.max() < 0.033
 
 
 def test_directions_agree_with_erfa_without_air(catalogue):
