@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.stellar.parameters import ARCSEC, INDEX, NAMES
+from photogram.angles import ARCSEC
+from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.reduction import columns
 
 PLATE_SD, STAR_SD = 3e-6, 0.2 * ARCSEC

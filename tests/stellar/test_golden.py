@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from photogram import _photocore
+from photogram.angles import ARCSEC
 from photogram.stellar import Air, Site, calibrate, refraction
 from photogram.stellar.combination import constraints, modify
 from photogram.stellar.curves import distortion_curves
-from photogram.stellar.parameters import ARCSEC, GRAD, NAMES
+from photogram.stellar.parameters import GRAD, NAMES
 from photogram.stellar.reduction import columns
 from photogram.stellar.transformation import transformed_angles
 

@@ -6,9 +6,10 @@ import numpy as np
 import plates
 import pytest
 
+from photogram.angles import ARCSEC
 from photogram.stellar import calibrate
 from photogram.stellar.movement import movement, pairs_to_combine
-from photogram.stellar.parameters import ARCSEC, INDEX, NAMES
+from photogram.stellar.parameters import INDEX, NAMES
 
 RUNS = 120
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from photogram.angles import ARCSEC
 from photogram.stellar import Air, Site, refraction
-from photogram.stellar.parameters import ARCSEC
 
 EARTH, TROPOPAUSE, TOP = 6378120.0, 11000.0, 80000.0
 LAPSE, MOLAR, GAS = 0.0065, 28.9644, 8314.32

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from photogram import InputError
+from photogram.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.parameters import ARCSEC
 from photogram.stellar.places import apparent_places, sidereal_time
 from photogram.stellar.skies import (
     BrownCamera,

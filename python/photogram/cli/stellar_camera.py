@@ -92,7 +92,8 @@ def _read(deck: Path) -> list[Problem]:
 
 def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool) -> dict[Path, bytes]:
     """Make everything that is written for one problem."""
-    from photogram.stellar.document import camera_document, to_json
+    from photogram.stellar.cameras import camera_document
+    from photogram.stellar.document import to_json
     from photogram.stellar.listing import listing, plate_list
 
     made = {

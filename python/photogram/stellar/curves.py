@@ -22,6 +22,7 @@ __all__ = [
     "distortion_curves",
     "histogram",
     "refraction_curves",
+    "residual_classes",
 ]
 
 Floats = NDArray[np.float64]
@@ -151,6 +152,12 @@ class Histogram:
     expected: Floats
     mean: float
     sd: float
+
+
+def residual_classes(result: Result) -> dict[str, Floats]:
+    """Return residuals of known stars in x, y and both, metres."""
+    chosen = result.solved.residuals[result.problem.known[result.problem.image_stars]]
+    return {"x": chosen[:, 0], "y": chosen[:, 1], "x and y": chosen.ravel()}
 
 
 def histogram(values: Floats) -> Histogram:

@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.angles import ARCSEC
 from photogram.errors import InputError
 from photogram.stellar.cards import Card, Cards
 from photogram.stellar.options import Options
-from photogram.stellar.parameters import ARCSEC, GRAD, NAMES
+from photogram.stellar.parameters import GRAD, NAMES
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.rejection import rejected
 from photogram.stellar.sky import Air, Site
@@ -82,11 +83,10 @@ def read_deck(path: Path) -> list[Problem]:
     Raises
     ------
     InputError
-        A card that cannot be used, with its number and text: errors 1 and 3 of the report and all others.
-    OSError
-        The file cannot be read.
+        The file cannot be read; or a card cannot be used, with its number and text: error 1 of the report and
+        all others.
     """
-    cards = Cards(path.read_text(encoding="utf-8", errors="replace"), path)
+    cards = Cards(path)
     problems = []
     while True:
         problem, last = _problem(cards)
@@ -98,7 +98,8 @@ def read_deck(path: Path) -> list[Problem]:
 def _problem(cards: Cards) -> tuple[Problem, bool]:
     first = cards.take("card 1 (problem number)")
     title = cards.take("card 2 (title)")
-    descriptors = _descriptors(cards.take("card 3 (options)"))
+    option_card = cards.take("card 3 (options)")
+    descriptors = _descriptors(option_card)
     constants = cards.take("card 4 (problem constants)")
     values = constants.reals(1, 10, 8, 6)
     event, plate, comparator = (
@@ -119,8 +120,6 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
     plate_weight = _matrix(cards.take("card 21 (weight of the plate)"), 1, 12) if descriptors[4] else None
     stars, points = _rejections(cards) if descriptors.reject else (set(), set())
     minimum = _minimum(cards, descriptors[6]) if descriptors[6] else ()
-    if descriptors[7] and not minimum:
-        raise InputError("option 7 (pre-run) needs option 6 (minimum solution)")
     corrections = tuple(_sidereal(plate, column) for column in (37, 51, 65))
     common = _Common(
         post=comparator.integer(72, 74) or 500,
@@ -130,28 +129,31 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
         plate_weight=plate_weight,
     )
     data = _data(cards, common)
-    options = Options(
-        common_scale=bool(descriptors[1]),
-        refraction=bool(descriptors[5]),
-        minimum_stars=minimum,
-        pre_run=bool(descriptors[7]),
-        curves=bool(descriptors[8]),
-        reference=reference,
-        pole=pole,
-        plate_list=bool(descriptors[11]),
-        max_iterations_minimum=descriptors[12],
-        max_iterations=descriptors[13],
-        mean_error=descriptors.mean_error,
-        histogram=descriptors.histogram,
-        tolerance=values[0],
-        refraction_tolerance=values[1] * ARCSEC,
-        crossover=values[4],
-        interval=values[5] or 0.005,
-        extent=values[6],
-        distortion_tolerance=values[7],
-        movement_factor=_factor(comparator),
-        movement_time=plate.real(26, 36),
-    )
+    try:
+        options = Options(
+            common_scale=bool(descriptors[1]),
+            refraction=bool(descriptors[5]),
+            minimum_stars=minimum,
+            pre_run=bool(descriptors[7]),
+            curves=bool(descriptors[8]),
+            reference=reference,
+            pole=pole,
+            plate_list=bool(descriptors[11]),
+            max_iterations_minimum=descriptors[12],
+            max_iterations=descriptors[13],
+            mean_error=descriptors.mean_error,
+            histogram=descriptors.histogram,
+            tolerance=values[0],
+            refraction_tolerance=(values[1] or 1e-4) * ARCSEC,
+            crossover=values[4],
+            interval=values[5] or 0.005,
+            extent=values[6],
+            distortion_tolerance=values[7],
+            movement_factor=_factor(comparator),
+            movement_time=plate.real(26, 36),
+        )
+    except InputError as error:
+        raise option_card.error(error.message) from None
     labels = {
         "title": title.name(1, 80),
         "problem": first.name(1, 4),
@@ -163,6 +165,9 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
         "tracking unit": plate.name(17, 19),
         "comparator": comparator.name(1, 8),
         "operator": comparator.name(9, 32),
+        "time corrections pre, post, event": ", ".join(f"{c / _HOUR * 3600:.4f} s" for c in corrections)
+        if any(corrections)
+        else "",
     }
     problem = Problem(
         site=site,
@@ -187,7 +192,7 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
 
 def _descriptors(card: Card) -> _Descriptors:
     """Read the options: separated by blanks, or one after the other without any."""
-    words = card.text[:76].split()
+    words = card.columns(1, 76).split()
     if len(words) >= 13:
         try:
             numbers = [int(word) for word in words[:13]]
@@ -320,7 +325,7 @@ def _sidereal(card: Card, column: int) -> float:
 
 
 def _factor(card: Card) -> float:
-    words = card.text[32:71].split()
+    words = card.columns(33, 71).split()
     try:
         return float(words[-1]) if words else 0.0
     except ValueError:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.stellar.curves import distortion_curves, histogram, refraction_curves
-from photogram.stellar.document import residual_classes
-from photogram.stellar.parameters import ARCSEC, GROUPS
+from photogram.angles import ARCSEC
+from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
+from photogram.stellar.parameters import GROUPS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

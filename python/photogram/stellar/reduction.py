@@ -6,6 +6,7 @@ attitudes, and the naming of what the stars do not determine, which all need the
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,7 @@ from photogram.errors import AdjustmentError
 from photogram.stellar.parameters import NAMES
 from photogram.stellar.problem import Problem
 
-__all__ = ["Reduced", "columns", "invert", "reduce", "undetermined"]
+__all__ = ["Reduced", "columns", "invert", "log_determinant", "reduce", "undetermined"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -134,6 +135,20 @@ def invert(normal: Floats, free: Bools) -> Floats:
     inner = np.linalg.inv(part * np.outer(scale, scale))
     inverse[np.ix_(chosen, chosen)] = 0.5 * (inner + inner.T) * np.outer(scale, scale)
     return inverse
+
+
+def log_determinant(normal: Floats, free: Bools) -> float:
+    """Return the natural logarithm of the determinant over the free parameters; NaN where it is not positive.
+
+    The determinant itself, which the report prints, can be beyond the range of numbers.
+    """
+    part = normal[np.ix_(free, free)]
+    diagonal = np.diag(part)
+    if not (diagonal > 0).all():
+        return math.nan
+    scale = 1.0 / np.sqrt(diagonal)
+    sign, value = np.linalg.slogdet(part * np.outer(scale, scale))
+    return float(value - 2.0 * np.log(scale).sum()) if sign > 0 else math.nan
 
 
 def undetermined(normal: Floats, free: Bools, limit: float = 1e-14) -> list[str]:

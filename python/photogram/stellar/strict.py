@@ -14,10 +14,11 @@ from photogram.errors import AdjustmentError
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.parameters import NAMES
 from photogram.stellar.problem import Problem
-from photogram.stellar.reduction import reduce, undetermined
+from photogram.stellar.reduction import log_determinant, reduce, undetermined
+from photogram.stellar.residuals import complete
 from photogram.stellar.state import Level, Solved
 
-__all__ = ["iterate"]
+__all__ = ["iterate", "residual_cycle"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -87,6 +88,36 @@ def _first_places(problem: Problem, parameters: Floats, free: Bools) -> Floats:
         for star in np.flatnonzero(unknown):
             places[star] = directions[first[int(star)]]
     return places
+
+
+def residual_cycle(
+    problem: Problem, parameters: Floats, free: Bools, places: Floats, *, cofactors: Floats
+) -> Solved:
+    """Compute star corrections, residuals and their tests at final parameters, without iterating again.
+
+    Parameters
+    ----------
+    problem, parameters, free
+        As for `iterate`.
+    places
+        (S, 2) places near the final ones.
+    cofactors
+        (26, 26) of the parameters.
+    """
+    core = problem.core(parameters, places, ~free)
+    reduced = reduce(problem, core, core.equations(), places)
+    places = places + reduced.star_corrections()
+    final = problem.core(parameters, places, ~free)
+    return complete(
+        problem,
+        final,
+        reduced,
+        parameters=parameters,
+        free=free,
+        places=places,
+        residuals=-final.equations()["constant"],
+        cofactors=cofactors,
+    )
 
 
 class _Run:
@@ -166,6 +197,8 @@ class _Run:
             "diverged": "NO STEP LOWERS THE SUM OF SQUARES",
         }
         cofactors = found["cofactors"].reshape(len(NAMES), len(NAMES)) if len(found["cofactors"]) else None
+        core = problem.core(found["parameters"], found["places"], ~free)
+        reduced = reduce(problem, core, core.equations(), found["places"])
         tested = (problem.known & ~problem.held)[:, None]
         axis_residual = found["axis_residual"]
         return Solved(
@@ -174,6 +207,7 @@ class _Run:
             free=free,
             cofactors=np.full((len(NAMES), len(NAMES)), np.nan) if cofactors is None else cofactors,
             star_cofactors=found["place_cofactors"],
+            star_inverse=reduced.star_inverse,
             residuals=-found["residuals"],
             redundancy=found["image_redundancy"],
             # The engine's residuals are observed minus computed, in units of the expected mean error.
@@ -182,6 +216,7 @@ class _Run:
             star_standardized=np.where(tested, -unit * found["place_standardized"], np.nan),
             axis_residual=None if axis_residual is None else -np.array(axis_residual),
             sums=(plate, stars, weighted + axis),
+            log_determinant=log_determinant(reduced.normal + problem.parameter_weights, free),
             stop=stops.get(status, f"{count} ITERATIONS COMPLETED"),
             converged=status == "converged",
             levels=tuple(Level(self.solution, i + 1, level) for i, level in enumerate(self.levels)),
