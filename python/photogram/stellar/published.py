@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.stellar.counts import degrees_of_freedom
+from photogram.stellar.parameters import NAMES
 from photogram.stellar.problem import Problem
-from photogram.stellar.reduction import Reduced, invert, reduce
+from photogram.stellar.reduction import Reduced, invert, reduce, singular
 from photogram.stellar.residuals import complete
 from photogram.stellar.state import Level, Solved
 
@@ -115,7 +116,7 @@ def iterate(
     parameters, dof = initial.copy(), degrees_of_freedom(problem, free).usable
     weights = problem.parameter_weights
     levels: list[float] = []
-    inverse = None
+    inverse, touched = None, free
     while True:
         formed = _form(problem, parameters, free)
         known = problem.known[problem.image_stars]
@@ -135,6 +136,8 @@ def iterate(
         )
         if problem.options.common_scale:
             parameters[13] = parameters[12]
+    if (free & ~touched).any():
+        raise singular([NAMES[i] for i in np.flatnonzero(free & ~touched)])
     history = tuple(Level(solution, i + 1, level) for i, level in enumerate(levels))
     # The covariance is that of the last correction; the equations after it serve the residuals only.
     solved = residual_cycle(problem, parameters, free, cofactors=inverse, formed=formed)

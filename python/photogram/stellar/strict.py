@@ -14,7 +14,7 @@ from photogram.errors import AdjustmentError
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.parameters import NAMES
 from photogram.stellar.problem import Problem
-from photogram.stellar.reduction import log_determinant, reduce, undetermined
+from photogram.stellar.reduction import log_determinant, reduce, singular, undetermined
 from photogram.stellar.residuals import complete
 from photogram.stellar.state import Level, Solved
 
@@ -181,10 +181,7 @@ class _Run:
             return AdjustmentError(f"ERROR 2: no inverse for the submatrix of star {names}")
         if kind == "undetermined":
             normal = reduce(self.problem, core, core.equations(), places).normal
-            names = ", ".join(undetermined(normal + self.problem.parameter_weights, free, 1e-10))
-            return AdjustmentError(
-                f"ERROR 4: no inverse for the reduced normal equations: the stars do not determine {names}"
-            )
+            return singular(undetermined(normal + self.problem.parameter_weights, free, 1e-10))
         return AdjustmentError(message)
 
     def solved(self, found: dict[str, Any], free: Bools, unit: float) -> Solved:
