@@ -47,7 +47,9 @@ impl Calibration {
         let sin = direction[0].hypot(direction[1]);
         let zenith_distance = sin.atan2(direction[2]);
         let angle = self.station.air.published(zenith_distance, &sight.tau, tolerances.refraction);
-        let tangent = (zenith_distance - angle).tan();
+        let (across, height) = (zenith_distance - angle).sin_cos();
+        // Below the horizon the tangent would come back as that of a direction above it.
+        let tangent = if height > 0.0 { across / height } else { f64::NAN };
         let along = if sin > 0.0 { tangent / sin } else { 1.0 };
         let apparent = [direction[0] * along, direction[1] * along, 1.0];
         let refracted = self.station.equatorial(&apparent);
@@ -85,6 +87,8 @@ fn approximate(
     let offset = [undistorted[0] - xp - dx, undistorted[1] - yp - dy];
     let lens = camera.distortion().linearize(offset);
     let [m, n, q] = Attitude::turned(&attitude.matrix, standard);
+    // A direction behind the camera has no image.
+    let q = if q > 0.0 { q } else { f64::NAN };
     let computed = [cx * m / q + xp + lens.shift[0] - epsilon * measured[1], cy * n / q + yp + lens.shift[1]];
     let [[a1, b1, _], [a2, b2, _], [d, e, _]] = attitude.matrix;
     let (p1, p2) = ((computed[0] - xp) / cx, (computed[1] - yp) / cy);
