@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache
 from importlib.resources import as_file, files
@@ -37,8 +38,9 @@ def night() -> CalibratedNight:
 def adjustment_lines() -> list[str]:
     """Show the figures of the packaged plate."""
     (_, problems), (_, figures) = summary(plate())
-    # Sums that vanish are noise in their digits.
-    return [*problems, "", *(line for line in figures if not line.startswith("sums of"))]
+    # The digits of sums that vanish, and the last ones of parts of a minimum, are noise.
+    noisy = ("sums of", "weighted sum of squares, plate", "weighted sum of squares, stars")
+    return [*problems, "", *(line for line in figures if not line.startswith(noisy))]
 
 
 def parameter_lines() -> list[str]:
@@ -46,17 +48,17 @@ def parameter_lines() -> list[str]:
     strict, published = plate(), plate(as_published=True)
     lines = [f"{'':13}{'unit':6}{'strict':>15}{'mean error':>13}{'as published':>15}{'difference':>12}"]
     for name in NAMES[:3] + NAMES[9:22]:
-        unit = GRAD if UNITS[name] == "rad" else 1.0
-        value, error, other = (
-            each / unit
-            for each in (strict.parameters[name], strict.mean_errors[name], published.parameters[name])
-        )
-        shown = "grad" if UNITS[name] == "rad" else UNITS[name]
+        unit, shown = (GRAD, "grad") if UNITS[name] == "rad" else (1.0, UNITS[name])
+        value, other = strict.parameters[name] / unit, published.parameters[name] / unit
+        error = strict.mean_errors[name] / unit
+        # To the second digit of the mean error.
+        digits = max(0, 1 - math.floor(math.log10(error)))
         lines.append(
-            f"{name:13}{shown:6}{value:15.6g}{error:13.3g}{other:15.6g}{(other - value) / error:9.3f} me"
+            f"{name:13}{shown:6}{value:15.{digits}f}{error:13.2g}{other:15.{digits}f}"
+            f"{(other - value) / error:9.2f} me"
         )
-    m = strict.mean_error, published.mean_error
-    return [*lines, f"{'m':13}{'um':6}{1e6 * m[0]:15.5f}{'':13}{1e6 * m[1]:15.5f}"]
+    m = 1e6 * strict.mean_error, 1e6 * published.mean_error
+    return [*lines, f"{'m':13}{'um':6}{m[0]:15.4f}{'':13}{m[1]:15.4f}"]
 
 
 def refraction_lines() -> list[str]:

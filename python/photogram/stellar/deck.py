@@ -118,8 +118,9 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
     weights = _weights(cards, descriptors[10]) if descriptors[10] else np.zeros((len(NAMES), len(NAMES)))
     star_weight = _matrix(cards.take("card 20 (weight of the stars)"), 1, 12) if descriptors[3] else None
     plate_weight = _matrix(cards.take("card 21 (weight of the plate)"), 1, 12) if descriptors[4] else None
-    stars, points = _rejections(cards) if descriptors.reject else (set(), set())
-    minimum = _minimum(cards, descriptors[6]) if descriptors[6] else ()
+    stars, points = _rejections(cards) if descriptors.reject else ({}, {})
+    minimum = _minimum(cards, descriptors[6]) if descriptors[6] else {}
+    factor, time = _factor(comparator), plate.real(26, 36)
     corrections = tuple(_sidereal(plate, column) for column in (37, 51, 65))
     common = _Common(
         post=comparator.integer(72, 74) or 500,
@@ -129,11 +130,14 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
         plate_weight=plate_weight,
     )
     data = _data(cards, common)
+    _refuse_missing(minimum, data.ids, "incorrect stars specified for minimum solution")
+    _refuse_missing(stars, data.ids, "rejected but not there")
+    _refuse_missing(points, data.points, "rejected but not there")
     try:
         options = Options(
             common_scale=bool(descriptors[1]),
             refraction=bool(descriptors[5]),
-            minimum_stars=minimum,
+            minimum_stars=tuple(minimum),
             pre_run=bool(descriptors[7]),
             curves=bool(descriptors[8]),
             reference=reference,
@@ -149,8 +153,8 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
             interval=values[5] or 0.005,
             extent=values[6],
             distortion_tolerance=values[7],
-            movement_factor=_factor(comparator),
-            movement_time=plate.real(26, 36),
+            movement_factor=factor,
+            movement_time=time,
         )
     except InputError as error:
         raise option_card.error(error.message) from None
@@ -187,7 +191,7 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
         options=options,
         labels={name: value for name, value in labels.items() if value},
     )
-    return rejected(problem, stars, points), bool(first.integer(80, 80))
+    return rejected(problem, stars.keys(), points.keys()), bool(first.integer(80, 80))
 
 
 def _descriptors(card: Card) -> _Descriptors:
@@ -294,13 +298,14 @@ def _symmetric(card: Card, values: list[float]) -> Floats:
     return np.array([[first, cross], [cross, second]])
 
 
-def _rejections(cards: Cards) -> tuple[set[str], set[str]]:
-    stars: set[str] = set()
-    points: set[str] = set()
+def _rejections(cards: Cards) -> tuple[dict[str, Card], dict[str, Card]]:
+    """Read the numbers of stars and plate points, each with its card."""
+    stars: dict[str, Card] = {}
+    points: dict[str, Card] = {}
     while True:
         card = cards.take("a rejection card")
         number = card.integer(1, 6)
-        (stars if number < _FIRST_POINT else points).add(str(number))
+        (stars if number < _FIRST_POINT else points)[str(number)] = card
         if len(stars) > _MOST_STARS:
             raise card.error(f"too many rejected stars: {_MOST_STARS} at the most")
         if len(points) > _MOST_POINTS:
@@ -309,14 +314,20 @@ def _rejections(cards: Cards) -> tuple[set[str], set[str]]:
             return stars, points
 
 
-def _minimum(cards: Cards, count: int) -> tuple[str, ...]:
-    numbers: list[int] = []
-    while len(numbers) < count:
+def _minimum(cards: Cards, count: int) -> dict[str, Card]:
+    """Read the numbers of the stars, twenty a card, each with its card."""
+    numbers: dict[str, Card] = {}
+    for first in range(0, count, 20):
         card = cards.take("the stars of the minimum solution")
-        numbers += [card.integer(start, start + 3) for start in range(1, 80, 4)]
-    if 0 in numbers[:count]:
-        raise card.error("incorrect stars specified for minimum solution: a star without a number")
-    return tuple(str(number) for number in numbers[:count])
+        for start in range(1, 4 * min(20, count - first), 4):
+            numbers[str(card.integer(start, start + 3))] = card
+    return numbers
+
+
+def _refuse_missing(named: dict[str, Card], there: list[str], message: str) -> None:
+    for number, card in named.items():
+        if number not in there:
+            raise card.error(f"{message}: {number}")
 
 
 def _sidereal(card: Card, column: int) -> float:
@@ -346,10 +357,11 @@ def _data(cards: Cards, common: _Common) -> _Data:
         data.names.append(card.name(72, 77) or star)
         data.places.append([card.real(1, 14), card.real(15, 28)])
         data.weights.append(np.zeros((2, 2)) if number < 0 else _star_weight(card, common))
-        for _ in range(count):
-            last = _image(cards.take(f"an image of star {star}"), star, data, common)
-            if last and _ + 1 < count:
-                raise InputError(f"the last image of the deck is flagged, but star {star} has {count} images")
+        for image in range(count):
+            card = cards.take(f"an image of star {star}")
+            last = _image(card, star, data, common)
+            if last and image + 1 < count:
+                raise card.error(f"the last image of the deck is flagged, but star {star} has {count} images")
     return data
 
 

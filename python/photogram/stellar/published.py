@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.stellar.counts import degrees_of_freedom
+from photogram.stellar.parameters import NAMES
 from photogram.stellar.problem import Problem
-from photogram.stellar.reduction import Reduced, invert, log_determinant, reduce
+from photogram.stellar.reduction import Reduced, invert, log_determinant, reduce, singular
 from photogram.stellar.residuals import complete
 from photogram.stellar.state import Level, Solved
 
@@ -74,14 +75,13 @@ def _form(problem: Problem, parameters: Floats, free: Bools) -> _Formed:
         for star in np.flatnonzero(unknown):
             places[star] = directions[np.flatnonzero(problem.image_stars == star)[0]]
     core = problem.core(parameters, places, ~free)
-    equations = _published(problem, core, np.zeros_like(places))
+    equations = _published(problem, core)
     return _Formed(equations, reduce(problem, core, equations, places), places)
 
 
-def _published(problem: Problem, core: Any, corrections: Floats) -> dict[str, Any]:
+def _published(problem: Problem, core: Any) -> dict[str, Any]:
     options = problem.options
     found: dict[str, Any] = core.published(
-        corrections,
         refraction=options.refraction_tolerance,
         distortion=options.distortion_tolerance,
         passes=PASSES,
@@ -117,7 +117,7 @@ def iterate(
     parameters, dof = initial.copy(), degrees_of_freedom(problem, free).usable
     weights = problem.parameter_weights
     levels: list[float] = []
-    inverse, determinant = None, math.nan
+    inverse, determinant, touched = None, math.nan, free
     while True:
         formed = _form(problem, parameters, free)
         known = problem.known[problem.image_stars]
@@ -137,6 +137,8 @@ def iterate(
         )
         if problem.options.common_scale:
             parameters[13] = parameters[12]
+    if (free & ~touched).any():
+        raise singular([NAMES[i] for i in np.flatnonzero(free & ~touched)])
     history = tuple(Level(solution, i + 1, level) for i, level in enumerate(levels))
     # Covariance and determinant are those of the last correction; the equations after it serve the residuals.
     solved = residual_cycle(problem, parameters, free, cofactors=inverse, formed=formed)
@@ -159,6 +161,9 @@ def residual_cycle(
 ) -> Solved:
     """Compute star corrections, residuals and their tests at final parameters (the report's v-cycle).
 
+    Refraction is that of the corrected places; the report's listing keeps that of the catalogue's, which is
+    two millionths of the mean error of unit weight.
+
     Parameters
     ----------
     problem, parameters, free
@@ -173,8 +178,8 @@ def residual_cycle(
     if cofactors is None:
         cofactors = invert(reduced.normal + problem.parameter_weights, free)
     corrections = reduced.star_corrections()
-    core = problem.core(parameters, formed.places, ~free)
-    final = _published(problem, core, corrections)
+    core = problem.core(parameters, formed.places + corrections, ~free)
+    final = _published(problem, core)
     remarks = tuple(
         f"DISTORTION NOT CONVERGING FOR POINT NUMBER {problem.image_points[i]}: "
         f"last changes {a:.3g}, {b:.3g} m"
