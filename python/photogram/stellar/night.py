@@ -34,8 +34,8 @@ SIGNIFICANT = 1.96
 _ROUNDS = 20
 _REACH = 3.0
 """Distance from a predicted image up to which a measured one is called its star at least, pixels."""
-_FEWEST = 4
-"""Stars that an exposure needs to take part."""
+_FEWEST = 2
+"""Stars that an attitude needs."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ catalogue places while the parameters are iterated, and the change of refraction
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.parameters import NAMES
 from photogram.stellar.problem import Problem
-from photogram.stellar.reduction import Reduced, invert, reduce, singular
+from photogram.stellar.reduction import Reduced, invert, log_determinant, reduce, singular
 from photogram.stellar.residuals import complete
 from photogram.stellar.state import Level, Solved
 
@@ -116,7 +117,7 @@ def iterate(
     parameters, dof = initial.copy(), degrees_of_freedom(problem, free).usable
     weights = problem.parameter_weights
     levels: list[float] = []
-    inverse, touched = None, free
+    inverse, touched, determinant = None, free, math.nan
     while True:
         formed = _form(problem, parameters, free)
         known = problem.known[problem.image_stars]
@@ -129,7 +130,7 @@ def iterate(
         right = formed.reduced.right - weights @ (parameters - problem.initial)
         # What the equations do not touch yet (a direction of no decentering) is not corrected.
         touched = free & (np.diag(normal) > 0)
-        inverse = invert(normal, touched)
+        inverse, determinant = invert(normal, touched), log_determinant(normal, touched)
         parameters = parameters + inverse @ right
         parameters[21] = (
             np.mod(parameters[21], 2 * np.pi) if abs(parameters[21]) > 2 * np.pi else parameters[21]
@@ -139,9 +140,15 @@ def iterate(
     if (free & ~touched).any():
         raise singular([NAMES[i] for i in np.flatnonzero(free & ~touched)])
     history = tuple(Level(solution, i + 1, level) for i, level in enumerate(levels))
-    # The covariance is that of the last correction; the equations after it serve the residuals only.
+    # Covariance and determinant are those of the last correction; the equations after it serve the residuals.
     solved = residual_cycle(problem, parameters, free, cofactors=inverse, formed=formed)
-    return replace(solved, stop=stop, converged=stop == SETTLED or once, levels=history)
+    return replace(
+        solved,
+        stop=stop,
+        converged=stop == SETTLED or once,
+        levels=history,
+        log_determinant=determinant,
+    )
 
 
 def residual_cycle(

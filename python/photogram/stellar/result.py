@@ -243,12 +243,12 @@ class Result:
     @property
     def standardized(self) -> Floats:
         """(m, 2) residuals over their mean errors."""
-        return self.solved.standardized / self.mean_error
+        return self.solved.standardized / (self.mean_error or math.nan)
 
     @property
     def star_standardized(self) -> Floats:
         """(S, 2) residuals of the catalogue places over their mean errors."""
-        return self.solved.star_standardized / self.mean_error
+        return self.solved.star_standardized / (self.mean_error or math.nan)
 
     def ellipses(self) -> list[Ellipse]:
         """Return the mean error ellipse of every star."""

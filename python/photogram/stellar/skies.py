@@ -29,6 +29,8 @@ __all__ = ["BrownCamera", "Exposure", "SkyCalibration", "calibrate_exposures", "
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _STILL = Earth()
+_FEWEST, _SHARE = 6, 0.2
+"""Stars, and their share of all that could be, below which an identification is one of chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +152,8 @@ def identify(
 
     Returns
     -------
-    (k,) index in the catalogue; -1 where there is none.
+    (k,) index in the catalogue; -1 where there is none, and everywhere where so few images have one that
+    chance would have found them.
     """
     site = earth.site_of_date(site)
     time = sidereal_time(site, exposure.utc, earth.dut1)
@@ -159,6 +162,8 @@ def identify(
     with np.errstate(invalid="ignore"):
         seen = np.flatnonzero(((predicted >= margin[0]) & (predicted <= margin[1])).all(axis=1))
     found = match(exposure.xy, predicted[seen], radius=radius, tolerance=tolerance)
+    if (found >= 0).sum() < max(_FEWEST, _SHARE * min(len(found), len(seen))):
+        return np.full(len(found), -1, np.int64)
     return np.where(found >= 0, seen[found] if len(seen) else -1, -1)
 
 
@@ -339,12 +344,12 @@ def _result(found: dict[str, Any], images: _Images, count: int, freedom: int) ->
         xy=images.xy,
         residuals=found["residuals"],
         redundancy=found["image_redundancy"],
-        standardized=found["image_standardized"] / mean_error,
+        standardized=found["image_standardized"] / (mean_error or math.nan),
         catalogue=images.catalogue,
         star_residuals=np.where(held, np.nan, found["places"] - images.places),
         star_redundancy=np.where(held, np.nan, found["place_redundancy"]),
         # The engine's residuals are observed minus computed.
-        star_standardized=np.where(held, np.nan, -found["place_standardized"] / mean_error),
+        star_standardized=np.where(held, np.nan, -found["place_standardized"] / (mean_error or math.nan)),
         mean_error=mean_error,
         degrees_of_freedom=freedom,
         iterations=len(found["iterations"]),
