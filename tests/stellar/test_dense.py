@@ -6,6 +6,7 @@ import numpy as np
 import plates
 import pytest
 
+from photogram._photocore import pointing_matrix
 from photogram.stellar import calibrate
 from photogram.stellar.adjustment import free_parameters
 from photogram.stellar.parameters import INDEX, NAMES
@@ -166,9 +167,11 @@ def test_forms_of_the_model_differ_where_scales_differ(truth):
     assert one == pytest.approx(other, abs=1e-16)
 
 
-def test_the_axis_counts_two_observations_and_holds_the_event(truth):
+@pytest.mark.parametrize("as_published", [False, True])
+def test_the_axis_counts_two_observations_and_holds_the_event(truth, as_published):
     """Equation 72, without distortion: a heavy axis keeps its image where it is."""
     made = plates.noisy(truth, np.random.default_rng(22))
+    made = replace(made, options=replace(made.options, as_published=as_published))
     free = calibrate(made)
     given = pointed(truth, 0.0)
     with_axis = calibrate(replace(made, axis=replace(given, weight=np.eye(2) * 1e6)))
@@ -180,3 +183,12 @@ def test_the_axis_counts_two_observations_and_holds_the_event(truth):
     x, y = xp + cx * m / q, yp + cy * n / q
     assert given.xy == pytest.approx([x - epsilon * y, y], abs=2e-9)
     assert with_axis.mean_errors["alpha_event"] < free.mean_errors["alpha_event"]
+
+
+def test_the_matrix_turns_and_reflects():
+    generator = np.random.default_rng(23)
+    for angles in generator.uniform([-3, -1.5, -3], [3, 1.5, 3], (50, 3)):
+        found = pointing_matrix(angles)
+        assert found == pytest.approx(plates.matrix(angles), abs=1e-15)
+        assert found @ found.T == pytest.approx(np.eye(3), abs=1e-15)
+        assert np.linalg.det(found) == pytest.approx(-1.0)
