@@ -15,6 +15,7 @@ from rich.markup import escape
 
 from photogram.cli.console import errors, failures, output
 from photogram.cli.options import Quiet
+from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, Options
@@ -103,7 +104,6 @@ def comparator(
     with failures(), ExitStack() as resources:
         from photogram.comparator import Options, calibrate, find_grid, read
         from photogram.errors import InputError
-        from photogram.files import write_whole
 
         if example:
             packaged = files("photogram") / "examples" / "comparator" / EXAMPLE
@@ -123,7 +123,7 @@ def comparator(
         written = _results(calibrations, folder, pdf=pdf, pictures=pictures, quiet=quiet)
         if json is not None:
             written[json] = _documents(calibrations)
-        write_whole(written)
+        write_results(written, paths or [])
         if not quiet:
             for calibration in calibrations:
                 _summarize(calibration)
@@ -220,10 +220,9 @@ def correct(
         from photogram.comparator.apply import correct_table
         from photogram.comparator.correction import Correction
         from photogram.comparator.csvfile import read_table
-        from photogram.files import write_whole
 
         made = correct_table(Correction.read(correction), read_table(measurements), invert=invert)
         if out is None:
             typer.echo(made.decode(), nl=False)
         else:
-            write_whole({out: made})
+            write_results({out: made}, [correction, measurements])

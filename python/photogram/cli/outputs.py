@@ -16,20 +16,16 @@ def write_results(files: Mapping[Path, bytes], inputs: Iterable[Path]) -> None:
     files
         Contents by path.
     inputs
-        The files, or directories of files, that the command has read.
+        The files that the command has read.
 
     Raises
     ------
     InputError
-        A file would replace an input, by whatever name; nothing is written.
+        A file would replace an input; nothing is written.
     OSError
         A file cannot be written.
     """
-    from photogram.errors import InputError
-    from photogram.files import write_whole
+    from photogram.files import spare, write_whole
 
-    given = [file for path in inputs for file in (path.iterdir() if path.is_dir() else [path])]
-    for path in files:
-        if path.exists() and any(file.exists() and path.samefile(file) for file in given):
-            raise InputError("the results would be written over the input", file=path)
+    spare(files, inputs)
     write_whole(files)

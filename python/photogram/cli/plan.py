@@ -13,6 +13,7 @@ from rich.markup import escape
 
 from photogram.cli.console import errors, failures, output
 from photogram.cli.options import JsonFile
+from photogram.cli.outputs import write_results
 from photogram.cli.simulated import Control, NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -63,7 +64,6 @@ def plan(
     location, of photographs, and the gross errors that can be found.
     """
     with failures():
-        from photogram.files import write_whole
         from photogram.planning import plan as predict
 
         if projects:
@@ -79,7 +79,7 @@ def plan(
             patterns = _simulated(network, second)
         made = predict(patterns)
         written = _documents(made, json, plot)
-        write_whole(written)
+        write_results(written, [path for project in projects or [] for path in project.iterdir()])
         output.print(made.report(), markup=False, end="")
         if written:
             errors.print("written: " + escape(", ".join(str(path) for path in written)))

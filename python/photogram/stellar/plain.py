@@ -195,12 +195,19 @@ def _star_weight(row: Row, common: list[float] | None) -> Floats:
     return _weight(row, common, _STAR_WEIGHT)
 
 
+def _orientation(name: str) -> int:
+    if name not in GROUPS:
+        raise InputError(f"orientation {name!r} is not one of {', '.join(GROUPS)}")
+    return GROUPS.index(name)
+
+
 def _group(row: Row, images: dict[str, Any]) -> int:
     """Take the column `orientation`, else the number of the point as in the deck."""
     if row.cells.get("orientation"):
-        if row.cells["orientation"] not in GROUPS:
-            raise row.place.error(f"orientation {row.cells['orientation']!r} is not {', '.join(GROUPS)}")
-        return GROUPS.index(row.cells["orientation"])
+        try:
+            return _orientation(row.cells["orientation"])
+        except InputError as error:
+            raise row.place.error(error.message) from None
     try:
         trail = abs(int(row.cells["point"])) % 1000
     except ValueError:
@@ -220,7 +227,7 @@ def _axis(table: dict[str, Any]) -> Axis:
         zenith_distance=math.radians(table["zenith_distance_deg"]),
         xy=np.array([table.get("x_m", 0.0), table.get("y_m", 0.0)]),
         weight=np.array([[xx, xy], [xy, yy]]),
-        group=GROUPS.index(table.get("orientation", "event")),
+        group=_orientation(table.get("orientation", "event")),
     )
 
 

@@ -145,6 +145,8 @@ class Problem:
         _refuse_indefinite(points, self.image_weights)
         weighted = np.flatnonzero(self.known & ~self.held)
         _refuse_indefinite([f"star {self.star_ids[i]}" for i in weighted], self.star_weights[weighted])
+        if self.axis is not None:
+            _refuse_indefinite(["the axis"], self.axis.weight[None])
 
     @property
     def known(self) -> Bools:

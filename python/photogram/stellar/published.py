@@ -117,7 +117,7 @@ def iterate(
     parameters, dof = initial.copy(), degrees_of_freedom(problem, free).usable
     weights = problem.parameter_weights
     levels: list[float] = []
-    inverse, touched, determinant = None, free, math.nan
+    inverse, determinant, touched = None, math.nan, free
     while True:
         formed = _form(problem, parameters, free)
         known = problem.known[problem.image_stars]
