@@ -11,6 +11,7 @@ from photogram.angles import ARCSEC
 from photogram.stellar import calibrate, refraction
 from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES
+from photogram.stellar.result import ellipse
 from photogram.stellar.tables import star_means
 
 
@@ -219,3 +220,14 @@ def test_the_transformed_distortion_vanishes_at_the_crossover(plate):
     assert curves.transformed[6] == pytest.approx(0.0, abs=1e-18)
     assert curves.transformed_error[6] == pytest.approx(0.0, abs=1e-18)
     assert curves.transformed[5] - curves.radial[5] == pytest.approx(curves.scale * 0.05, rel=1e-9)
+
+
+def test_an_ellipse_has_the_axes_and_the_direction_of_its_covariance():
+    """Three seconds long, one wide, thirty degrees from east towards north, at a declination of sixty."""
+    turn, dec = np.radians(30.0), np.radians(60.0)
+    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    on_sphere = axes @ np.diag([9.0, 1.0]) @ axes.T
+    in_places = np.diag([1 / np.cos(dec), 1.0]) @ on_sphere @ np.diag([1 / np.cos(dec), 1.0])
+    found = ellipse(in_places, dec)
+    assert (found.major, found.minor) == (pytest.approx(3.0), pytest.approx(1.0))
+    assert found.direction == pytest.approx(turn)
