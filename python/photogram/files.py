@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 from photogram.errors import InputError
 
-__all__ = ["read_bytes", "read_lines", "spare", "whole", "write_whole"]
+__all__ = ["read_bytes", "read_lines", "reading", "spare", "whole", "write_whole"]
 
 
 def spare(paths: Iterable[Path], inputs: Iterable[Path]) -> None:
@@ -57,6 +57,15 @@ def write_whole(files: Mapping[Path, bytes]) -> None:
             temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Name the file that the system cannot read: an :class:`OSError` becomes an :class:`InputError`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+
+
 def read_bytes(path: Path) -> bytes:
     """Read a file.
 
@@ -65,10 +74,8 @@ def read_bytes(path: Path) -> bytes:
     InputError
         The file cannot be read.
     """
-    try:
+    with reading(path):
         return path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
 
 
 def read_lines(path: Path) -> list[str]:

@@ -6,7 +6,7 @@ use photocore::programs::block::{AdjustedImage, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::table;
+use crate::arrays::{squares, table};
 
 /// Number, weighted sum of squares, largest change in standard deviations, damping.
 pub type IterationRow = (usize, f64, f64, f64);
@@ -209,13 +209,4 @@ impl BlockSolution {
         dict.set_item("cofactors", seconds.cofactors)?;
         Ok(dict)
     }
-}
-
-/// Square matrices as an (n, N, N) array.
-pub fn squares<const N: usize>(
-    py: Python<'_>,
-    matrices: Vec<[[f64; N]; N]>,
-) -> PyResult<Bound<'_, PyArray3<f64>>> {
-    let count = matrices.len();
-    PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, N, N])
 }

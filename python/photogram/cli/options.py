@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-__all__ = ["JsonFile", "Quiet"]
+__all__ = ["JsonFile", "Quiet", "default_out"]
 
 JsonFile = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+
+
+def default_out(source: Path, ending: str) -> Path:
+    """Return the directory for the results where no option names one: the name of the input with an ending.
+
+    It is beside the input, or, as published data are often read-only, else where the command is given.
+    """
+    place = source.resolve()
+    parent = place.parent if os.access(place.parent, os.W_OK) else Path()
+    return parent / f"{place.name if place.is_dir() else place.stem}{ending}"

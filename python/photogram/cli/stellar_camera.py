@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, failures, output
+from photogram.cli.console import NOT_CONVERGED, failures, print_sections, print_written
 from photogram.cli.options import JsonFile, Quiet
 from photogram.cli.outputs import write_results
 
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["exposures", "stellar_camera"]
 
-SHOWN = 24
-"""Lines of a section that the summary shows at most."""
 
 Out = Annotated[
     Path | None,
@@ -79,10 +76,10 @@ def stellar_camera(
             mark = f"-{number}" if len(problems) > 1 else ""
             written |= _files(result, target, mark, json, plots)
             if not quiet:
-                _summarize(summary(result))
+                print_sections(summary(result), "the listing")
         write_results(written, inputs)
         if not quiet:
-            _name(written)
+            print_written(written)
     if not converged:
         raise typer.Exit(NOT_CONVERGED)
 
@@ -124,10 +121,10 @@ def exposures(
         result = calibrate_night(read_night(night), threads)
         written = _night_files(result, out or Path(f"{night.stem}-calibrated"), json, plots)
         if not quiet:
-            _summarize(summary(result))
+            print_sections(summary(result), "the report")
         write_results(written, inputs(night))
         if not quiet:
-            _name(written)
+            print_written(written)
     if not result.converged:
         raise typer.Exit(NOT_CONVERGED)
 
@@ -180,16 +177,3 @@ def _night_files(result: CalibratedNight, out: Path, json: Path | None, plots: b
 
         made |= {out / name: content for name, content in figures(result).items()}
     return made
-
-
-def _summarize(sections: list[tuple[str, list[str]]]) -> None:
-    for title, lines in sections:
-        output.print(f"[bold]{title}[/]")
-        for line in lines[:SHOWN]:
-            output.print(f"  {escape(line)}")
-        if len(lines) > SHOWN:
-            output.print(f"  and {len(lines) - SHOWN} more lines in the listing")
-
-
-def _name(written: dict[Path, bytes]) -> None:
-    output.print("written: " + escape(", ".join(str(path) for path in written)))

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::problem::{Model, Problem};
 use crate::normals::{Cofactors, GroupRows};
 
-/// What an adjustment counts. The degrees of freedom are `observations + weighted - unknowns`.
+/// What an adjustment counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
     /// Observations proper.
@@ -17,6 +17,13 @@ pub struct Counts {
     pub weighted: usize,
     /// Unknowns that are not fixed.
     pub unknowns: usize,
+}
+
+impl Counts {
+    /// Observations, those of unknowns themselves among them, minus unknowns.
+    pub fn degrees_of_freedom(&self) -> i64 {
+        (self.observations + self.weighted) as i64 - self.unknowns as i64
+    }
 }
 
 /// Residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w); NaN without redundancy.
@@ -105,7 +112,7 @@ impl<M: Model> Problem<M> {
     }
 
     /// Weighted sum of squares of observed minus computed unknowns.
-    pub(super) fn prior_sum_of_squares(&self, values: &[f64]) -> f64 {
+    pub fn prior_sum_of_squares(&self, values: &[f64]) -> f64 {
         values.iter().enumerate().map(|(unknown, &value)| self.prior_square(unknown, value)).sum()
     }
 }
