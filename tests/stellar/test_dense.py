@@ -6,8 +6,10 @@ import numpy as np
 import plates
 import pytest
 
+from photogram._photocore import pointing_matrix
 from photogram.stellar import calibrate
 from photogram.stellar.adjustment import free_parameters
+from photogram.stellar.combination import modify
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.problem import Axis
 
@@ -125,18 +127,22 @@ def test_a_dense_adjustment_of_everything_agrees(few, case):
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__)
-def test_redundancy_numbers_are_those_of_the_dense_adjustment(few, case):
-    """Every share of the hat matrix, and their sum: the degrees of freedom."""
+def test_redundancy_and_standardized_residuals_are_those_of_the_dense_adjustment(few, case):
+    """Of the decorrelated components: every share of the hat matrix, and their sum."""
     problem = case(few, np.random.default_rng(21))
     result, free = calibrate(problem), free_parameters(problem)
-    design, _ = plates.equations(problem, result.solved.parameters, result.solved.places, free)
+    design, right = plates.equations(problem, result.solved.parameters, result.solved.places, free)
     design = design[:, np.concatenate([np.flatnonzero(free), np.arange(len(NAMES), design.shape[1])])]
     hat = np.sum(np.linalg.qr(design / np.linalg.norm(design, axis=0))[0] ** 2, axis=1)
     images = 2 * len(problem.image_points)
-    # Of the decorrelated components.
     assert result.solved.redundancy.ravel() == pytest.approx(1 - hat[:images], abs=1e-9)
     tested = result.solved.star_redundancy[problem.known].ravel()
     assert tested == pytest.approx(1 - hat[images : images + len(tested)], abs=1e-9)
+    # Residuals are computed minus observed.
+    standardized = -right / np.sqrt(1 - hat)
+    assert result.solved.standardized.ravel() == pytest.approx(standardized[:images], rel=1e-7, abs=1e-12)
+    tested = result.solved.star_standardized[problem.known].ravel()
+    assert tested == pytest.approx(standardized[images : images + len(tested)], rel=1e-7, abs=1e-12)
     assert len(hat) - hat.sum() == pytest.approx(result.degrees_of_freedom, abs=1e-9)
 
 
@@ -154,6 +160,31 @@ def test_the_camera_comes_back_from_images_of_a_model_of_its_own(truth, case):
     assert np.abs(off[chosen] / errors[:22][chosen]).max() < 1e-6
 
 
+def test_published_tests_are_nearly_the_strict_ones(truth):
+    """Its partials are right to a few parts in ten thousand."""
+    strict = calibrate(plates.noisy(truth, np.random.default_rng(21)))
+    options = replace(strict.problem.options, as_published=True)
+    published = calibrate(replace(strict.problem, options=options))
+    assert published.solved.redundancy == pytest.approx(strict.solved.redundancy, abs=2e-3)
+    assert published.standardized == pytest.approx(strict.standardized, abs=0.03)
+    assert published.solved.star_redundancy == pytest.approx(strict.solved.star_redundancy, abs=2e-3)
+    assert published.star_standardized == pytest.approx(strict.star_standardized, abs=0.03)
+    total = published.solved.redundancy.sum() + published.solved.star_redundancy.sum()
+    assert total == pytest.approx(published.degrees_of_freedom, abs=0.5)
+
+
+def test_the_method_of_modification_is_least_squares_with_constraints():
+    """Equations 104 and 105 against the bordered normal equations."""
+    generator = np.random.default_rng(24)
+    rows = generator.standard_normal((30, 9))
+    normal, right = rows.T @ rows, generator.standard_normal(9)
+    c, misclosure = generator.standard_normal((3, 9)), generator.standard_normal(3)
+    step, cofactors = modify(np.linalg.inv(normal), right, c, misclosure)
+    bordered = np.linalg.inv(np.block([[normal, c.T], [c, np.zeros((3, 3))]]))
+    assert step == pytest.approx((bordered @ np.concatenate([right, misclosure]))[:9], rel=1e-10)
+    assert cofactors == pytest.approx(bordered[:9, :9], rel=1e-9, abs=1e-12)
+
+
 def test_forms_of_the_model_differ_where_scales_differ(truth):
     """Scale after distortion moves an image by (cx / c0 - 1) of its distortion, here a hundredth."""
     wide = plates.changed(truth.initial, cx=0.303, cy=0.297)
@@ -166,9 +197,11 @@ def test_forms_of_the_model_differ_where_scales_differ(truth):
     assert one == pytest.approx(other, abs=1e-16)
 
 
-def test_the_axis_counts_two_observations_and_holds_the_event(truth):
+@pytest.mark.parametrize("as_published", [False, True])
+def test_the_axis_counts_two_observations_and_holds_the_event(truth, as_published):
     """Equation 72, without distortion: a heavy axis keeps its image where it is."""
     made = plates.noisy(truth, np.random.default_rng(22))
+    made = replace(made, options=replace(made.options, as_published=as_published))
     free = calibrate(made)
     given = pointed(truth, 0.0)
     with_axis = calibrate(replace(made, axis=replace(given, weight=np.eye(2) * 1e6)))
@@ -180,3 +213,12 @@ def test_the_axis_counts_two_observations_and_holds_the_event(truth):
     x, y = xp + cx * m / q, yp + cy * n / q
     assert given.xy == pytest.approx([x - epsilon * y, y], abs=2e-9)
     assert with_axis.mean_errors["alpha_event"] < free.mean_errors["alpha_event"]
+
+
+def test_the_matrix_turns_and_reflects():
+    generator = np.random.default_rng(23)
+    for angles in generator.uniform([-3, -1.5, -3], [3, 1.5, 3], (50, 3)):
+        found = pointing_matrix(angles)
+        assert found == pytest.approx(plates.matrix(angles), abs=1e-15)
+        assert found @ found.T == pytest.approx(np.eye(3), abs=1e-15)
+        assert np.linalg.det(found) == pytest.approx(-1.0)

@@ -9,8 +9,10 @@ import pytest
 
 from photogram.angles import ARCSEC
 from photogram.stellar import calibrate, refraction
-from photogram.stellar.curves import histogram, refraction_curves, residual_classes
+from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES
+from photogram.stellar.result import ellipse
+from photogram.stellar.tables import star_means
 
 
 @pytest.fixture(scope="module")
@@ -196,3 +198,36 @@ def test_results_name_what_is_doubtful(plate):
     weak = calibrate(plates.noisy(none, np.random.default_rng(57)))
     assert weak.significance()["K5"] < 1.96
     assert "distortion terms that are not significant: K5 (" in " ".join(m.text for m in weak.messages)
+
+
+def test_means_of_a_star_are_radial_and_tangential(plate):
+    """An outward mean residual is radial, positive; one that leads round from x to y is tangential."""
+    result = calibrate(plates.quiet(plate))
+    rows = list(star_means(result))
+    assert [star for star, *_ in rows] == list(plate.star_ids)
+    for star, mean, residual, (radial, tangential) in rows:
+        chosen = plate.image_stars == plate.star_ids.index(star)
+        assert mean == pytest.approx(plate.image_xy[chosen].mean(axis=0))
+        assert residual == pytest.approx(result.solved.residuals[chosen].mean(axis=0))
+        outward = mean / np.linalg.norm(mean)
+        across = np.array([-outward[1], outward[0]])
+        assert radial * outward + tangential * across == pytest.approx(residual, abs=1e-18)
+
+
+def test_the_transformed_distortion_vanishes_at_the_crossover(plate):
+    options = replace(plates.quiet(plate).options, crossover=0.06, interval=0.01, extent=0.1)
+    curves = distortion_curves(calibrate(replace(plate, options=options)))
+    assert curves.transformed[6] == pytest.approx(0.0, abs=1e-18)
+    assert curves.transformed_error[6] == pytest.approx(0.0, abs=1e-18)
+    assert curves.transformed[5] - curves.radial[5] == pytest.approx(curves.scale * 0.05, rel=1e-9)
+
+
+def test_an_ellipse_has_the_axes_and_the_direction_of_its_covariance():
+    """Three seconds long, one wide, thirty degrees from east towards north, at a declination of sixty."""
+    turn, dec = np.radians(30.0), np.radians(60.0)
+    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    on_sphere = axes @ np.diag([9.0, 1.0]) @ axes.T
+    in_places = np.diag([1 / np.cos(dec), 1.0]) @ on_sphere @ np.diag([1 / np.cos(dec), 1.0])
+    found = ellipse(in_places, dec)
+    assert (found.major, found.minor) == (pytest.approx(3.0), pytest.approx(1.0))
+    assert found.direction == pytest.approx(turn)
