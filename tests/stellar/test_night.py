@@ -17,12 +17,13 @@ from photogram.cli import app
 from photogram.stellar import Air, Site
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
+from photogram.stellar.matching import mutually_nearest
 from photogram.stellar.night import calibrate_night
 from photogram.stellar.night_document import axis_of, to_json
 from photogram.stellar.night_file import attitude_of, inputs, read_night
 from photogram.stellar.night_report import report
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
-from photogram.stellar.skies import calibrate_exposures, project_sky
+from photogram.stellar.skies import calibrate_exposures, project_sky, stars_near
 from photogram.stellar.transformation import pole_matrix, terrestrial
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "exposures" / "night.toml"))
@@ -265,6 +266,31 @@ def test_rough_attitudes_from_azimuth_elevation_roll(azimuth, elevation):
     # A camera turned clockwise by a right angle has what was above on its left.
     turned = seen(azimuth, elevation + 1, attitude_of(*np.radians([azimuth, elevation, 90])))
     assert turned == pytest.approx([above[1], 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("limit", [0.02, 0.1, 0.7, 3.0])
+def test_nearest_images_are_those_of_all_distances(limit):
+    generator = np.random.default_rng(31)
+    points, others = generator.uniform(-1, 1, (200, 2)), generator.uniform(-1.2, 0.9, (300, 2))
+    distance = np.linalg.norm(points[:, None] - others[None], axis=2)
+    nearest = distance.argmin(axis=1)
+    mutual = distance.argmin(axis=0)[nearest] == np.arange(200)
+    expected = np.where(mutual & (distance.min(axis=1) <= limit), nearest, -1)
+    assert (mutually_nearest(points, others, limit) == expected).all()
+    assert (mutually_nearest(points, others[:0], limit) == -1).all()
+    assert len(mutually_nearest(points[:0], others, limit)) == 0
+
+
+def test_stars_near_are_all_in_the_frame(night, result):
+    """Those of the field and some around it; all of them where the axis is level."""
+    for exposure in result.exposures:
+        near = stars_near(exposure, result.camera, night.site, night.catalogue, night.frame, 0.0)
+        assert set(exposure.stars[exposure.stars >= 0]) <= set(near)
+        assert len(near) < 0.2 * len(night.catalogue.ids)
+    level = replace(result.exposures[0], attitude=np.array([np.pi / 2, 0.0, 0.0]))
+    assert len(stars_near(level, result.camera, night.site, night.catalogue, night.frame, 0.0)) == len(
+        night.catalogue.ids
+    )
 
 
 def test_mean_errors_of_the_catalogue():

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["exposures", "stellar_camera"]
 
-
 Out = Annotated[
     Path | None,
     typer.Option(

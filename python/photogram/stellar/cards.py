@@ -1,23 +1,30 @@
-"""Cards of 80 columns: fields by column, errors with the number and text of the card."""
+"""Cards of 80 columns: fields as numbers, and the cards of a deck one after the other."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.errors import InputError
-from photogram.files import read_lines
 from photogram.giant.fields import parse_integer, parse_real
-from photogram.places import Place
+from photogram.records import Record, Source
 
 __all__ = ["Card", "Cards"]
 
 
-class Card(Place):
+@dataclass(frozen=True)
+class Card:
     """A card: fields are taken by their first and last column, counted from 1."""
 
+    record: Record
+
+    def error(self, message: str) -> InputError:
+        """Return an error that names this card."""
+        return self.record.error(message)
+
     def columns(self, first: int, last: int) -> str:
-        """Return columns as they are; short cards end in blanks."""
-        return (self.text or "").ljust(80)[first - 1 : last]
+        """Return columns as they are; short cards have fewer."""
+        return self.record.columns(first, last)
 
     def name(self, first: int, last: int) -> str:
         """Return a field as text."""
@@ -58,7 +65,7 @@ class Cards:
     """
 
     def __init__(self, file: Path) -> None:
-        self._lines, self._file, self._taken = read_lines(file), file, 0
+        self._source, self._taken = Source.read(file), 0
 
     def take(self, what: str) -> Card:
         """Return the next card, which holds what is named.
@@ -68,14 +75,13 @@ class Cards:
         InputError
             The deck is at its end.
         """
-        if self._taken >= len(self._lines):
-            raise InputError(
-                f"the deck ends where {what} is expected", file=self._file, record=self._taken + 1
-            )
+        if self._taken >= len(self._source.lines):
+            message = f"the deck ends where {what} is expected"
+            raise InputError(message, file=self._source.path, record=self._taken + 1)
         self._taken += 1
-        return Card(self._file, self._taken, self._lines[self._taken - 1])
+        return Card(self._source.record(self._taken))
 
     @property
     def at_end(self) -> bool:
         """Whether nothing but blank cards is left."""
-        return not any(line.strip() for line in self._lines[self._taken :])
+        return not any(number > self._taken for number in self._source.filled())

@@ -12,7 +12,13 @@ import orjson
 from photogram import _photocore
 from photogram.angles import ARCSEC
 from photogram.stellar.comparator_frame import comparator_frame
-from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
+from photogram.stellar.curves import (
+    distortion_curves,
+    histogram,
+    refraction_curves,
+    residual_classes,
+    star_means,
+)
 from photogram.stellar.movement import fictitious_points
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.result import Ellipse, Result, Stage
@@ -79,6 +85,7 @@ def _solution(result: Result) -> dict[str, Any]:
         },
         "stars": _stars(result),
         "images": _images(result),
+        "star_means": _means(result),
         "axis_residual_um": None if axis is None else 1e6 * axis,
         "transformed": _transformed(result),
         "comparator_frame": None
@@ -192,6 +199,20 @@ def _images(result: Result) -> list[dict[str, Any]]:
             "standardized": standardized,
         }
         for point, star, group, xy, residual, redundancy, standardized in columns
+    ]
+
+
+def _means(result: Result) -> list[dict[str, Any]]:
+    """Return means over the images of each star with two at least."""
+    return [
+        {
+            "star": star,
+            "xy_m": xy,
+            "residual_um": 1e6 * v,
+            "radial_um": 1e6 * radial,
+            "tangential_um": 1e6 * along,
+        }
+        for star, xy, v, (radial, along) in star_means(result)
     ]
 
 

@@ -6,15 +6,13 @@ import math
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.angles import ARCSEC
+from photogram.sections import Section, composed, headline
 from photogram.stellar import tables
 from photogram.stellar.parameters import GROUPS
 from photogram.stellar.result import SIGNIFICANT, Result, Stage
 
 __all__ = ["listing", "plate_list", "summary"]
-
-Section = tuple[str, list[str]]
 
 
 def listing(result: Result) -> str:
@@ -31,10 +29,7 @@ def listing(result: Result) -> str:
         ("Histogram of residuals", tables.residual_histogram(result)),
         *_combined(result),
     ]
-    title = result.problem.labels.get("title", "")
-    head = f"photogram {_photocore.__version__}  stellar camera  {title}".rstrip()
-    parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
-    return "\n\n".join([head, *parts]) + "\n"
+    return composed(headline("stellar camera", result.problem.labels.get("title", "")), sections)
 
 
 def summary(result: Result) -> list[Section]:

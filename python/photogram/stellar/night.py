@@ -19,7 +19,14 @@ from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import mutually_nearest
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
-from photogram.stellar.skies import Exposure, SkyCalibration, calibrate_exposures, identify, project_sky
+from photogram.stellar.skies import (
+    Exposure,
+    SkyCalibration,
+    calibrate_exposures,
+    identify,
+    project_sky,
+    stars_near,
+)
 from photogram.stellar.sky import Site
 
 __all__ = ["CalibratedNight", "Night", "calibrate_night"]
@@ -269,18 +276,25 @@ def _seen_again(night: Night, seen: _Seen, found: SkyCalibration, attitude: Floa
     given = night.exposures[seen.index]
     noise = max(1.4826 * float(np.median(np.abs(found.residuals))), 1e-3 * night.pixel_sd)
     limit = night.rejection * noise if night.rejection else math.inf
-    places = apparent_places(night.catalogue, given.utc)
+    turned = replace(given, attitude=attitude)
+    near = stars_near(turned, found.camera, night.site, night.catalogue, night.frame, 0.0, night.earth.dut1)
+    stars = given.stars
+    if stars is not None:
+        near = np.union1d(near, stars[stars >= 0])
+    places = apparent_places(night.catalogue.take(near), given.utc)
     time = sidereal_time(night.site, given.utc, night.earth.dut1)
     predicted = project_sky(found.camera, attitude, night.site, places, time)
-    stars = given.stars
     if stars is None:
         reach = max(2 * night.rejection * noise, _REACH)
         with np.errstate(invalid="ignore"):
             seen_by = ((predicted > -reach) & (predicted < np.array(night.frame) + reach)).all(axis=1)
         inside = np.flatnonzero(seen_by)
         nearest = mutually_nearest(given.xy, predicted[inside], reach)
-        stars = np.where(nearest >= 0, inside[nearest], -1)
-    off = np.abs(given.xy - predicted[stars]).max(axis=1)
+        local = np.where(nearest >= 0, inside[nearest], -1) if len(inside) else nearest
+        stars = np.where(local >= 0, near[local], -1)
+    else:
+        local = np.where(stars >= 0, np.searchsorted(near, stars), -1)
+    off = np.abs(given.xy - predicted[local]).max(axis=1)
     kept = (stars >= 0) & (off <= limit)
     return _Seen(seen.index, stars, kept) if kept.sum() >= _FEWEST else seen
 

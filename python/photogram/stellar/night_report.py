@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.angles import ARCSEC
+from photogram.sections import Section, composed, headline
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.night import SIGNIFICANT, CalibratedNight
 from photogram.stellar.night_document import axis_of
@@ -15,14 +15,11 @@ from photogram.stellar.parameters import GRAD
 
 __all__ = ["report", "summary"]
 
-Section = tuple[str, list[str]]
-
 _LARGEST = 10
 
 
 def report(result: CalibratedNight) -> str:
     """Return the report of a calibration."""
-    head = f"photogram {_photocore.__version__}  stellar camera, exposures  {result.night.title}".rstrip()
     sections = [
         *summary(result),
         ("Exposures", _exposures(result)),
@@ -30,8 +27,7 @@ def report(result: CalibratedNight) -> str:
         ("Largest standardized residuals", _largest(result)),
         ("Largest corrections of stars", _stars(result)),
     ]
-    parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
-    return "\n\n".join([head, *parts]) + "\n"
+    return composed(headline("stellar camera, exposures", result.night.title), sections)
 
 
 def summary(result: CalibratedNight) -> list[Section]:

@@ -24,11 +24,20 @@ from photogram.stellar.problem import weight_root
 from photogram.stellar.sky import Site
 from photogram.stellar.transformation import transformed_angles
 
-__all__ = ["BrownCamera", "Exposure", "SkyCalibration", "calibrate_exposures", "identify", "project_sky"]
+__all__ = [
+    "BrownCamera",
+    "Exposure",
+    "SkyCalibration",
+    "calibrate_exposures",
+    "identify",
+    "project_sky",
+    "stars_near",
+]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _STILL = Earth()
+_SLACK = math.radians(2.0)
 _FEWEST, _SHARE = 6, 0.2
 """Stars, and their share of all that could be, below which an identification is one of chance."""
 
@@ -122,6 +131,34 @@ def project_sky(camera: BrownCamera, attitude: Floats, site: Site, places: Float
     return pixels
 
 
+def stars_near(
+    exposure: Exposure,
+    camera: BrownCamera,
+    site: Site,
+    catalogue: Catalogue,
+    frame: tuple[float, float],
+    margin: float,
+    dut1: float = 0.0,
+) -> Indices:
+    """Return the stars of a catalogue around the field of an exposure, by index.
+
+    `margin` (radians) is what the attitude may be off.
+    """
+    alpha, omega = exposure.attitude[:2]
+    if not math.cos(alpha) * math.cos(omega) > 0.02:
+        # Nearly level or below: there are no standard coordinates to go by.
+        return np.arange(len(catalogue.ids))
+    axis = np.array([[math.tan(alpha), math.tan(omega) / math.cos(alpha)]])
+    ((ra, dec),) = site.places(axis, sidereal_time(site, exposure.utc, dut1))
+    fx, fy, cx, cy = camera.values[:4]
+    corner = math.hypot(max(cx, frame[0] - cx) / fx, max(cy, frame[1] - cy) / fy)
+    # Distortion, and precession over the years.
+    reach = 1.1 * math.atan(corner) + margin + _SLACK
+    right, declination = catalogue.places.T
+    cosine = np.sin(dec) * np.sin(declination) + np.cos(dec) * np.cos(declination) * np.cos(right - ra)
+    return np.flatnonzero(cosine >= math.cos(min(reach, math.pi)))
+
+
 def identify(
     exposure: Exposure,
     camera: BrownCamera,
@@ -157,14 +194,16 @@ def identify(
     """
     site = earth.site_of_date(site)
     time = sidereal_time(site, exposure.utc, earth.dut1)
-    predicted = project_sky(camera, exposure.attitude, site, apparent_places(catalogue, exposure.utc), time)
+    near = stars_near(exposure, camera, site, catalogue, frame, radius / camera.values[0], earth.dut1)
+    places = apparent_places(catalogue.take(near), exposure.utc)
+    predicted = project_sky(camera, exposure.attitude, site, places, time)
     margin = np.array([-radius, -radius]), np.array(frame) + radius
     with np.errstate(invalid="ignore"):
         seen = np.flatnonzero(((predicted >= margin[0]) & (predicted <= margin[1])).all(axis=1))
     found = match(exposure.xy, predicted[seen], radius=radius, tolerance=tolerance)
     if (found >= 0).sum() < max(_FEWEST, _SHARE * min(len(found), len(seen))):
         return np.full(len(found), -1, np.int64)
-    return np.where(found >= 0, seen[found] if len(seen) else -1, -1)
+    return np.where(found >= 0, near[seen[found]] if len(seen) else -1, -1)
 
 
 def calibrate_exposures(

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.angles import ARCSEC, degrees_minutes_seconds
 from photogram.stellar.comparator_frame import comparator_frame
-from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
+from photogram.stellar.curves import (
+    distortion_curves,
+    histogram,
+    refraction_curves,
+    residual_classes,
+    star_means,
+)
 from photogram.stellar.movement import fictitious_points
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.result import Ellipse, Result, ellipse
@@ -33,7 +38,6 @@ __all__ = [
     "pre_run",
     "refraction",
     "residual_histogram",
-    "star_means",
     "stars",
     "transformed",
 ]
@@ -298,19 +302,6 @@ def means(result: Result) -> list[str]:
             f"{1e6 * radial:9.3f}{1e6 * tangential:12.3f}"
         )
     return lines if len(lines) > 1 else []
-
-
-def star_means(result: Result) -> Iterator[tuple[str, np.ndarray, np.ndarray, tuple[float, float]]]:
-    """Yield star, mean plate coordinates, mean residual, and its radial and tangential parts; metres."""
-    for i, star in enumerate(result.problem.star_ids):
-        chosen = result.problem.image_stars == i
-        if chosen.sum() > 1:
-            mean, v = (
-                result.problem.image_xy[chosen].mean(axis=0),
-                result.solved.residuals[chosen].mean(axis=0),
-            )
-            cos, sin = mean / max(float(np.hypot(*mean)), 1e-300)
-            yield star, mean, v, (float(v[0] * cos + v[1] * sin), float(-v[0] * sin + v[1] * cos))
 
 
 def pre_run(result: Result) -> list[str]:
