@@ -1,5 +1,7 @@
 """Computed references written from the report's specification, at the tolerances of their README."""
 
+from dataclasses import replace
+
 import golden
 import numpy as np
 import pytest
@@ -99,6 +101,16 @@ def test_adjustment_with_noise(noisy):
     assert levels == pytest.approx(expected["levels_of_discrepancy"], rel=1e-9)
     stars = np.array(expected["star_residuals_arcsec"])
     assert result.star_residuals / ARCSEC == pytest.approx(stars, abs=1e-9)
+
+
+def test_counts_are_those_of_the_printed_sample(plate):
+    """The report's 75 stars with five images each and one weighted parameter: 729 degrees of freedom."""
+    weights = np.zeros((26, 26))
+    weights[INDEX["epsilon"], INDEX["epsilon"]] = 1.0
+    counts = calibrate(replace(plate, parameter_weights=weights)).counts
+    assert counts.parameter_observations == 1
+    assert (counts.star_observations, counts.plate_observations) == (150, 750)
+    assert (counts.observations, counts.unknowns, counts.degrees_of_freedom) == (901, 172, 729)
 
 
 def test_strict_solution_is_near_the_published_one(noisy):
