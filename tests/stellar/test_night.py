@@ -268,6 +268,41 @@ def test_rough_attitudes_from_azimuth_elevation_roll(azimuth, elevation):
     assert turned == pytest.approx([above[1], 0], abs=1e-6)
 
 
+def test_catalogue_and_prior_from_files(result, folder):
+    """The stars that were seen, as a table, and the camera that came out: the same again, known better."""
+    catalogue = result.night.catalogue
+    stars = catalogue.take(np.unique(result.calibration.stars))
+    head = "id,ra_deg,dec_deg,pm_ra_mas,pm_dec_mas,parallax_mas,magnitude"
+    lines = [f"{head},ra_error_mas,dec_error_mas,pm_ra_error_mas,pm_dec_error_mas"]
+    mas = 1e3 / ARCSEC
+    for i, name in enumerate(stars.ids):
+        values = [*np.degrees(stars.places[i]), *(mas * stars.proper_motions[i]), mas * stars.parallaxes[i]]
+        values += [stars.magnitudes[i], *(mas * stars.errors[i])]
+        lines.append(",".join([name, *map(repr, map(float, values))]))
+    (folder / "stars.csv").write_text("\n".join(lines))
+    (folder / "camera.json").write_bytes(result.camera.to_json())
+    file = folder / "night.toml"
+    text = file.read_text().replace(
+        "faintest = 6.0", 'file = "stars.csv"\nepoch = 1991.25\nfaintest = 6.0\nweigh_stars = true'
+    )
+    file.write_text(text)
+    night = read_night(file)
+    assert night.catalogue.errors.min() > 0
+    again = calibrate_night(night)
+    errors = np.sqrt(np.diag(result.camera.covariance))
+    assert np.abs((again.camera.values - result.camera.values) / errors).max() < 0.01
+    assert "Largest corrections of stars" in report(again)
+    assert len(json.loads(to_json(again))["stars"]) == len(again.calibration.catalogue)
+    file.write_text(text.replace("[camera]", '[camera]\nprior = "camera.json"'))
+    known = calibrate_night(read_night(file))
+    assert known.calibration.degrees_of_freedom == again.calibration.degrees_of_freedom + 9
+    assert "prior" in report(known)
+    assert inputs(file)[1:] == [folder / "images.csv", folder / "stars.csv", folder / "camera.json"]
+    (folder / "stars.csv").write_text(f"{head}\nx,1,2,3,4,5,\n")
+    with pytest.raises(InputError, match="magnitude is blank"):
+        read_night(file)
+
+
 @pytest.mark.parametrize("limit", [0.02, 0.1, 0.7, 3.0])
 def test_nearest_images_are_those_of_all_distances(limit):
     generator = np.random.default_rng(31)

@@ -52,7 +52,10 @@ def stellar_camera(
     plots: Plots = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate a camera by a plate with images of stars (NOAA Technical Report NOS 55)."""
+    """Calibrate a camera by a plate with images of stars (NOAA Technical Report NOS 55).
+
+    `photogram stellar-camera exposures` does so by digital exposures of the sky.
+    """
     if example == (deck is not None):
         raise typer.BadParameter("give a deck, or --example", param_hint="DECK")
     with failures(), ExitStack() as resources:
