@@ -20,7 +20,7 @@ def plate():
 @pytest.fixture(scope="session")
 def truth(plate):
     """Return the example without errors; its initial values are the true ones."""
-    import plates
+    import star_plates as plates
 
     from photogram.stellar import calibrate
 

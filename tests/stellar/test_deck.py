@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from decks import cards, put
+from star_decks import cards, put
 from typer.testing import CliRunner
 
 from photogram import InputError

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from decks import cards, put
+from star_decks import cards, put
 from typer.testing import CliRunner
 
 from photogram import AdjustmentError, InputError

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import plates
 import pytest
+import star_plates as plates
 
 from photogram.angles import ARCSEC
 from photogram.stellar import calibrate

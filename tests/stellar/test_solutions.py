@@ -4,8 +4,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import plates
 import pytest
+import star_plates as plates
 
 from photogram.angles import ARCSEC
 from photogram.stellar import calibrate, refraction

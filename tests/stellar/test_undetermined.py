@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import plates
 import pytest
+import star_plates as plates
 
 from photogram import AdjustmentError, InputError
 from photogram.stellar import calibrate
