@@ -1,17 +1,10 @@
-"""Put the numbers of the packaged example into docs/comparator.md.
-
-    python docs/comparator_numbers.py
-
-Blocks between `<!-- numbers: NAME -->` and `<!-- end -->` are made anew from the calibration of the example.
-"""
+"""The numbers of docs/comparator.md: `python docs/regenerate.py comparator.md`."""
 
 from __future__ import annotations
 
 import math
-import re
 from functools import cache
 from importlib.resources import as_file, files
-from pathlib import Path
 
 import numpy as np
 
@@ -20,9 +13,6 @@ from photogram.comparator.listing.joint import tests_page
 from photogram.comparator.listing.parameters import combined_linear_page
 from photogram.comparator.listing.summary import variance_lines
 from photogram.comparator.rigid import fit_rigid
-
-PAGE = Path(__file__).with_name("comparator.md")
-BLOCK = re.compile(r"(<!-- numbers: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 @cache
@@ -77,22 +67,10 @@ def grid_lines() -> list[str]:
     ]
 
 
-def numbers(name: str) -> list[str]:
-    """Return the lines of a block."""
-    made = {
-        "variance": lambda: variance_lines(calibration()),
-        "linear": lambda: combined_linear_page(calibration())[2:],
-        "tests": lambda: tests_page(calibration())[2:],
-        "joint": joint_lines,
-        "grid": grid_lines,
-    }
-    return [line.rstrip() for line in made[name]()]
-
-
-def regenerated(page: str) -> str:
-    """Return the page with all blocks made anew."""
-    return BLOCK.sub(lambda m: "\n".join([f"{m[1]}```text", *numbers(m[2]), "```", m[3]]), page)
-
-
-if __name__ == "__main__":
-    PAGE.write_text(regenerated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+BLOCKS = {
+    "variance": lambda: variance_lines(calibration()),
+    "linear": lambda: combined_linear_page(calibration())[2:],
+    "tests": lambda: tests_page(calibration())[2:],
+    "joint": joint_lines,
+    "grid": grid_lines,
+}

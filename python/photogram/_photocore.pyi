@@ -981,15 +981,11 @@ class StellarProblem:
     def axis_equations(self) -> dict[str, _Floats]:
         """Equations of the axis as `equations` has them, with one row or none."""
 
-    def published(
-        self, corrections: _Floats, *, refraction: float, distortion: float, passes: int
-    ) -> dict[str, Any]:
+    def published(self, *, refraction: float, distortion: float, passes: int) -> dict[str, Any]:
         """Equations of the images as the report's program formed them (equations 48 to 62, 73, 74).
 
         Parameters
         ----------
-        corrections
-            (S, 2) added to the refracted places.
         refraction, distortion, passes
             Tolerances (radians, unit of the plate) and limit of the inner iterations.
 

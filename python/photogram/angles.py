@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["degrees_minutes_seconds"]
+__all__ = ["ARCSEC", "degrees_minutes_seconds"]
+
+ARCSEC = math.pi / 648000.0
+"""One second of arc in radians."""
 
 
 def degrees_minutes_seconds(angle: float, decimals: int) -> tuple[int, int, float]:

@@ -3,14 +3,35 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 from photogram.errors import InputError
 
-__all__ = ["read_bytes", "read_lines", "reading", "whole", "write_whole"]
+__all__ = ["read_bytes", "read_lines", "reading", "spare", "whole", "write_whole"]
+
+
+def spare(paths: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Refuse to write over what is read.
+
+    Parameters
+    ----------
+    paths
+        Where results are to go.
+    inputs
+        The files that are read; those that are not there do not matter.
+
+    Raises
+    ------
+    InputError
+        A path is one of the inputs, by whatever name.
+    """
+    given = [file for file in inputs if file.exists()]
+    for path in paths:
+        if path.exists() and any(path.samefile(file) for file in given):
+            raise InputError("would be written over the input", file=path)
 
 
 def write_whole(files: Mapping[Path, bytes]) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.angles import degrees_minutes_seconds
+from photogram.angles import ARCSEC, degrees_minutes_seconds
 from photogram.reliability import TESTABLE
 from photogram.sections import Section, composed, headline
 from photogram.structuring import structure
@@ -20,7 +20,6 @@ __all__ = ["bandwidths", "report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
-_ARCSEC = 180 * 3600 / math.pi
 _ORDERINGS = {
     "input": "in input order",
     "rcm": "by reverse Cuthill-McKee",
@@ -204,9 +203,7 @@ def _photos(result: AdjustedBlock) -> list[str]:
     )
     for name, values, angles, sd in rows:
         lines.append(f"{name:<10}{position(values)}" + "".join(f"{angle:>15.7f}" for angle in angles))
-        lines.append(
-            f"{'':<10}{sd_position(sd[:3])}" + "".join(f"{each * _ARCSEC:>15.3f}" for each in sd[3:])
-        )
+        lines.append(f"{'':<10}{sd_position(sd[:3])}" + "".join(f"{each / ARCSEC:>15.3f}" for each in sd[3:]))
     return lines
 
 
@@ -261,7 +258,7 @@ def _rms(values: Floats) -> float:
 
 def _outward(result: AdjustedBlock) -> Floats:
     """Return the factors from inner units to those of the report: arcsec for angles."""
-    return np.array([_ARCSEC, _ARCSEC, 1.0] if result.block.geographic else [1.0, 1.0, 1.0])
+    return np.array([1.0 / ARCSEC, 1.0 / ARCSEC, 1.0] if result.block.geographic else [1.0, 1.0, 1.0])
 
 
 def _difference_units(result: AdjustedBlock) -> tuple[str, str, str]:

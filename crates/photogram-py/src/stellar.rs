@@ -300,18 +300,16 @@ impl StellarProblem {
         equations(py, &rows.into_iter().collect::<Vec<_>>())
     }
 
-    #[pyo3(signature = (corrections, *, refraction, distortion, passes))]
+    #[pyo3(signature = (*, refraction, distortion, passes))]
     fn published<'py>(
         &self,
         py: Python<'py>,
-        corrections: Array<'py>,
         refraction: f64,
         distortion: f64,
         passes: usize,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let corrections = rows("corrections", &corrections)?;
         let tolerances = Tolerances { refraction, distortion, passes };
-        let found = self.calibration.published(&corrections, &tolerances).map_err(|error| failure(&error))?;
+        let found = self.calibration.published(&tolerances).map_err(|error| failure(&error))?;
         let dict = equations(py, &found.iter().map(|image| image.rows).collect::<Vec<_>>())?;
         dict.set_item("standard", table(py, found.iter().map(|image| image.standard).collect())?)?;
         dict.set_item("undistorted", table(py, found.iter().map(|image| image.undistorted).collect())?)?;

@@ -19,6 +19,7 @@ from photogram.errors import InputError
 from photogram.files import read_lines
 from photogram.geometry import rotation_matrix
 from photogram.messages import Message
+from photogram.places import Place
 
 __all__ = [
     "Deck",
@@ -54,18 +55,11 @@ class Deck:
     messages: list[Message] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class _Record:
-    path: Path
-    number: int
-    text: str
-
-    def error(self, text: str) -> InputError:
-        return InputError(text, file=self.path, record=self.number, text=self.text)
-
+class _Record(Place):
     def words(self, least: int, most: int, what: str) -> list[str]:
         """Split into words; between two commas there may be none."""
-        split = self.text.split(",") if "," in self.text else self.text.split()
+        text = self.text or ""
+        split = text.split(",") if "," in text else text.split()
         words = [word.strip() for word in split]
         if not least <= len(words) <= most:
             wanted = f"{least}" if least == most else f"{least} or {most}"
@@ -181,7 +175,7 @@ def _former(record: _Record, stations: Stations, messages: list[Message]) -> Sim
     kappa = _kappa(stations)
     if kappa is None:
         remark = "the quadrant of kappa is not in its sine; it is taken within 90 degrees"
-        messages.append(Message(remark, record.path, record.number, record.text))
+        messages.append(record.message(remark))
     elif math.cos(kappa) < 0:
         angles[2] = math.pi - angles[2]
     return Similarity.from_parameters(values[3], rotation_matrix(angles[np.newaxis])[0], values[4:])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.cards import restart_record, transformation_records
 from photogram.absolute_orientation.oriented import OrientedModel
+from photogram.angles import ARCSEC
 from photogram.sections import Section, composed, headline
 
 __all__ = ["report", "summary"]
@@ -17,7 +18,6 @@ __all__ = ["report", "summary"]
 Floats = NDArray[np.float64]
 
 AXES = ("X", "Y", "Z")
-ARCSEC = 180 * 3600 / math.pi
 TEST = 3.0
 """Standardized residuals beyond this are marked."""
 
@@ -94,7 +94,7 @@ def _parameters(result: OrientedModel) -> list[str]:
     lines = [f"{'':<8}{'value':>20}{'sd':>16}"]
     for k, name in enumerate(("omega", "phi", "kappa")):
         angle = f"{math.degrees(similarity.angles[k]):>20.8f}"
-        lines.append(f"{name:<8}{angle}{_number(sd[k] * ARCSEC, 16, 3)}  deg, sd arcsec")
+        lines.append(f"{name:<8}{angle}{_number(sd[k] / ARCSEC, 16, 3)}  deg, sd arcsec")
     scale = f"{unit} / {stations.ground_unit}"
     lines.append(f"{'s':<8}{similarity.scale:>20.12g}{_general(sd[3])}  {scale}")
     lines += [

@@ -48,11 +48,18 @@ orientation_app = typer.Typer(
 )
 orientation_app.command("orient")(absolute_orientation.absolute_orientation)
 orientation_app.command("transform")(absolute_orientation.transform)
+stellar_app = typer.Typer(
+    name="stellar-camera",
+    cls=GroupWithMain,
+    help="Calibrate a camera by a plate with stars, or by exposures of the sky.",
+)
+stellar_app.command("plate")(stellar_camera.stellar_camera)
+stellar_app.command("exposures")(stellar_camera.exposures)
 app.add_typer(giant_app)
 app.add_typer(orientation_app)
 app.add_typer(comparator_app)
 app.command("perspective-center")(perspective_center.perspective_center)
-app.command("stellar-camera")(stellar_camera.stellar_camera)
+app.add_typer(stellar_app)
 app.command()(plan.plan)
 app.command()(simulate.simulate)
 

@@ -14,6 +14,7 @@ from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, errors, failures, output, print_sections, print_written
 from photogram.cli.options import JsonFile, Quiet
+from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity, Stations
@@ -147,7 +148,7 @@ def absolute_orientation(
         from photogram import orient
         from photogram.absolute_orientation.document import read_similarity
         from photogram.absolute_orientation.report import summary
-        from photogram.files import write_whole
+        from photogram.files import spare
 
         if file is None:
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
@@ -166,11 +167,13 @@ def absolute_orientation(
         result.messages[:0] = messages
         made = _small_files(result, listing, plot, None if points else json)
         written = list(made)
+        inputs = [each for each in (file, restart, points) if each]
         if points:
             target = points_out or points.with_name(f"{points.stem}-transformed.csv")
+            spare([target, *([json] if json else []), *made], inputs)
             _stream(result, points, target, json, point_sd, decimals, quiet)
             written = [target, *([json] if json else []), *written]
-        write_whole(made)
+        write_results(made, inputs)
         if not quiet:
             print_sections(summary(result), "the listing", SHOWN)
             print_written(written)
@@ -254,10 +257,7 @@ def _stream(
     """Transform a file of points, into the JSON document too."""
     from photogram.absolute_orientation.document import point_rows, without_points
     from photogram.absolute_orientation.stream import Document, decimals_for, transform_file
-    from photogram.errors import InputError
 
-    if target.exists() and target.samefile(points):
-        raise InputError("the transformed points would be written over the points", file=target)
     if decimals is None:
         decimals = decimals_for((result.rms or 0.0) / result.similarity.scale)
     document = None

@@ -14,6 +14,7 @@ from rich.markup import escape
 
 from photogram.cli.console import failures, output, print_remark, print_written
 from photogram.cli.options import Quiet, default_out
+from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, Options
@@ -102,7 +103,6 @@ def comparator(
     with failures(), ExitStack() as resources:
         from photogram.comparator import Options, calibrate, find_grid, read
         from photogram.errors import InputError
-        from photogram.files import write_whole
 
         if example:
             packaged = files("photogram") / "examples" / "comparator" / EXAMPLE
@@ -122,7 +122,7 @@ def comparator(
         written = _results(calibrations, folder, pdf=pdf, pictures=pictures, quiet=quiet)
         if json is not None:
             written[json] = _documents(calibrations)
-        write_whole(written)
+        write_results(written, paths or [])
         if not quiet:
             for calibration in calibrations:
                 _summarize(calibration)
@@ -212,10 +212,9 @@ def correct(
         from photogram.comparator.apply import correct_table
         from photogram.comparator.correction import Correction
         from photogram.comparator.csvfile import read_table
-        from photogram.files import write_whole
 
         made = correct_table(Correction.read(correction), read_table(measurements), invert=invert)
         if out is None:
             typer.echo(made.decode(), nl=False)
         else:
-            write_whole({out: made})
+            write_results({out: made}, [correction, measurements])

@@ -13,6 +13,7 @@ from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, failures, output, print_remark, print_written
 from photogram.cli.options import JsonFile, Quiet
+from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
@@ -74,14 +75,13 @@ def perspective_center(
     if example == (deck is not None):
         raise typer.BadParameter("give a deck, or --example", param_hint="DECK")
     with failures(), ExitStack() as resources:
-        from photogram.files import write_whole
         from photogram.perspective_center import run_deck
 
         if deck is None:
             deck = resources.enter_context(as_file(files("photogram").joinpath("examples", *EXAMPLE)))
         run = run_deck(deck, as_published=as_published, weights=weights.value)
         written = _files(run, json, listing, plot)
-        write_whole(written)
+        write_results(written, [deck])
         if not quiet:
             _summarize(run)
             print_written(written)

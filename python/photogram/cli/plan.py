@@ -11,6 +11,7 @@ import typer
 
 from photogram.cli.console import errors, failures, output, print_remark, print_written
 from photogram.cli.options import JsonFile
+from photogram.cli.outputs import write_results
 from photogram.cli.simulated import Control, NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -61,7 +62,6 @@ def plan(
     location, of photographs, and the gross errors that can be found.
     """
     with failures():
-        from photogram.files import write_whole
         from photogram.planning import plan as predict
 
         if projects:
@@ -77,7 +77,7 @@ def plan(
             patterns = _simulated(network, second)
         made = predict(patterns)
         written = _documents(made, json, plot)
-        write_whole(written)
+        write_results(written, [path for project in projects or [] for path in project.iterdir()])
         output.print(made.report(), markup=False, end="")
         print_written(written, errors)
 

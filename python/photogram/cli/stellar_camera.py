@@ -1,8 +1,8 @@
-"""`photogram stellar-camera`: calibrate a camera by stars."""
+"""`photogram stellar-camera`: calibrate a camera by stars, on a plate or on digital exposures."""
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,12 +11,24 @@ import typer
 
 from photogram.cli.console import NOT_CONVERGED, failures, print_sections, print_written
 from photogram.cli.options import JsonFile, Quiet
+from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
+    from photogram.stellar.night import CalibratedNight
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
 
-__all__ = ["stellar_camera"]
+__all__ = ["exposures", "stellar_camera"]
+
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="OUT",
+        help="Directory for listing, camera and plots. Default: INPUT-calibrated, here.",
+        show_default=False,
+    ),
+]
+Plots = Annotated[bool, typer.Option("--plots", help="Draw the plots (needs matplotlib).")]
 
 
 def stellar_camera(
@@ -32,35 +44,29 @@ def stellar_camera(
         bool,
         typer.Option("--example", help="Calibrate the packaged example instead: 75 stars in three groups."),
     ] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="OUT",
-            help="Directory for listing, camera and plots. Default: DECK-calibrated, here.",
-            show_default=False,
-        ),
-    ] = None,
+    out: Out = None,
     json: JsonFile = None,
     as_published: Annotated[
         bool, typer.Option("--as-published", help="Iterate with the report's partials and stop rules.")
     ] = False,
-    plots: Annotated[bool, typer.Option("--plots", help="Draw the plots (needs matplotlib).")] = False,
+    plots: Plots = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate a camera by its images of stars (NOAA Technical Report NOS 55)."""
+    """Calibrate a camera by a plate with images of stars (NOAA Technical Report NOS 55).
+
+    `photogram stellar-camera exposures` does so by digital exposures of the sky.
+    """
     if example == (deck is not None):
         raise typer.BadParameter("give a deck, or --example", param_hint="DECK")
     with failures(), ExitStack() as resources:
         from dataclasses import replace
 
-        from photogram.files import write_whole
         from photogram.stellar import calibrate
         from photogram.stellar.listing import summary
 
         if deck is None:
-            directory = resources.enter_context(as_file(files("photogram") / "examples" / "stellar"))
-            deck = directory / "plate.toml"
-        problems = _read(deck)
+            deck = resources.enter_context(_example("stellar")) / "plate.toml"
+        problems, inputs = _read(deck)
         target = out or Path(f"{deck.stem}-calibrated")
         written: dict[Path, bytes] = {}
         converged = True
@@ -73,23 +79,74 @@ def stellar_camera(
             written |= _files(result, target, mark, json, plots)
             if not quiet:
                 print_sections(summary(result), "the listing")
-        write_whole(written)
+        write_results(written, inputs)
         if not quiet:
             print_written(written)
     if not converged:
         raise typer.Exit(NOT_CONVERGED)
 
 
-def _read(deck: Path) -> list[Problem]:
-    from photogram.stellar.deck import read_deck
-    from photogram.stellar.plain import read_plain
+def exposures(
+    night: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="FILE",
+            help="TOML file that names station, camera, times, rough attitudes and the table of star images.",
+            show_default=False,
+        ),
+    ] = None,
+    example: Annotated[
+        bool,
+        typer.Option("--example", help="Calibrate the packaged example instead: five exposures of a night."),
+    ] = False,
+    out: Out = None,
+    json: JsonFile = None,
+    plots: Plots = False,
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Threads; the results do not depend on it. Default: all.", show_default=False
+        ),
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Calibrate a digital camera by exposures of the sky: pinhole and Brown distortion (needs pyerfa)."""
+    if example == (night is not None):
+        raise typer.BadParameter("give a file, or --example", param_hint="FILE")
+    with failures(), ExitStack() as resources:
+        from photogram.stellar.night import calibrate_night
+        from photogram.stellar.night_file import inputs, read_night
+        from photogram.stellar.night_report import summary
 
-    return [read_plain(deck)] if deck.suffix.lower() == ".toml" else read_deck(deck)
+        if night is None:
+            night = resources.enter_context(_example("exposures")) / "night.toml"
+        result = calibrate_night(read_night(night), threads)
+        written = _night_files(result, out or Path(f"{night.stem}-calibrated"), json, plots)
+        if not quiet:
+            print_sections(summary(result), "the report")
+        write_results(written, inputs(night))
+        if not quiet:
+            print_written(written)
+    if not result.converged:
+        raise typer.Exit(NOT_CONVERGED)
+
+
+def _example(name: str) -> AbstractContextManager[Path]:
+    return as_file(files("photogram") / "examples" / name)
+
+
+def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
+    """Return the problems, and the files that they are read from."""
+    from photogram.stellar.deck import read_deck
+    from photogram.stellar.plain import inputs, read_plain
+
+    return ([read_plain(deck)], inputs(deck)) if deck.suffix.lower() == ".toml" else (read_deck(deck), [deck])
 
 
 def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool) -> dict[Path, bytes]:
     """Make everything that is written for one problem."""
-    from photogram.stellar.document import camera_document, to_json
+    from photogram.stellar.cameras import camera_document
+    from photogram.stellar.document import to_json
     from photogram.stellar.listing import listing, plate_list
 
     made = {
@@ -106,4 +163,19 @@ def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool)
         made |= {
             out / name.replace(".png", f"{mark}.png"): content for name, content in figures(result).items()
         }
+    return made
+
+
+def _night_files(result: CalibratedNight, out: Path, json: Path | None, plots: bool) -> dict[Path, bytes]:
+    """Make everything that is written for a night."""
+    from photogram.stellar.night_document import to_json
+    from photogram.stellar.night_report import report
+
+    made = {out / "report.txt": report(result).encode(), out / "camera.json": result.camera.to_json()}
+    if json is not None:
+        made[json] = to_json(result)
+    if plots:
+        from photogram.stellar.night_plots import figures
+
+        made |= {out / name: content for name, content in figures(result).items()}
     return made

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,53 +9,12 @@ from pathlib import Path
 from photogram.errors import InputError
 from photogram.files import read_bytes
 from photogram.places import Place
+from photogram.rows import Row, cells
 
-__all__ = ["Row", "Table", "read_table"]
+__all__ = ["Table", "read_table"]
 
 MICROMETRES = {"um": 1.0, "mm": 1000.0}
 """Units of coordinates, as the names of columns end."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One record: its cells by column, and where it stands."""
-
-    cells: Mapping[str, str]
-    place: Place
-
-    def integer(self, column: str, default: int | None = None) -> int:
-        """Return a whole number that is not negative; `default` where the cell or the column is missing.
-
-        Raises
-        ------
-        InputError
-            The cell is blank without a default, or no such number.
-        """
-        text = self.cells.get(column, "")
-        if not text and default is not None:
-            return default
-        if not (text.isascii() and text.isdigit()):
-            raise self.place.error(f"{column} {text!r} is not a whole number")
-        return int(text)
-
-    def number(self, column: str) -> float | None:
-        """Return a finite number; None where the cell is blank.
-
-        Raises
-        ------
-        InputError
-            The cell is no such number.
-        """
-        text = self.cells[column]
-        if not text:
-            return None
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise self.place.error(f"{column} {text!r} is not a number")
-        return value
 
 
 @dataclass(frozen=True)
@@ -152,21 +109,17 @@ def read_table(path: Path) -> Table:
     if not numbered:
         raise InputError("holds no table", file=path)
     head, *body = numbered
-    columns = tuple(name.lower() for name in _cells(head))
+    columns = tuple(name.lower() for name in cells(head.text or ""))
     return Table(
         path, settings, columns, head, tuple(_row(columns, place) for place in body), _unit(columns, head)
     )
 
 
-def _cells(place: Place) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([place.text or ""]))]
-
-
 def _row(columns: tuple[str, ...], place: Place) -> Row:
-    cells = _cells(place)
-    if len(cells) != len(columns):
-        raise place.error(f"there are {len(cells)} cells under {len(columns)} columns")
-    return Row(dict(zip(columns, cells, strict=True)), place)
+    found = cells(place.text or "")
+    if len(found) != len(columns):
+        raise place.error(f"there are {len(found)} cells under {len(columns)} columns")
+    return Row(dict(zip(columns, found, strict=True)), place)
 
 
 def _unit(columns: tuple[str, ...], head: Place) -> str:

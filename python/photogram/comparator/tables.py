@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from photogram.comparator.csvfile import Row, Table, read_table
+from photogram.comparator.csvfile import Table, read_table
 from photogram.comparator.grid import Grid, find_grid
 from photogram.comparator.readings import Case, Reading, Session, collect_cases
 from photogram.errors import InputError
+from photogram.rows import Row
 
 __all__ = ["read_csv", "to_csv"]
 

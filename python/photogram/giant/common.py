@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from photogram.giant.fields import ARCSEC, format_deviations, format_real
+from photogram.angles import ARCSEC
+from photogram.giant.fields import format_deviations, format_real
 from photogram.giant.records import Record, Source
 
 __all__ = ["Common", "common_records", "parse_common"]

@@ -11,8 +11,9 @@ import re
 from collections.abc import Iterable
 from decimal import Decimal
 
+from photogram.angles import ARCSEC
+
 __all__ = [
-    "ARCSEC",
     "MOST_ANGLE",
     "format_angle",
     "format_deviations",
@@ -28,9 +29,6 @@ __all__ = [
     "printed_order",
     "unpack_dms",
 ]
-
-ARCSEC = math.pi / 648000.0
-"""One second of arc in radians."""
 
 MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC
 """The largest angle that is written: 360 59 59, for a field may have 360 degrees and minutes besides."""

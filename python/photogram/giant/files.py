@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from photogram.errors import InputError
+from photogram.files import spare
 
 __all__ = ["NAMES", "find_files", "present_files", "spare_input", "to_bytes", "written"]
 
@@ -36,8 +37,7 @@ def spare_input(path: Path, directory: Path) -> None:
         The path is one of its files.
     """
     inputs = [found for candidates in present_files(directory).values() for found in candidates]
-    if path.exists() and any(path.samefile(found) for found in inputs):
-        raise InputError("would be written over the input", file=path)
+    spare([path], inputs)
 
 
 def find_files(directory: Path) -> dict[str, Path]:

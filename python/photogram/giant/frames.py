@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from photogram.angles import ARCSEC
 from photogram.giant.columns import Columns, angle_fields, deviation_fields, position_fields, texts
-from photogram.giant.fields import ARCSEC, format_name
+from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
 
 __all__ = ["ATTITUDE_SD", "Frame", "frame_records", "parse_frames"]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from itertools import compress
 from typing import TYPE_CHECKING
 
+from photogram.angles import ARCSEC
 from photogram.planning.statistics import PointQuality
 from photogram.sections import composed, headline
 
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["report"]
 
-_ARCSEC = 180 * 3600 / math.pi
 _NOTICED = 1.005
 """Ratio of standard deviations that two decimals show."""
 _HEAD = 3
@@ -131,7 +131,7 @@ def _photos(patterns: Sequence[Pattern]) -> list[str]:
     for pattern in patterns:
         rows = [["rms", "max", *(["redundancy"] if weighted else [])]]
         for k, quality in enumerate(pattern.photos):
-            factor, digits = (1.0, decimals) if k < 3 else (_ARCSEC, 2)
+            factor, digits = (1.0, decimals) if k < 3 else (1.0 / ARCSEC, 2)
             rows.append([_fixed(factor * sd, digits) for sd in (quality.rms_sd, quality.max_sd)])
             rows[-1] += [_fixed(quality.redundancy, 3)] if weighted else []
         blocks.append(_aligned(pattern.name, rows))

@@ -1,6 +1,7 @@
 """Stellar camera calibration (NOAA Technical Report NOS 55, 1972)."""
 
 from photogram.stellar.adjustment import calibrate
+from photogram.stellar.cameras import BrownCamera, PlateCamera
 from photogram.stellar.options import Options
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.result import Result
@@ -9,7 +10,9 @@ from photogram.stellar.sky import Air, Site, refraction
 __all__ = [
     "Air",
     "Axis",
+    "BrownCamera",
     "Options",
+    "PlateCamera",
     "Problem",
     "Result",
     "Site",

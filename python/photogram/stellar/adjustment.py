@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -17,8 +17,8 @@ from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.movement import movement, pairs_to_combine
 from photogram.stellar.parameters import GROUPS, INDEX
 from photogram.stellar.problem import Problem
-from photogram.stellar.result import PreRun, Result
-from photogram.stellar.state import Level, Solved
+from photogram.stellar.result import PreRun, Result, Stage
+from photogram.stellar.state import Solved
 
 __all__ = ["calibrate"]
 
@@ -62,9 +62,8 @@ def calibrate(
         if problem.options.as_published
         else partial(strict.iterate, threads=threads, progress=progress)
     )
-    messages: list[Message] = []
     initial = problem.initial.copy()
-    levels: tuple[Level, ...] = ()
+    stages: tuple[Stage, ...] = ()
     if problem.options.minimum_stars:
         smallest = _minimum_problem(problem)
         solved = iterate(
@@ -74,21 +73,24 @@ def calibrate(
             solution="minimum",
             limit=problem.options.max_iterations_minimum,
         )
-        levels = solved.levels
+        stages = (_stage(smallest, solved),)
         initial = solved.parameters.copy()
         initial[0:3] = initial[3:6] = initial[6:9]
         if problem.options.pre_run:
-            return _result(
-                problem, smallest, solved, messages, pre_run=_pre_run(problem, smallest, initial, solved)
-            )
+            residuals = _pre_run(problem, smallest, initial, solved)
+            return _result(problem, smallest, solved, stages, pre_run=residuals)
     free = free_parameters(problem)
     _check_groups(problem)
     limit = problem.options.max_iterations
     solved = iterate(problem, initial, free, solution="maximum", limit=limit)
-    levels = (*levels, *solved.levels)
-    if problem.options.refraction:
-        solved, levels = _refraction(problem, iterate, solved, levels, messages)
-    result = _result(problem, problem, replace(solved, levels=levels), messages)
+    stages = (*stages, _stage(problem, solved))
+    remarks: list[str] = []
+    if problem.options.refraction and solved.converged:
+        solved = _refraction(problem, iterate, solved)
+        stages = (*stages, _stage(problem, solved))
+    elif problem.options.refraction:
+        remarks = ["REFRACTION SOLUTION ELIMINATED FROM PROBLEM"]
+    result = _result(problem, problem, solved, stages, remarks=remarks)
     return _combined(result) if problem.options.movement_factor > 0 else result
 
 
@@ -155,40 +157,41 @@ def _pre_run(problem: Problem, smallest: Problem, initial: Floats, solved: Solve
     )
 
 
-def _refraction(
-    problem: Problem,
-    iterate: Callable[..., Solved],
-    solved: Solved,
-    levels: tuple[Level, ...],
-    messages: list[Message],
-) -> tuple[Solved, tuple[Level, ...]]:
-    """Estimate the coefficients of refraction, unless the camera has diverged."""
-    if not solved.converged:
-        messages.append(Message("REFRACTION SOLUTION ELIMINATED FROM PROBLEM"))
-        return solved, levels
+def _refraction(problem: Problem, iterate: Callable[..., Solved], solved: Solved) -> Solved:
+    """Estimate the coefficients of refraction with the camera."""
     free = solved.free.copy()
     free[22:] = ~problem.fixed[22:]
     once = {"once": True} if problem.options.as_published else {}
-    again = iterate(
+    return iterate(
         problem, solved.parameters, free, solution="refraction", limit=problem.options.max_iterations, **once
     )
-    return again, (*levels, *again.levels)
+
+
+def _stage(problem: Problem, solved: Solved) -> Stage:
+    counts = degrees_of_freedom(problem, solved.free)
+    return Stage(
+        solved.levels[0].solution,
+        counts,
+        solved.levels,
+        solved.stop,
+        solved.converged,
+        solved.log_determinant,
+    )
 
 
 def _result(
     problem: Problem,
     solved_problem: Problem,
     solved: Solved,
-    messages: list[Message],
+    stages: tuple[Stage, ...],
+    *,
+    remarks: Sequence[str] = (),
     pre_run: PreRun | None = None,
 ) -> Result:
-    counts = degrees_of_freedom(solved_problem, solved.free)
-    messages = messages + [Message(text) for text in solved.remarks]
-    if not solved.converged:
-        messages.insert(0, Message(f"the solution has not converged: {solved.stop}"))
-    result = Result(solved_problem, solved, counts, tuple(messages), problem, pre_run)
-    named = [Message(text) for text in result.doubtful()]
-    return replace(result, messages=(*result.messages, *named))
+    unsettled = [] if solved.converged else [f"the solution has not converged: {solved.stop}"]
+    result = Result(solved_problem, solved, stages[-1].counts, (), problem, stages, pre_run)
+    texts = (*unsettled, *remarks, *solved.remarks, *result.doubtful())
+    return replace(result, messages=tuple(Message(text) for text in texts))
 
 
 def _combined(result: Result) -> Result:

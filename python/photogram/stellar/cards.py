@@ -1,50 +1,46 @@
-"""Cards of 80 columns: fields by column, errors with the number and text of the card."""
+"""Cards of 80 columns: fields as numbers, and the cards of a deck one after the other."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.errors import InputError
 from photogram.giant.fields import parse_integer, parse_real
+from photogram.records import Record, Source
 
 __all__ = ["Card", "Cards"]
 
 
+@dataclass(frozen=True)
 class Card:
-    """A card: fields are taken by their first and last column, counted from 1.
+    """A card: fields are taken by their first and last column, counted from 1."""
 
-    Parameters
-    ----------
-    text
-        The card.
-    number
-        Of the card in its file, from 1.
-    file
-        The file.
-    """
-
-    def __init__(self, text: str, number: int, file: Path | None) -> None:
-        self.text, self.number, self.file = text.ljust(80), number, file
+    record: Record
 
     def error(self, message: str) -> InputError:
         """Return an error that names this card."""
-        return InputError(message, file=self.file, record=self.number, text=self.text.rstrip())
+        return self.record.error(message)
+
+    def columns(self, first: int, last: int) -> str:
+        """Return columns as they are; short cards have fewer."""
+        return self.record.columns(first, last)
 
     def name(self, first: int, last: int) -> str:
         """Return a field as text."""
-        return self.text[first - 1 : last].strip()
+        return self.columns(first, last).strip()
 
     def real(self, first: int, last: int, decimals: int = 8) -> float:
         """Return an Ew.d or Fw.d field; blank is zero."""
         try:
-            return float(parse_real(self.text[first - 1 : last], decimals))
+            return float(parse_real(self.columns(first, last), decimals))
         except ValueError as error:
             raise self.error(f"columns {first}-{last}: {error}") from None
 
     def integer(self, first: int, last: int) -> int:
         """Return an Iw field; blank is zero."""
         try:
-            return parse_integer(self.text[first - 1 : last])
+            return parse_integer(self.columns(first, last))
         except ValueError as error:
             raise self.error(f"columns {first}-{last}: {error}") from None
 
@@ -59,14 +55,17 @@ class Cards:
 
     Parameters
     ----------
-    text
-        The whole file.
     file
-        Its path.
+        A card a line.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
     """
 
-    def __init__(self, text: str, file: Path | None = None) -> None:
-        self._lines, self._file, self._taken = text.splitlines(), file, 0
+    def __init__(self, file: Path) -> None:
+        self._source, self._taken = Source.read(file), 0
 
     def take(self, what: str) -> Card:
         """Return the next card, which holds what is named.
@@ -76,14 +75,13 @@ class Cards:
         InputError
             The deck is at its end.
         """
-        if self._taken >= len(self._lines):
-            raise InputError(
-                f"the deck ends where {what} is expected", file=self._file, record=self._taken + 1
-            )
+        if self._taken >= len(self._source.lines):
+            message = f"the deck ends where {what} is expected"
+            raise InputError(message, file=self._source.path, record=self._taken + 1)
         self._taken += 1
-        return Card(self._lines[self._taken - 1], self._taken, self._file)
+        return Card(self._source.record(self._taken))
 
     @property
     def at_end(self) -> bool:
         """Whether nothing but blank cards is left."""
-        return not any(line.strip() for line in self._lines[self._taken :])
+        return not any(number > self._taken for number in self._source.filled())

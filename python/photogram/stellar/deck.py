@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.angles import ARCSEC
 from photogram.errors import InputError
 from photogram.stellar.cards import Card, Cards
 from photogram.stellar.options import Options
-from photogram.stellar.parameters import ARCSEC, GRAD, NAMES
+from photogram.stellar.parameters import GRAD, NAMES
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.rejection import rejected
 from photogram.stellar.sky import Air, Site
@@ -82,11 +83,10 @@ def read_deck(path: Path) -> list[Problem]:
     Raises
     ------
     InputError
-        A card that cannot be used, with its number and text: errors 1 and 3 of the report and all others.
-    OSError
-        The file cannot be read.
+        The file cannot be read; or a card cannot be used, with its number and text: error 1 of the report and
+        all others.
     """
-    cards = Cards(path.read_text(encoding="utf-8", errors="replace"), path)
+    cards = Cards(path)
     problems = []
     while True:
         problem, last = _problem(cards)
@@ -98,7 +98,8 @@ def read_deck(path: Path) -> list[Problem]:
 def _problem(cards: Cards) -> tuple[Problem, bool]:
     first = cards.take("card 1 (problem number)")
     title = cards.take("card 2 (title)")
-    descriptors = _descriptors(cards.take("card 3 (options)"))
+    option_card = cards.take("card 3 (options)")
+    descriptors = _descriptors(option_card)
     constants = cards.take("card 4 (problem constants)")
     values = constants.reals(1, 10, 8, 6)
     event, plate, comparator = (
@@ -117,10 +118,9 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
     weights = _weights(cards, descriptors[10]) if descriptors[10] else np.zeros((len(NAMES), len(NAMES)))
     star_weight = _matrix(cards.take("card 20 (weight of the stars)"), 1, 12) if descriptors[3] else None
     plate_weight = _matrix(cards.take("card 21 (weight of the plate)"), 1, 12) if descriptors[4] else None
-    stars, points = _rejections(cards) if descriptors.reject else (set(), set())
-    minimum = _minimum(cards, descriptors[6]) if descriptors[6] else ()
-    if descriptors[7] and not minimum:
-        raise InputError("option 7 (pre-run) needs option 6 (minimum solution)")
+    stars, points = _rejections(cards) if descriptors.reject else ({}, {})
+    minimum = _minimum(cards, descriptors[6]) if descriptors[6] else {}
+    factor, time = _factor(comparator), plate.real(26, 36)
     corrections = tuple(_sidereal(plate, column) for column in (37, 51, 65))
     common = _Common(
         post=comparator.integer(72, 74) or 500,
@@ -130,28 +130,34 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
         plate_weight=plate_weight,
     )
     data = _data(cards, common)
-    options = Options(
-        common_scale=bool(descriptors[1]),
-        refraction=bool(descriptors[5]),
-        minimum_stars=minimum,
-        pre_run=bool(descriptors[7]),
-        curves=bool(descriptors[8]),
-        reference=reference,
-        pole=pole,
-        plate_list=bool(descriptors[11]),
-        max_iterations_minimum=descriptors[12],
-        max_iterations=descriptors[13],
-        mean_error=descriptors.mean_error,
-        histogram=descriptors.histogram,
-        tolerance=values[0],
-        refraction_tolerance=values[1] * ARCSEC,
-        crossover=values[4],
-        interval=values[5] or 0.005,
-        extent=values[6],
-        distortion_tolerance=values[7],
-        movement_factor=_factor(comparator),
-        movement_time=plate.real(26, 36),
-    )
+    _refuse_missing(minimum, data.ids, "incorrect stars specified for minimum solution")
+    _refuse_missing(stars, data.ids, "rejected but not there")
+    _refuse_missing(points, data.points, "rejected but not there")
+    try:
+        options = Options(
+            common_scale=bool(descriptors[1]),
+            refraction=bool(descriptors[5]),
+            minimum_stars=tuple(minimum),
+            pre_run=bool(descriptors[7]),
+            curves=bool(descriptors[8]),
+            reference=reference,
+            pole=pole,
+            plate_list=bool(descriptors[11]),
+            max_iterations_minimum=descriptors[12],
+            max_iterations=descriptors[13],
+            mean_error=descriptors.mean_error,
+            histogram=descriptors.histogram,
+            tolerance=values[0],
+            refraction_tolerance=(values[1] or 1e-4) * ARCSEC,
+            crossover=values[4],
+            interval=values[5] or 0.005,
+            extent=values[6],
+            distortion_tolerance=values[7],
+            movement_factor=factor,
+            movement_time=time,
+        )
+    except InputError as error:
+        raise option_card.error(error.message) from None
     labels = {
         "title": title.name(1, 80),
         "problem": first.name(1, 4),
@@ -163,6 +169,9 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
         "tracking unit": plate.name(17, 19),
         "comparator": comparator.name(1, 8),
         "operator": comparator.name(9, 32),
+        "time corrections pre, post, event": ", ".join(f"{c / _HOUR * 3600:.4f} s" for c in corrections)
+        if any(corrections)
+        else "",
     }
     problem = Problem(
         site=site,
@@ -182,12 +191,12 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
         options=options,
         labels={name: value for name, value in labels.items() if value},
     )
-    return rejected(problem, stars, points), bool(first.integer(80, 80))
+    return rejected(problem, stars.keys(), points.keys()), bool(first.integer(80, 80))
 
 
 def _descriptors(card: Card) -> _Descriptors:
     """Read the options: separated by blanks, or one after the other without any."""
-    words = card.text[:76].split()
+    words = card.columns(1, 76).split()
     if len(words) >= 13:
         try:
             numbers = [int(word) for word in words[:13]]
@@ -289,13 +298,14 @@ def _symmetric(card: Card, values: list[float]) -> Floats:
     return np.array([[first, cross], [cross, second]])
 
 
-def _rejections(cards: Cards) -> tuple[set[str], set[str]]:
-    stars: set[str] = set()
-    points: set[str] = set()
+def _rejections(cards: Cards) -> tuple[dict[str, Card], dict[str, Card]]:
+    """Read the numbers of stars and plate points, each with its card."""
+    stars: dict[str, Card] = {}
+    points: dict[str, Card] = {}
     while True:
         card = cards.take("a rejection card")
         number = card.integer(1, 6)
-        (stars if number < _FIRST_POINT else points).add(str(number))
+        (stars if number < _FIRST_POINT else points)[str(number)] = card
         if len(stars) > _MOST_STARS:
             raise card.error(f"too many rejected stars: {_MOST_STARS} at the most")
         if len(points) > _MOST_POINTS:
@@ -304,14 +314,20 @@ def _rejections(cards: Cards) -> tuple[set[str], set[str]]:
             return stars, points
 
 
-def _minimum(cards: Cards, count: int) -> tuple[str, ...]:
-    numbers: list[int] = []
-    while len(numbers) < count:
+def _minimum(cards: Cards, count: int) -> dict[str, Card]:
+    """Read the numbers of the stars, twenty a card, each with its card."""
+    numbers: dict[str, Card] = {}
+    for first in range(0, count, 20):
         card = cards.take("the stars of the minimum solution")
-        numbers += [card.integer(start, start + 3) for start in range(1, 80, 4)]
-    if 0 in numbers[:count]:
-        raise card.error("incorrect stars specified for minimum solution: a star without a number")
-    return tuple(str(number) for number in numbers[:count])
+        for start in range(1, 4 * min(20, count - first), 4):
+            numbers[str(card.integer(start, start + 3))] = card
+    return numbers
+
+
+def _refuse_missing(named: dict[str, Card], there: list[str], message: str) -> None:
+    for number, card in named.items():
+        if number not in there:
+            raise card.error(f"{message}: {number}")
 
 
 def _sidereal(card: Card, column: int) -> float:
@@ -320,7 +336,7 @@ def _sidereal(card: Card, column: int) -> float:
 
 
 def _factor(card: Card) -> float:
-    words = card.text[32:71].split()
+    words = card.columns(33, 71).split()
     try:
         return float(words[-1]) if words else 0.0
     except ValueError:
@@ -341,10 +357,11 @@ def _data(cards: Cards, common: _Common) -> _Data:
         data.names.append(card.name(72, 77) or star)
         data.places.append([card.real(1, 14), card.real(15, 28)])
         data.weights.append(np.zeros((2, 2)) if number < 0 else _star_weight(card, common))
-        for _ in range(count):
-            last = _image(cards.take(f"an image of star {star}"), star, data, common)
-            if last and _ + 1 < count:
-                raise InputError(f"the last image of the deck is flagged, but star {star} has {count} images")
+        for image in range(count):
+            card = cards.take(f"an image of star {star}")
+            last = _image(card, star, data, common)
+            if last and image + 1 < count:
+                raise card.error(f"the last image of the deck is flagged, but star {star} has {count} images")
     return data
 
 

@@ -1,7 +1,8 @@
-"""The JSON document of a calibration, and the exported camera; `docs/stellar-camera.md` describes them."""
+"""The JSON document of a calibration; `docs/stellar-camera.md` describes it."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any
 
@@ -9,12 +10,21 @@ import numpy as np
 import orjson
 
 from photogram import _photocore
-from photogram.stellar.curves import distortion_curves, histogram, refraction_curves
-from photogram.stellar.parameters import ARCSEC, GROUPS, INDEX, NAMES, UNITS
-from photogram.stellar.result import Result
+from photogram.angles import ARCSEC
+from photogram.stellar.comparator_frame import comparator_frame
+from photogram.stellar.curves import (
+    distortion_curves,
+    histogram,
+    refraction_curves,
+    residual_classes,
+    star_means,
+)
+from photogram.stellar.movement import fictitious_points
+from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.result import Ellipse, Result, Stage
 from photogram.stellar.transformation import transformed_angles
 
-__all__ = ["camera_document", "to_json"]
+__all__ = ["to_json"]
 
 _FORMAT = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
 
@@ -24,29 +34,8 @@ def to_json(result: Result) -> bytes:
     return orjson.dumps(_document(result), option=_FORMAT)
 
 
-def camera_document(result: Result) -> bytes:
-    """Return the calibrated camera with its covariance as JSON: a prior for later adjustments."""
-    chosen = [INDEX[name] for name in NAMES[9:22] if name in result.estimated]
-    options = result.problem.options
-    document = {
-        "program": f"photogram {_photocore.__version__}",
-        "kind": "stellar camera",
-        "form": "distortion, then scale" if options.distortion_first else "scale, then distortion",
-        "reference_principal_distance": options.distortion_first or None,
-        "common_scale": options.common_scale,
-        "parameters": {name: {"value": result.parameters[name], "unit": UNITS[name]} for name in NAMES[9:22]},
-        "covariance": {
-            "order": [NAMES[i] for i in chosen],
-            "matrix": result.covariance[np.ix_(chosen, chosen)],
-        },
-        "m": result.mean_error,
-        "degrees_of_freedom": result.degrees_of_freedom,
-    }
-    return orjson.dumps(document, option=_FORMAT)
-
-
 def _document(result: Result) -> dict[str, Any]:
-    estimated = [INDEX[name] for name in result.estimated]
+    options = result.problem.options
     return {
         "program": f"photogram {_photocore.__version__}",
         "labels": result.problem.labels,
@@ -56,18 +45,39 @@ def _document(result: Result) -> dict[str, Any]:
             "residual": "computed minus measured; of stars adjusted minus catalogue",
             "standardized": "residual over its mean error",
             "covariance": "cofactors times m squared, in the units of the parameters",
-            "iteration": "as published" if result.problem.options.as_published else "strict",
+            "iteration": "as published" if options.as_published else "strict",
         },
+        **_solution(result),
+        "iterations": [asdict(level) for level in result.levels],
+        "stop": result.solved.stop,
+        "converged": result.converged,
+        "solutions": [_stage(stage) for stage in result.stages],
+        "messages": [str(message) for message in result.messages],
+        "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],
+        "significance": result.significance(),
+        "movement": [asdict(point) for point in result.movement],
+        "fictitious_points": _fictitious(result) if result.movement else [],
+        "pre_run": _pre_run(result),
+        "histogram": {axis: asdict(histogram(values)) for axis, values in residual_classes(result).items()}
+        if options.histogram
+        else None,
+        "combined": None
+        if result.combined is None
+        else {"pairs": result.combined.pairs, **_solution(result.combined)},
+    }
+
+
+def _solution(result: Result) -> dict[str, Any]:
+    """Return what the solution with separate attitudes and the combined one have alike."""
+    estimated = [INDEX[name] for name in result.estimated]
+    options, axis = result.problem.options, result.solved.axis_residual
+    return {
         "m": result.mean_error,
         "m_computed": result.computed_mean_error,
         "m_unit": "m",
         "degrees_of_freedom": result.degrees_of_freedom,
         "counts": asdict(result.counts),
         "sums_of_squares": dict(zip(("plate", "stars", "parameters"), result.solved.sums, strict=True)),
-        "iterations": [asdict(level) for level in result.levels],
-        "stop": result.solved.stop,
-        "converged": result.converged,
-        "messages": [str(message) for message in result.messages],
         "parameters": _parameters(result),
         "covariance": {
             "order": result.estimated,
@@ -75,37 +85,32 @@ def _document(result: Result) -> dict[str, Any]:
         },
         "stars": _stars(result),
         "images": _images(result),
-        "axis_residual_um": None
-        if result.solved.axis_residual is None
-        else 1e6 * result.solved.axis_residual,
-        "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],
-        "significance": result.significance(),
-        "movement": [asdict(point) for point in result.movement],
-        "combined": _combined(result),
-        "pre_run": None
-        if result.pre_run is None
-        else {
-            "points": result.pre_run.points,
-            "stars": result.pre_run.stars,
-            "residual_um": 1e6 * result.pre_run.residuals,
-        },
+        "star_means": _means(result),
+        "axis_residual_um": None if axis is None else 1e6 * axis,
         "transformed": _transformed(result),
-        "distortion_curves": asdict(distortion_curves(result)) if result.problem.options.curves else None,
+        "comparator_frame": None
+        if options.comparator_angle is None
+        else asdict(comparator_frame(result, options.comparator_angle)),
+        "distortion_curves": asdict(distortion_curves(result)) if options.curves else None,
         "refraction_curves": {
             GROUPS[g]: asdict(refraction_curves(result, g))
             for g in range(3)
-            if result.problem.options.refraction and result.solved.free[3 * g]
+            if options.refraction and result.solved.free[3 * g]
         },
-        "histogram": {axis: asdict(histogram(values)) for axis, values in residual_classes(result).items()}
-        if result.problem.options.histogram
-        else None,
     }
 
 
-def residual_classes(result: Result) -> dict[str, Any]:
-    """Return residuals of known stars in x, y and both, metres."""
-    chosen = result.solved.residuals[result.problem.known[result.problem.image_stars]]
-    return {"x": chosen[:, 0], "y": chosen[:, 1], "x and y": chosen.ravel()}
+def _stage(stage: Stage) -> dict[str, Any]:
+    """Describe one of the solutions; its determinant is in the units of the parameters."""
+    return {
+        "solution": stage.solution,
+        **asdict(stage.counts),
+        "degrees_of_freedom": stage.counts.degrees_of_freedom,
+        "iterations": len(stage.levels) - 1,
+        "stop": stage.stop,
+        "converged": stage.converged,
+        "log10_determinant": stage.log_determinant / math.log(10),
+    }
 
 
 def _parameters(result: Result) -> dict[str, dict[str, Any]]:
@@ -117,6 +122,7 @@ def _parameters(result: Result) -> dict[str, dict[str, Any]]:
             "mean_error": errors[name],
             "unit": UNITS[name],
             "given": float(result.problem.initial[INDEX[name]]),
+            "weight": float(result.problem.parameter_weights[INDEX[name], INDEX[name]]),
             "estimated": name in result.estimated,
         }
         for name in names
@@ -125,8 +131,10 @@ def _parameters(result: Result) -> dict[str, dict[str, Any]]:
 
 def _stars(result: Result) -> list[dict[str, Any]]:
     problem = result.problem
+    unknown = {direction.star: direction for direction in result.directions()}
     columns = zip(
         problem.star_ids,
+        problem.star_names or problem.star_ids,
         problem.known.tolist(),
         result.solved.places.tolist(),
         (result.star_residuals / ARCSEC).tolist(),
@@ -135,22 +143,37 @@ def _stars(result: Result) -> list[dict[str, Any]]:
         result.star_standardized.tolist(),
         strict=True,
     )
-    return [
-        {
-            "id": name,
+    stars = []
+    for star, name, known, place, residual, ellipse, redundancy, standardized in columns:
+        document = {
+            "id": star,
+            "name": name,
             "known": known,
             "place_rad": place,
-            "residual" if known else "correction": residual if known else [None, None],
-            "ellipse": {
-                "major_arcsec": ellipse.major / ARCSEC,
-                "minor_arcsec": ellipse.minor / ARCSEC,
-                "direction_rad": ellipse.direction,
-            },
-            "redundancy": redundancy,
-            "standardized": standardized,
+            "ellipse": _ellipse(ellipse),
         }
-        for name, known, place, residual, ellipse, redundancy, standardized in columns
-    ]
+        if known:
+            document |= {"residual": residual, "redundancy": redundancy, "standardized": standardized}
+        else:
+            direction = unknown[star]
+            document |= {
+                "correction": [value / ARCSEC for value in direction.correction],
+                "azimuth_rad": direction.azimuth,
+                "elevation_rad": direction.elevation,
+                "m_i": direction.image_mean_error,
+                "orientation_ellipse": _ellipse(direction.orientation),
+                "published_ellipse": _ellipse(direction.published),
+            }
+        stars.append(document)
+    return stars
+
+
+def _ellipse(ellipse: Ellipse) -> dict[str, float]:
+    return {
+        "major_arcsec": ellipse.major / ARCSEC,
+        "minor_arcsec": ellipse.minor / ARCSEC,
+        "direction_rad": ellipse.direction,
+    }
 
 
 def _images(result: Result) -> list[dict[str, Any]]:
@@ -159,6 +182,7 @@ def _images(result: Result) -> list[dict[str, Any]]:
         problem.image_points,
         problem.image_stars.tolist(),
         problem.image_groups.tolist(),
+        problem.image_xy.tolist(),
         (1e6 * result.solved.residuals).tolist(),
         result.solved.redundancy.tolist(),
         result.standardized.tolist(),
@@ -169,30 +193,38 @@ def _images(result: Result) -> list[dict[str, Any]]:
             "point": point,
             "star": problem.star_ids[star],
             "orientation": GROUPS[group],
+            "xy_m": xy,
             "residual_um": residual,
             "redundancy": redundancy,
             "standardized": standardized,
         }
-        for point, star, group, residual, redundancy, standardized in columns
+        for point, star, group, xy, residual, redundancy, standardized in columns
     ]
 
 
-def _combined(result: Result) -> dict[str, Any] | None:
-    combined = result.combined
-    if combined is None:
+def _means(result: Result) -> list[dict[str, Any]]:
+    """Return means over the images of each star with two at least."""
+    return [
+        {
+            "star": star,
+            "xy_m": xy,
+            "residual_um": 1e6 * v,
+            "radial_um": 1e6 * radial,
+            "tangential_um": 1e6 * along,
+        }
+        for star, xy, v, (radial, along) in star_means(result)
+    ]
+
+
+def _fictitious(result: Result) -> list[dict[str, Any]]:
+    return [asdict(point) for point in fictitious_points(result)]
+
+
+def _pre_run(result: Result) -> dict[str, Any] | None:
+    found = result.pre_run
+    if found is None:
         return None
-    errors = combined.mean_error * np.sqrt(np.maximum(np.diag(combined.solved.cofactors), 0))
-    return {
-        "pairs": combined.pairs,
-        "m": combined.mean_error,
-        "degrees_of_freedom": result.degrees_of_freedom + combined.constraints,
-        "parameters": {
-            name: {"value": value, "mean_error": error, "unit": UNITS[name]}
-            for name, value, error in zip(
-                NAMES, combined.solved.parameters.tolist(), errors.tolist(), strict=True
-            )
-        },
-    }
+    return {"points": found.points, "stars": found.stars, "residual_um": 1e6 * found.residuals}
 
 
 def _transformed(result: Result) -> dict[str, Any] | None:

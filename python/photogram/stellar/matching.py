@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["match"]
+__all__ = ["match", "mutually_nearest"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _SEEDS, _PAIRS = 25, 400
 """Brightest images that make hypotheses, and hypotheses tried."""
+_PLAIN = 0.7
+"""Share of bright images that a hypothesis has to explain to be taken at once."""
 
 
 def match(measured: Floats, predicted: Floats, *, radius: float, tolerance: float) -> Indices:
@@ -41,22 +43,24 @@ def match(measured: Floats, predicted: Floats, *, radius: float, tolerance: floa
     best, most = None, 2
     seeds = measured[: 3 * _SEEDS]
     for transform in _hypotheses(measured[:_SEEDS], predicted[: 2 * _SEEDS], radius, tolerance):
-        found = _nearest(_apply(transform, seeds), predicted, 3 * tolerance)
+        found = mutually_nearest(_apply(transform, seeds), predicted, 3 * tolerance)
         count = int((found >= 0).sum())
         if count > most:
             best, most = transform, count
+        if most > _PLAIN * len(seeds):
+            break
     if best is None:
         return none
     moved = _apply(best, measured)
     for degree in (1, 1, 2, 3, 3, 3):
-        found = _nearest(moved, predicted, 2 * tolerance)
+        found = mutually_nearest(moved, predicted, 2 * tolerance)
         chosen = found >= 0
         if chosen.sum() < 3:
             return none
         # Three matches and more for each coefficient.
         degree = min(degree, 3 if chosen.sum() > 30 else 2 if chosen.sum() > 18 else 1)
         moved = _fitted(measured, chosen, predicted[found[chosen]], degree)
-    return _nearest(moved, predicted, tolerance)
+    return mutually_nearest(moved, predicted, tolerance)
 
 
 def _hypotheses(measured: Floats, predicted: Floats, radius: float, tolerance: float) -> list[Floats]:
@@ -98,10 +102,35 @@ def _fitted(measured: Floats, chosen: NDArray[np.bool_], predicted: Floats, degr
     return np.asarray(design @ np.linalg.lstsq(design[chosen], predicted, rcond=None)[0], float)
 
 
-def _nearest(points: Floats, predicted: Floats, limit: float) -> Indices:
+def mutually_nearest(points: Floats, predicted: Floats, limit: float) -> Indices:
     """Return for each point its mutually nearest predicted one within a limit; else -1."""
-    distance = np.linalg.norm(points[:, None] - predicted[None], axis=2)
-    nearest = distance.argmin(axis=1)
-    index = np.arange(len(points))
-    mutual = distance.argmin(axis=0)[nearest] == index
-    return np.where(mutual & (distance[index, nearest] <= limit), nearest, -1)
+    found, back = _nearest(points, predicted, limit), _nearest(predicted, points, limit)
+    mutual = (found >= 0) & (back[found] == np.arange(len(points))) if len(predicted) else found >= 0
+    return np.where(mutual, found, -1)
+
+
+def _nearest(points: Floats, others: Floats, limit: float) -> Indices:
+    """Return for each point the nearest of the others within a limit, -1 for none.
+
+    The others are sorted into cells as wide as the limit, so that only nine cells are searched.
+    """
+    best, least = np.full(len(points), -1, np.int64), np.full(len(points), limit**2)
+    if not len(others):
+        return best
+    corner = others.min(axis=0)
+    cells = np.floor((others - corner) / limit).astype(np.int64) + 1
+    width = int(cells[:, 1].max()) + 2
+    order = np.argsort(cells @ [width, 1], kind="stable")
+    keys = (cells @ [width, 1])[order]
+    own = np.floor((points - corner) / limit).astype(np.int64) + 1
+    inside = np.flatnonzero(((own >= 0) & (own <= cells.max(axis=0) + 1)).all(axis=1))
+    for step in (-width - 1, -width, -width + 1, -1, 0, 1, width - 1, width, width + 1):
+        wanted = own[inside] @ [width, 1] + step
+        first, last = (np.searchsorted(keys, wanted, side) for side in ("left", "right"))
+        for k in range(int((last - first).max(initial=0))):
+            here = first + k < last
+            point, other = inside[here], order[first[here] + k]
+            square = np.sum((points[point] - others[other]) ** 2, axis=1)
+            nearer = square <= least[point]
+            best[point[nearer]], least[point[nearer]] = other[nearer], square[nearer]
+    return best

@@ -1,12 +1,13 @@
-"""What the movement test finds: movements between the groups of exposures, and the solution without them."""
+"""What the movement test finds: plate points under the attitudes, and how they differ."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from photogram.stellar.state import Solved
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["Combined", "Movement"]
+__all__ = ["FictitiousPoint", "Movement"]
 
 
 @dataclass(frozen=True)
@@ -35,22 +36,26 @@ class Movement:
 
 
 @dataclass(frozen=True, eq=False)
-class Combined:
-    """A solution whose attitudes are constrained to common values, not iterated again.
+class FictitiousPoint:
+    """A plate point as a direction under one attitude.
 
     Attributes
     ----------
-    pairs
-        The pairs that the movement test found equal.
-    solved
-        Parameters, cofactors and residuals.
-    constraints
-        Number of constraints, which join the degrees of freedom.
-    mean_error
-        Of unit weight, with these degrees of freedom.
+    group
+        Of the attitude.
+    xy
+        x = y of the point, metres.
+    place
+        Apparent right ascension and declination, radians.
+    azimuth, elevation
+        Observed (refracted) ones: azimuth from south, positive west; radians.
+    covariance
+        (2, 2) of the place from the orientation, radians squared.
     """
 
-    pairs: tuple[tuple[str, str], ...]
-    solved: Solved
-    constraints: int
-    mean_error: float
+    group: str
+    xy: float
+    place: tuple[float, float]
+    azimuth: float
+    elevation: float
+    covariance: NDArray[np.float64]

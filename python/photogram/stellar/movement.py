@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.stellar.moved import Movement
+from photogram.stellar.moved import FictitiousPoint, Movement
 from photogram.stellar.parameters import GROUPS
 
 if TYPE_CHECKING:
     from photogram.stellar.result import Result
 
-__all__ = ["movement", "pairs_to_combine"]
+__all__ = ["fictitious_points", "movement", "pairs_to_combine"]
 
 Floats = NDArray[np.float64]
 
@@ -29,8 +29,7 @@ def movement(result: Result) -> tuple[Movement, ...]:
 
     The mean error rests on the covariance of all parameters, in which both attitudes share the camera.
     """
-    solved = [g for g in range(3) if result.solved.free[3 * g : 3 * g + 3].all()]
-    directions = {g: _directions(result, g) for g in solved}
+    directions = {g: _directions(result, g) for g in _solved(result)}
     cofactors = result.solved.cofactors
     found = []
     for first, second in PAIRS:
@@ -52,6 +51,24 @@ def movement(result: Result) -> tuple[Movement, ...]:
                 )
             )
     return tuple(found)
+
+
+def fictitious_points(result: Result) -> tuple[FictitiousPoint, ...]:
+    """Compute the directions of the nine points under every attitude, with their covariances."""
+    found = []
+    for group in _solved(result):
+        places, local, by = _directions(result, group)
+        covariances = by @ result.covariance @ np.swapaxes(by, 1, 2)
+        rows = zip(_DIAGONAL.tolist(), places.tolist(), local.tolist(), covariances, strict=True)
+        found += [
+            FictitiousPoint(GROUPS[group], xy, (ra, dec), azimuth % (2 * np.pi), elevation, covariance)
+            for xy, (ra, dec), (azimuth, elevation), covariance in rows
+        ]
+    return tuple(found)
+
+
+def _solved(result: Result) -> list[int]:
+    return [g for g in range(3) if result.solved.free[3 * g : 3 * g + 3].all()]
 
 
 def pairs_to_combine(test: tuple[Movement, ...], factor: float) -> tuple[tuple[str, str], ...]:

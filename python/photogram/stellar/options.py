@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from photogram.stellar.parameters import ARCSEC
+from photogram.angles import ARCSEC
+from photogram.errors import InputError
 from photogram.stellar.sky import Site
 
 __all__ = ["Options"]
@@ -47,6 +48,9 @@ class Options:
         Sidereal time of the fictitious points, radians.
     crossover, interval, extent
         Radius at which the transformed distortion vanishes; step and end of the curves; metres.
+    comparator_angle
+        From the axes of the plate coordinates to those of the comparator, from x towards y, radians: scales
+        and nonperpendicularity are given in the latter, too (equation 42). None where they are the same.
     distortion_first
         Scale after distortion, at this principal distance (metres), as the report prefers for calibration
         (equations 40 and 41); 0 for scale before distortion, as programmed.
@@ -74,8 +78,29 @@ class Options:
     crossover: float = 0.0
     interval: float = 0.005
     extent: float = 0.1
+    comparator_angle: float | None = None
     distortion_first: float = 0.0
     as_published: bool = False
+
+    def __post_init__(self) -> None:
+        if self.pre_run and not self.minimum_stars:
+            raise InputError("option 7 (pre-run) needs option 6 (minimum solution)")
+        positive = ("refraction_tolerance", "interval")
+        for name in positive:
+            if not getattr(self, name) > 0:
+                raise InputError(f"{name} is {getattr(self, name)}; it must be positive")
+        limits = (
+            "tolerance",
+            "distortion_tolerance",
+            "max_iterations_minimum",
+            "max_iterations",
+            "mean_error",
+            "crossover",
+            "extent",
+        )
+        for name in limits:
+            if not getattr(self, name) >= 0:
+                raise InputError(f"{name} is {getattr(self, name)}; it cannot be negative")
 
     @property
     def camera_kind(self) -> tuple[float | None, bool, bool]:

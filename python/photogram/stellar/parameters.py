@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["ARCSEC", "COMMON", "GRAD", "GROUPS", "INDEX", "NAMES", "TAU", "UNITS"]
+__all__ = ["COMMON", "GRAD", "GROUPS", "INDEX", "NAMES", "TAU", "UNITS"]
 
-ARCSEC = math.pi / 648000.0
-"""One second of arc in radians."""
 GRAD = math.pi / 200.0
 """One grad in radians."""
 

@@ -2,22 +2,55 @@
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.angles import ARCSEC
 from photogram.errors import InputError
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.parameters import ARCSEC
 from photogram.stellar.sky import Site
+from photogram.stellar.transformation import pole_matrix, terrestrial
 
-__all__ = ["apparent_places", "sidereal_time"]
+__all__ = ["Earth", "apparent_places", "epoch", "sidereal_time"]
 
 Floats = NDArray[np.float64]
 
 _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:\.\d*)?)Z?")
+
+
+@dataclass(frozen=True)
+class Earth:
+    """How the Earth is turned, as the IERS publishes it.
+
+    Attributes
+    ----------
+    dut1
+        UT1 - UTC in seconds; one second is 15 arcsec of attitude, the same for all exposures of a night.
+    pole
+        x of the pole towards the prime meridian, y towards 90 degrees west, radians.
+    """
+
+    dut1: float = 0.0
+    pole: tuple[float, float] = (0.0, 0.0)
+
+    def site_of_date(self, site: Site) -> Site:
+        """Return a station with its latitude and longitude from the instantaneous pole.
+
+        The given ones are from the mean pole; its zenith is the same.
+        """
+        if self.pole == (0.0, 0.0):
+            return site
+        zenith = pole_matrix(self.pole).T @ terrestrial(site)[:, 2]
+        return replace(
+            site,
+            latitude=math.atan2(zenith[2], math.hypot(zenith[0], zenith[1])),
+            longitude_west=math.atan2(zenith[1], zenith[0]),
+        )
 
 
 def _utc(text: str) -> tuple[float, float]:
@@ -27,8 +60,20 @@ def _utc(text: str) -> tuple[float, float]:
     if match is None:
         raise InputError(f"{text!r} is not a UTC time such as 2024-03-01T21:03:05.25")
     year, month, day, hour, minute = (int(part) for part in match.groups()[:5])
-    first, second = erfa.dtf2d("UTC", year, month, day, hour, minute, float(match[6]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", erfa.ErfaWarning)
+        try:
+            first, second = erfa.dtf2d("UTC", year, month, day, hour, minute, float(match[6]))
+        except (erfa.ErfaError, erfa.ErfaWarning) as error:
+            raise InputError(f"{text!r}: {error}") from None
     return float(first), float(second)
+
+
+def epoch(utc: str) -> float:
+    """Return the Julian epoch of a UTC time, in years."""
+    import erfa
+
+    return float(erfa.epj(*erfa.taitt(*erfa.utctai(*_utc(utc)))))
 
 
 def apparent_places(catalogue: Catalogue, utc: str) -> Floats:

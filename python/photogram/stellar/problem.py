@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.errors import InputError
+from photogram.messages import listed
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.sky import TAU, Site
@@ -137,6 +138,15 @@ class Problem:
             raise InputError("an image names a star or a group that is not there")
         if np.isnan(self.star_weights).any():
             raise InputError("star_weights holds what is not a number")
+        points = [
+            f"point {point} of star {self.star_ids[star]}"
+            for point, star in zip(self.image_points, self.image_stars, strict=True)
+        ]
+        _refuse_indefinite(points, self.image_weights)
+        weighted = np.flatnonzero(self.known & ~self.held)
+        _refuse_indefinite([f"star {self.star_ids[i]}" for i in weighted], self.star_weights[weighted])
+        if self.axis is not None:
+            _refuse_indefinite(["the axis"], self.axis.weight[None])
 
     @property
     def known(self) -> Bools:
@@ -212,6 +222,14 @@ def weight_root(weights: Floats, names: list[str]) -> Floats:
     except np.linalg.LinAlgError:
         raise InputError(f"the weight matrix of {', '.join(names)} is not positive definite") from None
     return np.ascontiguousarray(lower.T * scale)
+
+
+def _refuse_indefinite(names: list[str], weights: Floats) -> None:
+    first, cross, second = weights[:, 0, 0], weights[:, 0, 1], weights[:, 1, 1]
+    definite = (first > 0) & (second - cross**2 / np.where(first > 0, first, 1.0) > 0)
+    if not definite.all():
+        named = listed([names[i] for i in np.flatnonzero(~definite)])
+        raise InputError(f"the weight matrix of {named} is not positive definite")
 
 
 def _chosen(names: tuple[str, ...], keep: Bools) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ catalogue places while the parameters are iterated, and the change of refraction
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -15,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.stellar.counts import degrees_of_freedom
+from photogram.stellar.parameters import NAMES
 from photogram.stellar.problem import Problem
-from photogram.stellar.reduction import Reduced, invert, reduce
+from photogram.stellar.reduction import Reduced, invert, log_determinant, reduce, singular
+from photogram.stellar.residuals import complete
 from photogram.stellar.state import Level, Solved
 
-__all__ = ["DIVERGED", "SETTLED", "iterate", "stop_reason"]
+__all__ = ["DIVERGED", "SETTLED", "iterate", "residual_cycle", "stop_reason"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -72,14 +75,13 @@ def _form(problem: Problem, parameters: Floats, free: Bools) -> _Formed:
         for star in np.flatnonzero(unknown):
             places[star] = directions[np.flatnonzero(problem.image_stars == star)[0]]
     core = problem.core(parameters, places, ~free)
-    equations = _published(problem, core, np.zeros_like(places))
+    equations = _published(problem, core)
     return _Formed(equations, reduce(problem, core, equations, places), places)
 
 
-def _published(problem: Problem, core: Any, corrections: Floats) -> dict[str, Any]:
+def _published(problem: Problem, core: Any) -> dict[str, Any]:
     options = problem.options
     found: dict[str, Any] = core.published(
-        corrections,
         refraction=options.refraction_tolerance,
         distortion=options.distortion_tolerance,
         passes=PASSES,
@@ -115,7 +117,7 @@ def iterate(
     parameters, dof = initial.copy(), degrees_of_freedom(problem, free).usable
     weights = problem.parameter_weights
     levels: list[float] = []
-    inverse = None
+    inverse, determinant, touched = None, math.nan, free
     while True:
         formed = _form(problem, parameters, free)
         known = problem.known[problem.image_stars]
@@ -128,17 +130,25 @@ def iterate(
         right = formed.reduced.right - weights @ (parameters - problem.initial)
         # What the equations do not touch yet (a direction of no decentering) is not corrected.
         touched = free & (np.diag(normal) > 0)
-        inverse = invert(normal, touched)
+        inverse, determinant = invert(normal, touched), log_determinant(normal, touched)
         parameters = parameters + inverse @ right
         parameters[21] = (
             np.mod(parameters[21], 2 * np.pi) if abs(parameters[21]) > 2 * np.pi else parameters[21]
         )
         if problem.options.common_scale:
             parameters[13] = parameters[12]
+    if (free & ~touched).any():
+        raise singular([NAMES[i] for i in np.flatnonzero(free & ~touched)])
     history = tuple(Level(solution, i + 1, level) for i, level in enumerate(levels))
-    # The covariance is that of the last correction; the equations after it serve the residuals only.
+    # Covariance and determinant are those of the last correction; the equations after it serve the residuals.
     solved = residual_cycle(problem, parameters, free, cofactors=inverse, formed=formed)
-    return replace(solved, stop=stop, converged=stop == SETTLED or once, levels=history)
+    return replace(
+        solved,
+        stop=stop,
+        converged=stop == SETTLED or once,
+        levels=history,
+        log_determinant=determinant,
+    )
 
 
 def residual_cycle(
@@ -150,6 +160,9 @@ def residual_cycle(
     formed: _Formed | None = None,
 ) -> Solved:
     """Compute star corrections, residuals and their tests at final parameters (the report's v-cycle).
+
+    Refraction is that of the corrected places; the report's listing keeps that of the catalogue's, which is
+    two millionths of the mean error of unit weight.
 
     Parameters
     ----------
@@ -165,75 +178,21 @@ def residual_cycle(
     if cofactors is None:
         cofactors = invert(reduced.normal + problem.parameter_weights, free)
     corrections = reduced.star_corrections()
-    core = problem.core(parameters, formed.places, ~free)
-    final = _published(problem, core, corrections)
-    residuals = -final["constant"]
-    star_cofactors = reduced.star_inverse + _propagated(reduced, cofactors)
-    redundancy, standardized = _image_tests(problem, reduced, cofactors, residuals)
-    known = problem.known & ~problem.held
-    weights = np.where(known[:, None, None], problem.star_weights, 0.0)
-    star_residuals = np.where(known[:, None], formed.places + corrections - problem.star_places, 0.0)
-    star_redundancy, star_standardized = _star_tests(weights, star_cofactors, star_residuals, known)
-    off = parameters - problem.initial
-    axis = core.axis_equations()["constant"] if problem.axis is not None else np.zeros((0, 2))
-    axis_sum = float(sum(v @ problem.axis.weight @ v for v in axis)) if problem.axis else 0.0
-    sums = (
-        float(np.einsum("mi,mij,mj->", residuals, problem.image_weights, residuals)),
-        float(np.einsum("si,sij,sj->", star_residuals, weights, star_residuals)),
-        float(off @ problem.parameter_weights @ off) + axis_sum,
-    )
+    core = problem.core(parameters, formed.places + corrections, ~free)
+    final = _published(problem, core)
     remarks = tuple(
         f"DISTORTION NOT CONVERGING FOR POINT NUMBER {problem.image_points[i]}: "
         f"last changes {a:.3g}, {b:.3g} m"
         for i, (a, b) in final["unsettled"]
     )
-    return Solved(
+    return complete(
+        problem,
+        core,
+        reduced,
         parameters=parameters,
-        places=formed.places + corrections,
         free=free,
+        places=formed.places + corrections,
+        residuals=-final["constant"],
         cofactors=cofactors,
-        star_cofactors=star_cofactors,
-        residuals=residuals,
-        redundancy=redundancy,
-        standardized=standardized,
-        star_redundancy=star_redundancy,
-        star_standardized=star_standardized,
-        axis_residual=-axis[0] if len(axis) else None,
-        sums=sums,
-        stop="",
-        converged=True,
-        levels=(),
         remarks=remarks,
     )
-
-
-def _propagated(reduced: Reduced, cofactors: Floats) -> Floats:
-    """Return (1)^-1 (2) N^-1 (2)^T (1)^-1 of every star: the part of the parameters."""
-    tied = reduced.star_inverse @ reduced.coupling
-    return np.asarray(np.einsum("sik,kl,sjl->sij", tied, cofactors, tied), float)
-
-
-def _image_tests(
-    problem: Problem, reduced: Reduced, cofactors: Floats, residuals: Floats
-) -> tuple[Floats, Floats]:
-    """Return redundancy numbers, and residuals over root of their cofactors, of the plate coordinates."""
-    inverse = reduced.star_inverse[problem.image_stars]
-    tied = (reduced.star_inverse @ reduced.coupling)[problem.image_stars]
-    rows = reduced.rows - reduced.star_rows @ tied
-    computed = np.einsum("mik,kl,mjl->mij", rows, cofactors, rows)
-    computed += reduced.star_rows @ inverse @ np.swapaxes(reduced.star_rows, 1, 2)
-    return _tests(problem.image_weights, computed, residuals)
-
-
-def _star_tests(weights: Floats, cofactors: Floats, residuals: Floats, known: Bools) -> tuple[Floats, Floats]:
-    redundancy, standardized = np.full(residuals.shape, np.nan), np.full(residuals.shape, np.nan)
-    redundancy[known], standardized[known] = _tests(weights[known], cofactors[known], residuals[known])
-    return redundancy, standardized
-
-
-def _tests(weights: Floats, computed: Floats, residuals: Floats) -> tuple[Floats, Floats]:
-    redundancy = 1.0 - np.einsum("mij,mji->mi", computed, weights)
-    left = np.einsum("mii->mi", np.linalg.inv(weights) - computed)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        standardized = np.where(redundancy > 1e-10, residuals / np.sqrt(np.maximum(left, 0)), np.nan)
-    return redundancy, standardized

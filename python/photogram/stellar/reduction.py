@@ -6,6 +6,7 @@ attitudes, and the naming of what the stars do not determine, which all need the
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.errors import AdjustmentError
+from photogram.messages import listed
 from photogram.stellar.parameters import NAMES
 from photogram.stellar.problem import Problem
 
-__all__ = ["Reduced", "columns", "invert", "reduce", "undetermined"]
+__all__ = ["Reduced", "columns", "invert", "log_determinant", "reduce", "singular", "undetermined"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -81,8 +83,12 @@ def reduce(problem: Problem, core: Any, equations: dict[str, Any], places: Float
     Raises
     ------
     AdjustmentError
-        A star's own normal equations are singular.
+        A star's own normal equations are singular (error 2), or the values put it out of sight.
     """
+    unseen = ~np.isfinite(equations["constant"]).all(axis=1)
+    if unseen.any():
+        stars = listed([problem.star_ids[i] for i in np.unique(problem.image_stars[unseen])])
+        raise AdjustmentError(f"below the horizon or behind the camera: star {stars}")
     rows = columns(problem, equations, problem.image_groups)
     star_rows, constant = equations["star"], equations["constant"]
     count = len(problem.star_ids)
@@ -126,14 +132,32 @@ def invert(normal: Floats, free: Bools) -> Floats:
     part = normal[np.ix_(chosen, chosen)]
     lost = undetermined(normal, free)
     if lost:
-        raise AdjustmentError(
-            "ERROR 4: no inverse for the reduced normal equations: "
-            f"the stars do not determine {', '.join(lost)}"
-        )
+        raise singular(lost)
     scale = 1.0 / np.sqrt(np.diag(part))
     inner = np.linalg.inv(part * np.outer(scale, scale))
     inverse[np.ix_(chosen, chosen)] = 0.5 * (inner + inner.T) * np.outer(scale, scale)
     return inverse
+
+
+def log_determinant(normal: Floats, free: Bools) -> float:
+    """Return the natural logarithm of the determinant over the free parameters; NaN where it is not positive.
+
+    The determinant itself, which the report prints, can be beyond the range of numbers.
+    """
+    part = normal[np.ix_(free, free)]
+    diagonal = np.diag(part)
+    if not (diagonal > 0).all():
+        return math.nan
+    scale = 1.0 / np.sqrt(diagonal)
+    sign, value = np.linalg.slogdet(part * np.outer(scale, scale))
+    return float(value - 2.0 * np.log(scale).sum()) if sign > 0 else math.nan
+
+
+def singular(names: list[str]) -> AdjustmentError:
+    """Return error 4 of the report, with the names of the parameters."""
+    return AdjustmentError(
+        f"ERROR 4: no inverse for the reduced normal equations: the stars do not determine {', '.join(names)}"
+    )
 
 
 def undetermined(normal: Floats, free: Bools, limit: float = 1e-14) -> list[str]:

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from photogram.messages import Message
 from photogram.stellar.counts import Counts
-from photogram.stellar.moved import Combined, Movement
+from photogram.stellar.moved import Movement
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.problem import Problem
 from photogram.stellar.state import Level, Solved
 
-__all__ = ["Ellipse", "PreRun", "Result", "ellipse"]
+__all__ = ["Direction", "Ellipse", "PreRun", "Result", "Stage", "ellipse"]
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +50,73 @@ def ellipse(covariance: Floats, declination: float) -> Ellipse:
     values, vectors = np.linalg.eigh(turned @ covariance @ turned)
     minor, major = (math.sqrt(max(float(value), 0.0)) for value in values)
     return Ellipse(major, minor, math.atan2(vectors[1, 1], vectors[0, 1]) % math.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """An unknown direction (section 5.7).
+
+    Attributes
+    ----------
+    star
+        Its number.
+    place
+        Right ascension and declination, radians.
+    correction
+        (2,) of the direction of its first image, radians.
+    azimuth, elevation
+        Observed (refracted) ones at its first image: azimuth from south, positive west; radians.
+    mean_errors
+        Of right ascension times cos(declination), and declination; radians.
+    image_mean_error
+        m_i: mean error of unit weight from its own images, which should be parallel; that of the adjustment
+        where there is only one.
+    orientation
+        Ellipse from the orientation alone, as if its images had no error.
+    total
+        Ellipse with its images at the mean error of unit weight of the adjustment.
+    published
+        Ellipse with its images at m_i, as the report has it.
+    """
+
+    star: str
+    place: tuple[float, float]
+    correction: tuple[float, float]
+    azimuth: float
+    elevation: float
+    mean_errors: tuple[float, float]
+    image_mean_error: float
+    orientation: Ellipse
+    total: Ellipse
+    published: Ellipse
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One of the solutions of a run.
+
+    Attributes
+    ----------
+    solution
+        `minimum`, `maximum` or `refraction`.
+    counts
+        Its observations and unknowns.
+    levels
+        Its history.
+    stop
+        Why it stopped.
+    converged
+        Whether by its criterion.
+    log_determinant
+        Natural logarithm of the determinant of its reduced normal equations, in the units of the parameters.
+    """
+
+    solution: str
+    counts: Counts
+    levels: tuple[Level, ...]
+    stop: str
+    converged: bool
+    log_determinant: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +155,16 @@ class Result:
         Remarks that did not stop the run.
     given
         The whole problem, where only the minimum solution was computed.
+    stages
+        The solutions of the run in their order; the last one is `solved`.
     pre_run
         Residuals of the images that took no part, if a pre-run was asked for.
     movement
         The movement test, if asked for.
     combined
-        The combined solution, if attitudes do not differ.
+        The combined solution, if attitudes do not differ: a result of its own.
+    pairs
+        Of a combined solution: the pairs that the movement test found equal.
     """
 
     problem: Problem
@@ -101,9 +172,11 @@ class Result:
     counts: Counts
     messages: tuple[Message, ...]
     given: Problem
+    stages: tuple[Stage, ...] = ()
     pre_run: PreRun | None = None
     movement: tuple[Movement, ...] = ()
-    combined: Combined | None = None
+    combined: Result | None = None
+    pairs: tuple[tuple[str, str], ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -112,8 +185,8 @@ class Result:
 
     @property
     def levels(self) -> tuple[Level, ...]:
-        """The history."""
-        return self.solved.levels
+        """The history of all solutions."""
+        return tuple(level for stage in self.stages for level in stage.levels)
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -170,17 +243,57 @@ class Result:
     @property
     def standardized(self) -> Floats:
         """(m, 2) residuals over their mean errors."""
-        return self.solved.standardized / self.mean_error
+        return self.solved.standardized / (self.mean_error or math.nan)
 
     @property
     def star_standardized(self) -> Floats:
         """(S, 2) residuals of the catalogue places over their mean errors."""
-        return self.solved.star_standardized / self.mean_error
+        return self.solved.star_standardized / (self.mean_error or math.nan)
 
     def ellipses(self) -> list[Ellipse]:
         """Return the mean error ellipse of every star."""
         pairs = zip(self.star_covariances, self.solved.places, strict=True)
         return [ellipse(covariance, place[1]) for covariance, place in pairs]
+
+    def directions(self) -> list[Direction]:
+        """Return the unknown directions with their error ellipses."""
+        unknown = np.flatnonzero(~self.problem.known)
+        if not unknown.size:
+            return []
+        core = self.problem.core(self.solved.parameters, self.solved.places, ~self.solved.free)
+        of_images = core.directions()
+        return [self._direction(int(star), of_images) for star in unknown]
+
+    def _direction(self, star: int, of_images: Floats) -> Direction:
+        problem, solved = self.problem, self.solved
+        place, unit = solved.places[star], self.mean_error
+        images = np.flatnonzero(problem.image_stars == star)
+        residuals, weights = solved.residuals[images], problem.image_weights[images]
+        square = float(np.einsum("mi,mij,mj->", residuals, weights, residuals))
+        own = math.sqrt(square / (2 * len(images) - 2)) if len(images) > 1 else unit
+        inverse = solved.star_inverse[star]
+        orientation = unit**2 * (solved.star_cofactors[star] - inverse)
+        total = self.star_covariances[star]
+        time = problem.image_times[images[:1]]
+        ((xi, eta),) = problem.site.standard_coordinates(place[None], time, solved.parameters[22:])
+        return Direction(
+            star=problem.star_ids[star],
+            place=(float(place[0]), float(place[1])),
+            correction=(
+                math.remainder(place[0] - of_images[images[0], 0], math.tau),
+                float(place[1] - of_images[images[0], 1]),
+            ),
+            azimuth=math.atan2(-eta, -xi) % math.tau,
+            elevation=math.atan2(1.0, math.hypot(xi, eta)),
+            mean_errors=(
+                math.sqrt(total[0, 0]) * math.cos(place[1]),
+                math.sqrt(total[1, 1]),
+            ),
+            image_mean_error=own,
+            orientation=ellipse(orientation, place[1]),
+            total=ellipse(total, place[1]),
+            published=ellipse(orientation + own**2 * inverse, place[1]),
+        )
 
     def correlated(self) -> list[tuple[str, str, float]]:
         """Name pairs of parameters whose correlation exceeds 0.95."""

@@ -7,93 +7,39 @@ report's matrix leads from the left-handed north, east, zenith to them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import orjson
 from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.errors import AdjustmentError, InputError
+from photogram.stellar.cameras import BROWN_PLACE, COMMON, BrownCamera, weight_of
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import match
-from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.sky import TAU, Site
+from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
+from photogram.stellar.problem import weight_root
+from photogram.stellar.sky import Site
+from photogram.stellar.transformation import transformed_angles
 
-__all__ = ["BrownCamera", "Exposure", "SkyCalibration", "calibrate_exposures", "identify", "project_sky"]
+__all__ = [
+    "BrownCamera",
+    "Exposure",
+    "SkyCalibration",
+    "calibrate_exposures",
+    "identify",
+    "project_sky",
+    "stars_near",
+]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
-# Places of these among the common parameters of the core, whose P1 is the p2 of computer vision.
-_PLACE = (3, 4, 1, 2, 7, 8, 9, 11, 10)
-_COMMON = 17
-
-
-@dataclass(frozen=True, eq=False)
-class BrownCamera:
-    """A pinhole camera with Brown's distortion, in pixels, and its covariance.
-
-    With (u, v) = (X, Y) / Z and r^2 = u^2 + v^2,
-    x = fx (u (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 u v + p2 (r^2 + 2 u^2)) + cx,
-    and y likewise with fy, cy, and p1, p2 exchanged.
-
-    Attributes
-    ----------
-    values
-        (9,) fx, fy, cx, cy, k1, k2, k3, p1, p2.
-    covariance
-        (9, 9); zero for what was held.
-    """
-
-    values: Floats
-    covariance: Floats
-
-    @classmethod
-    def of_field(cls, width: float, height: float, field_of_view: float) -> BrownCamera:
-        """Return an ideal camera of a frame in pixels and a horizontal field of view in radians."""
-        f = 0.5 * width / math.tan(0.5 * field_of_view)
-        values = np.array([f, f, 0.5 * width, 0.5 * height, 0, 0, 0, 0, 0], float)
-        return cls(values, np.zeros((9, 9)))
-
-    @property
-    def common(self) -> Floats:
-        """(17,) as the core takes it."""
-        common = np.zeros(_COMMON)
-        common[list(_PLACE)] = self.values
-        common[13:] = TAU
-        return common
-
-    def to_json(self) -> bytes:
-        """Return the camera as a JSON document: a weighted prior of later adjustments."""
-        document = {
-            "program": f"photogram {_photocore.__version__}",
-            "kind": "brown camera",
-            "unit": "pixel",
-            "parameters": dict(zip(NAMES, self.values.tolist(), strict=True)),
-            "covariance": {"order": NAMES, "matrix": self.covariance},
-        }
-        return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
-
-    @classmethod
-    def read(cls, path: Path) -> BrownCamera:
-        """Read what `to_json` wrote.
-
-        Raises
-        ------
-        InputError
-            Another document.
-        """
-        try:
-            document = orjson.loads(path.read_bytes())
-            values = np.array([document["parameters"][name] for name in NAMES], float)
-            covariance = np.array(document["covariance"]["matrix"], float).reshape(9, 9)
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is not a camera: {error}", file=path) from None
-        return cls(values, covariance)
+_STILL = Earth()
+_SLACK = math.radians(2.0)
+_FEWEST, _SHARE = 6, 0.2
+"""Stars, and their share of all that could be, below which an identification is one of chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +78,14 @@ class SkyCalibration:
         (E, 3, 9) of attitudes and camera.
     exposures, stars
         (m,) exposure and catalogue star of each image used.
-    residuals, redundancy, standardized
-        (m, 2) measured minus computed, pixels; redundancy numbers; residuals over their mean errors.
+    xy, residuals, redundancy, standardized
+        (m, 2) measured pixels; measured minus computed, pixels; redundancy numbers; residuals over their mean
+        errors.
+    catalogue
+        (S,) index in the catalogue of the stars used.
+    star_residuals, star_redundancy, star_standardized
+        (S, 2) adjusted minus catalogue right ascension and declination, radians; redundancy numbers;
+        residuals over their mean errors. NaN for stars that were held.
     mean_error
         Mean error of unit weight: of a pixel coordinate over its assumed standard deviation.
     degrees_of_freedom, iterations, status
@@ -146,9 +98,14 @@ class SkyCalibration:
     cross_covariances: Floats
     exposures: Indices
     stars: Indices
+    xy: Floats
     residuals: Floats
     redundancy: Floats
     standardized: Floats
+    catalogue: Indices
+    star_residuals: Floats
+    star_redundancy: Floats
+    star_standardized: Floats
     mean_error: float
     degrees_of_freedom: int
     iterations: int
@@ -174,6 +131,34 @@ def project_sky(camera: BrownCamera, attitude: Floats, site: Site, places: Float
     return pixels
 
 
+def stars_near(
+    exposure: Exposure,
+    camera: BrownCamera,
+    site: Site,
+    catalogue: Catalogue,
+    frame: tuple[float, float],
+    margin: float,
+    dut1: float = 0.0,
+) -> Indices:
+    """Return the stars of a catalogue around the field of an exposure, by index.
+
+    `margin` (radians) is what the attitude may be off.
+    """
+    alpha, omega = exposure.attitude[:2]
+    if not math.cos(alpha) * math.cos(omega) > 0.02:
+        # Nearly level or below: there are no standard coordinates to go by.
+        return np.arange(len(catalogue.ids))
+    axis = np.array([[math.tan(alpha), math.tan(omega) / math.cos(alpha)]])
+    ((ra, dec),) = site.places(axis, sidereal_time(site, exposure.utc, dut1))
+    fx, fy, cx, cy = camera.values[:4]
+    corner = math.hypot(max(cx, frame[0] - cx) / fx, max(cy, frame[1] - cy) / fy)
+    # Distortion, and precession over the years.
+    reach = 1.1 * math.atan(corner) + margin + _SLACK
+    right, declination = catalogue.places.T
+    cosine = np.sin(dec) * np.sin(declination) + np.cos(dec) * np.cos(declination) * np.cos(right - ra)
+    return np.flatnonzero(cosine >= math.cos(min(reach, math.pi)))
+
+
 def identify(
     exposure: Exposure,
     camera: BrownCamera,
@@ -183,7 +168,7 @@ def identify(
     frame: tuple[float, float],
     radius: float,
     tolerance: float = 3.0,
-    dut1: float = 0.0,
+    earth: Earth = _STILL,
 ) -> Indices:
     """Find the catalogue star of each image.
 
@@ -199,85 +184,106 @@ def identify(
         Width and height in pixels.
     radius, tolerance
         Largest error of the approximate attitude, and of an image after the best polynomials, pixels.
-    dut1
-        UT1 - UTC in seconds.
+    earth
+        UT1 - UTC, and the pole.
 
     Returns
     -------
-    (k,) index in the catalogue; -1 where there is none.
+    (k,) index in the catalogue; -1 where there is none, and everywhere where so few images have one that
+    chance would have found them.
     """
-    time = sidereal_time(site, exposure.utc, dut1)
-    predicted = project_sky(camera, exposure.attitude, site, apparent_places(catalogue, exposure.utc), time)
+    site = earth.site_of_date(site)
+    time = sidereal_time(site, exposure.utc, earth.dut1)
+    near = stars_near(exposure, camera, site, catalogue, frame, radius / camera.values[0], earth.dut1)
+    places = apparent_places(catalogue.take(near), exposure.utc)
+    predicted = project_sky(camera, exposure.attitude, site, places, time)
     margin = np.array([-radius, -radius]), np.array(frame) + radius
     with np.errstate(invalid="ignore"):
         seen = np.flatnonzero(((predicted >= margin[0]) & (predicted <= margin[1])).all(axis=1))
     found = match(exposure.xy, predicted[seen], radius=radius, tolerance=tolerance)
-    return np.where(found >= 0, seen[found] if len(seen) else -1, -1)
+    if (found >= 0).sum() < max(_FEWEST, _SHARE * min(len(found), len(seen))):
+        return np.full(len(found), -1, np.int64)
+    return np.where(found >= 0, near[seen[found]] if len(seen) else -1, -1)
 
 
 def calibrate_exposures(
-    exposures: list[Exposure],
+    exposures: Sequence[Exposure],
     camera: BrownCamera,
     site: Site,
     catalogue: Catalogue,
     *,
     pixel_sd: float = 0.1,
-    fixed: tuple[str, ...] = (),
-    dut1: float = 0.0,
+    fixed: Sequence[str] = (),
+    prior: BrownCamera | None = None,
+    weigh_stars: bool = False,
+    earth: Earth = _STILL,
     threads: int | None = None,
 ) -> SkyCalibration:
     """Calibrate a camera by digital exposures of the sky.
-
-    Stars are held at their catalogue places, which are a thousand times better than a pixel.
 
     Parameters
     ----------
     exposures
         With their stars.
     camera
-        Initial values; a camera with covariance is no prior here.
+        Initial values.
     site, catalogue
-        Where, and which stars. The aberration of the site is the diurnal one.
+        Where, and which stars. The aberration of the site is the diurnal one; its latitude and longitude, and
+        the attitudes that come out, are from the mean pole.
     pixel_sd
         Standard deviation of an image coordinate, pixels.
     fixed
         Names of camera parameters to hold (of fx, fy, cx, cy, k1, k2, k3, p1, p2).
-    dut1
-        UT1 - UTC in seconds.
+    prior
+        A calibrated camera, whose values take part with the weight of their covariance; what was held in it
+        has no weight.
+    weigh_stars
+        Estimate the stars, too, with the mean errors of the catalogue; stars without are held. Else all are
+        held: catalogue places are a thousand times better than a pixel.
+    earth
+        UT1 - UTC, and the pole.
     threads
         Number of threads; all processors when None.
 
     Raises
     ------
     InputError
-        An exposure without stars; a parameter that does not exist.
+        An exposure without stars; a parameter that does not exist; a standard deviation that is not positive.
     AdjustmentError
         The stars do not determine the camera.
     """
-    unknown = sorted(set(fixed) - set(NAMES))
+    unknown = sorted(set(fixed) - set(BrownCamera.NAMES))
     if unknown:
         raise InputError(f"there is no camera parameter {', '.join(unknown)}")
-    images = _Images(exposures, site, catalogue, dut1)
-    count = len(exposures)
-    held = np.ones(3 * count + _COMMON, bool)
-    held[: 3 * count] = False
-    held[
-        3 * count + np.array([place for name, place in zip(NAMES, _PLACE, strict=True) if name not in fixed])
-    ] = False
-    core = _core(images, exposures, camera, site, held, pixel_sd)
+    if not pixel_sd > 0:
+        raise InputError(f"the standard deviation of an image coordinate is {pixel_sd} pixels")
+    place = earth.site_of_date(site)
+    images = _Images(exposures, place, catalogue, earth.dut1, weigh_stars)
+    free = np.array([name not in fixed for name in BrownCamera.NAMES])
+    core = _core(images, exposures, camera, place, free, prior, pixel_sd)
     try:
         found = core.adjust(
             unit=1.0, fraction=1e-5, max_iterations=100, covariance=True, threads=threads or 0, progress=None
         )
     except _photocore.StellarError as error:
         raise AdjustmentError(f"the stars do not determine the camera: {error.args[1]}") from None
-    return _result(found, images, count, int((~held).sum()))
+    weighted = 0 if prior is None else int((prior.known & free).sum())
+    freedom = 2 * len(images.xy) + weighted - 3 * len(exposures) - int(free.sum())
+    result = _result(found, images, len(exposures), freedom)
+    if earth.pole == (0.0, 0.0):
+        return result
+    # The turn between the poles is so small that covariances stay.
+    turned = [transformed_angles(angles, place, site, earth.pole) for angles in result.attitudes]
+    change = np.array(turned) - result.attitudes
+    return replace(result, attitudes=result.attitudes + np.remainder(change + np.pi, 2 * np.pi) - np.pi)
 
 
 class _Images:
     """All images of all exposures, with the apparent places of their stars."""
 
-    def __init__(self, exposures: list[Exposure], site: Site, catalogue: Catalogue, dut1: float) -> None:
+    def __init__(
+        self, exposures: Sequence[Exposure], site: Site, catalogue: Catalogue, dut1: float, weigh: bool
+    ) -> None:
         exposure_of, stars, xy, times, places = [], [], [], [], []
         for number, exposure in enumerate(exposures):
             chosen = np.flatnonzero(exposure.stars >= 0) if exposure.stars is not None else np.zeros(0, int)
@@ -291,30 +297,57 @@ class _Images:
         self.exposures, self.stars = np.concatenate(exposure_of), np.concatenate(stars)
         self.xy, self.times = np.vstack(xy), np.concatenate(times)
         every = np.vstack(places)
-        _, first, self.local = np.unique(self.stars, return_index=True, return_inverse=True)
+        self.catalogue, first, self.local = np.unique(self.stars, return_index=True, return_inverse=True)
         self.places = every[first]
         shifts = every - self.places[self.local]
         shifts[:, 0] = np.remainder(shifts[:, 0] + np.pi, 2 * np.pi) - np.pi
         self.shifts = shifts
+        errors = catalogue.take(self.catalogue).mean_errors(epoch(exposures[0].utc))
+        self.weighted: NDArray[np.bool_] = (errors.min(axis=1) > 0) & weigh
+        # The axes of date differ from those of the catalogue by minutes of arc: nothing to an error ellipse.
+        errors[:, 0] /= np.cos(self.places[:, 1])
+        self.weights = np.zeros((len(errors), 2, 2))
+        self.weights[self.weighted] = np.array([np.diag(row**-2.0) for row in errors[self.weighted]]).reshape(
+            -1, 2, 2
+        )
 
 
 def _core(
-    images: _Images, exposures: list[Exposure], camera: BrownCamera, site: Site, held: Any, pixel_sd: float
+    images: _Images,
+    exposures: Sequence[Exposure],
+    camera: BrownCamera,
+    site: Site,
+    free: NDArray[np.bool_],
+    prior: BrownCamera | None,
+    pixel_sd: float,
 ) -> _photocore.StellarProblem:
-    stars, count = len(images.places), len(images.xy)
+    first, count = 3 * len(exposures), len(images.xy)
+    place = first + np.array(BROWN_PLACE)
+    fixed = np.ones(first + COMMON, bool)
+    fixed[:first] = fixed[place[free]] = False
+    weighted, values, root = np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0))
+    if prior is not None:
+        # What is held conditions the others: a block of the whole weight matrix.
+        weights = np.zeros((len(free), len(free)))
+        weights[np.ix_(prior.known, prior.known)] = weight_of(
+            prior.covariance[np.ix_(prior.known, prior.known)]
+        )
+        chosen = np.flatnonzero(prior.known & free)
+        weighted, values = place[chosen], prior.values[chosen]
+        root = weight_root(weights[np.ix_(chosen, chosen)], [BrownCamera.NAMES[i] for i in chosen])
     return _photocore.StellarProblem(
         station=site.core,
         camera=(1.0, True, False),
         pointings=np.array([exposure.attitude for exposure in exposures], float),
         common=camera.common,
-        fixed=held.tolist(),
-        weighted=np.zeros(0, np.int64),
-        weighted_values=np.zeros(0),
-        weight_root=np.zeros((0, 0)),
+        fixed=fixed.tolist(),
+        weighted=weighted,
+        weighted_values=values,
+        weight_root=root,
         star_places=images.places,
         star_catalogue=images.places,
-        star_weights=np.zeros((stars, 2, 2)),
-        star_fixed=[True] * stars,
+        star_weights=images.weights,
+        star_fixed=(~images.weighted).tolist(),
         image_stars=images.local.astype(np.int64),
         image_pointings=images.exposures.astype(np.int64),
         image_xy=images.xy,
@@ -325,31 +358,37 @@ def _core(
     )
 
 
-def _result(found: dict[str, Any], images: _Images, count: int, unknowns: int) -> SkyCalibration:
-    freedom = 2 * len(images.xy) - unknowns
-    mean_error = math.sqrt(found["sums_of_squares"][0] / freedom) if freedom > 0 else 1.0
+def _result(found: dict[str, Any], images: _Images, count: int, freedom: int) -> SkyCalibration:
+    mean_error = math.sqrt(sum(found["sums_of_squares"]) / freedom) if freedom > 0 else 1.0
+    held = ~images.weighted[:, None]
     cofactors = mean_error**2 * found["cofactors"]
-    place = list(_PLACE)
+    place = list(BROWN_PLACE)
     if count <= 3:
-        full = cofactors.reshape(3 * count + _COMMON, -1)
+        full = cofactors.reshape(3 * count + COMMON, -1)
         own = np.array([full[3 * e : 3 * e + 3, 3 * e : 3 * e + 3] for e in range(count)])
         cross = np.array([full[3 * e : 3 * e + 3, 3 * count :] for e in range(count)])
         common = full[3 * count :, 3 * count :]
     else:
-        rows = cofactors[: count * 3 * (3 + _COMMON)].reshape(count, 3, 3 + _COMMON)
+        rows = cofactors[: count * 3 * (3 + COMMON)].reshape(count, 3, 3 + COMMON)
         own, cross = rows[:, :, :3], rows[:, :, 3:]
-        common = cofactors[count * 3 * (3 + _COMMON) :].reshape(_COMMON, _COMMON)
+        common = cofactors[count * 3 * (3 + COMMON) :].reshape(COMMON, COMMON)
     parameters = found["parameters"]
     return SkyCalibration(
         camera=BrownCamera(parameters[3 * count :][place], common[np.ix_(place, place)]),
         attitudes=parameters[: 3 * count].reshape(count, 3),
-        attitude_covariances=own,
-        cross_covariances=cross[:, :, place],
+        attitude_covariances=np.ascontiguousarray(own),
+        cross_covariances=np.ascontiguousarray(cross[:, :, place]),
         exposures=images.exposures,
         stars=images.stars,
+        xy=images.xy,
         residuals=found["residuals"],
         redundancy=found["image_redundancy"],
-        standardized=found["image_standardized"] / mean_error,
+        standardized=found["image_standardized"] / (mean_error or math.nan),
+        catalogue=images.catalogue,
+        star_residuals=np.where(held, np.nan, found["places"] - images.places),
+        star_redundancy=np.where(held, np.nan, found["place_redundancy"]),
+        # The engine's residuals are observed minus computed.
+        star_standardized=np.where(held, np.nan, -found["place_standardized"] / (mean_error or math.nan)),
         mean_error=mean_error,
         degrees_of_freedom=freedom,
         iterations=len(found["iterations"]),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
-from photogram.stellar.parameters import ARCSEC
+from photogram.angles import ARCSEC
 
 __all__ = ["ABERRATION", "TAU", "Air", "Site", "refraction"]
 

@@ -48,8 +48,9 @@ class Solved:
         (26,) which parameters were estimated.
     cofactors
         (26, 26) for unit weight; zero for what was not.
-    star_cofactors
-        (S, 2, 2).
+    star_cofactors, star_inverse
+        (S, 2, 2) of the places; and what of them would be left if the parameters were known: the report's
+        (1)^-1.
     residuals
         (m, 2) computed minus measured plate coordinates, metres.
     redundancy, standardized
@@ -60,6 +61,8 @@ class Solved:
         Computed minus measured plate coordinates of the axis.
     sums
         Weighted sums of squares of plate, stars, parameters (with the axis).
+    log_determinant
+        Natural logarithm of the determinant of the reduced normal equations in the units of the parameters.
     stop
         Why the iteration stopped.
     converged
@@ -75,6 +78,7 @@ class Solved:
     free: Bools
     cofactors: Floats
     star_cofactors: Floats
+    star_inverse: Floats
     residuals: Floats
     redundancy: Floats
     standardized: Floats
@@ -82,6 +86,7 @@ class Solved:
     star_standardized: Floats
     axis_residual: Floats | None
     sums: tuple[float, float, float]
+    log_determinant: float
     stop: str
     converged: bool
     levels: tuple[Level, ...]

@@ -14,18 +14,20 @@ from photogram.errors import AdjustmentError
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.parameters import NAMES
 from photogram.stellar.problem import Problem
-from photogram.stellar.reduction import reduce, undetermined
+from photogram.stellar.reduction import log_determinant, reduce, singular, undetermined
+from photogram.stellar.residuals import complete
 from photogram.stellar.state import Level, Solved
 
-__all__ = ["iterate"]
+__all__ = ["iterate", "residual_cycle"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 _EXPECTED = 1e-6
 """Mean error of a direction to begin with, radians."""
-_ROUGH, _FINE = 1e-3, 1e-4
-_LIMIT = 100
+_ROUGH, _FINE, _FINEST = 1e-3, 1e-4, 1e-9
+"""Largest changes in standard deviations: of a first solution, of one that has converged, of the best."""
+_LIMIT, _MORE = 100, 5
 
 
 def iterate(
@@ -42,8 +44,8 @@ def iterate(
 
     Parameters that the initial values leave without effect (the centre of a distortion that is zero) join in
     once the others have given them one. Weights are only known up to a factor, so a first solution finds the
-    mean error of unit weight, and a second one ends when no unknown changes by more than a ten-thousandth of
-    its standard deviation.
+    mean error of unit weight. A second one goes on until its corrections are rounding errors, a billionth of
+    the standard deviations on an ordinary plate; then a few more, so that the cofactors hold at the solution.
 
     Raises
     ------
@@ -61,9 +63,20 @@ def iterate(
         if (active == free).all() or found["status"] != "converged":
             break
     mean_error = float(np.sqrt(sum(found["sums_of_squares"]) / dof))
-    unit = max(mean_error, 1e-9 * unit)
-    found = run.adjust(parameters, places, free, unit, _FINE, covariance=True)
-    return run.solved(found, free, unit)
+    rounding = _rounding(problem, parameters)
+    unit = max(mean_error, rounding / _FINE)
+    found = run.adjust(parameters, places, free, unit, max(rounding / unit, _FINEST))
+    last = run.adjust(found["parameters"], found["places"], free, unit, 0.0, most=_MORE, covariance=True)
+    return run.solved({**last, "status": found["status"]}, free, unit)
+
+
+def _rounding(problem: Problem, parameters: Floats) -> float:
+    """Return the root of the weighted sum of squares of what rounding alone may leave of all observations."""
+    plate = parameters[12] ** 2 * np.einsum("mii->", problem.image_weights)
+    tested = problem.known & ~problem.held
+    stars = np.einsum("sii,si->", problem.star_weights[tested], problem.star_places[tested] ** 2)
+    weighted = np.diag(problem.parameter_weights) @ parameters**2
+    return float(np.finfo(float).eps * np.sqrt(plate + stars + weighted))
 
 
 def _first_places(problem: Problem, parameters: Floats, free: Bools) -> Floats:
@@ -75,6 +88,36 @@ def _first_places(problem: Problem, parameters: Floats, free: Bools) -> Floats:
         for star in np.flatnonzero(unknown):
             places[star] = directions[first[int(star)]]
     return places
+
+
+def residual_cycle(
+    problem: Problem, parameters: Floats, free: Bools, places: Floats, *, cofactors: Floats
+) -> Solved:
+    """Compute star corrections, residuals and their tests at final parameters, without iterating again.
+
+    Parameters
+    ----------
+    problem, parameters, free
+        As for `iterate`.
+    places
+        (S, 2) places near the final ones.
+    cofactors
+        (26, 26) of the parameters.
+    """
+    core = problem.core(parameters, places, ~free)
+    reduced = reduce(problem, core, core.equations(), places)
+    places = places + reduced.star_corrections()
+    final = problem.core(parameters, places, ~free)
+    return complete(
+        problem,
+        final,
+        reduced,
+        parameters=parameters,
+        free=free,
+        places=places,
+        residuals=-final.equations()["constant"],
+        cofactors=cofactors,
+    )
 
 
 class _Run:
@@ -106,6 +149,8 @@ class _Run:
         free: Bools,
         unit: float,
         fraction: float,
+        *,
+        most: int = _LIMIT,
         covariance: bool = False,
     ) -> dict[str, Any]:
         core = self.problem.core(parameters, places, ~free)
@@ -113,7 +158,7 @@ class _Run:
             found = core.adjust(
                 unit=unit,
                 fraction=fraction,
-                max_iterations=self.limit,
+                max_iterations=min(most, self.limit - max(len(self.levels) - 1, 0)),
                 covariance=covariance,
                 threads=self.threads,
                 progress=self.progress,
@@ -136,10 +181,7 @@ class _Run:
             return AdjustmentError(f"ERROR 2: no inverse for the submatrix of star {names}")
         if kind == "undetermined":
             normal = reduce(self.problem, core, core.equations(), places).normal
-            names = ", ".join(undetermined(normal + self.problem.parameter_weights, free, 1e-10))
-            return AdjustmentError(
-                f"ERROR 4: no inverse for the reduced normal equations: the stars do not determine {names}"
-            )
+            return singular(undetermined(normal + self.problem.parameter_weights, free, 1e-10))
         return AdjustmentError(message)
 
     def solved(self, found: dict[str, Any], free: Bools, unit: float) -> Solved:
@@ -152,6 +194,8 @@ class _Run:
             "diverged": "NO STEP LOWERS THE SUM OF SQUARES",
         }
         cofactors = found["cofactors"].reshape(len(NAMES), len(NAMES)) if len(found["cofactors"]) else None
+        core = problem.core(found["parameters"], found["places"], ~free)
+        reduced = reduce(problem, core, core.equations(), found["places"])
         tested = (problem.known & ~problem.held)[:, None]
         axis_residual = found["axis_residual"]
         return Solved(
@@ -160,6 +204,7 @@ class _Run:
             free=free,
             cofactors=np.full((len(NAMES), len(NAMES)), np.nan) if cofactors is None else cofactors,
             star_cofactors=found["place_cofactors"],
+            star_inverse=reduced.star_inverse,
             residuals=-found["residuals"],
             redundancy=found["image_redundancy"],
             # The engine's residuals are observed minus computed, in units of the expected mean error.
@@ -168,6 +213,7 @@ class _Run:
             star_standardized=np.where(tested, -unit * found["place_standardized"], np.nan),
             axis_residual=None if axis_residual is None else -np.array(axis_residual),
             sums=(plate, stars, weighted + axis),
+            log_determinant=log_determinant(reduced.normal + problem.parameter_weights, free),
             stop=stops.get(status, f"{count} ITERATIONS COMPLETED"),
             converged=status == "converged",
             levels=tuple(Level(self.solution, i + 1, level) for i, level in enumerate(self.levels)),

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.angles import degrees_minutes_seconds
+
 if TYPE_CHECKING:
     from photogram.adjusted import Floats
     from photogram.comparator.calibration import CaseResult
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
 __all__ = ["angle", "centred", "nearest", "number", "triangle"]
 
 WIDTH = 110
-ARCSEC = 180 * 3600 / math.pi
 
 
 def centred(title: str) -> list[str]:
@@ -38,11 +39,9 @@ def number(value: float | None, width: int, decimals: int) -> str:
 
 def angle(radians: float) -> str:
     """Return an angle in degrees, minutes and seconds of arc."""
-    thousandths = round(abs(radians) * ARCSEC * 1000)
-    minutes, seconds = divmod(thousandths, 60_000)
-    degrees, minutes = divmod(minutes, 60)
-    sign = "-" if radians < 0 and thousandths else " "
-    return f"{sign}{degrees:3d} DEG {minutes:2d} MIN {seconds / 1000:6.3f} SEC"
+    degrees, minutes, seconds = degrees_minutes_seconds(radians, 3)
+    sign = "-" if radians < 0 and (degrees or minutes or seconds) else " "
+    return f"{sign}{degrees:3d} DEG {minutes:2d} MIN {seconds:6.3f} SEC"
 
 
 def triangle(names: Iterable[str], matrix: Floats) -> list[str]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.listing.forms import ARCSEC, angle, centred, nearest, triangle
+from photogram.angles import ARCSEC
+from photogram.comparator.listing.forms import angle, centred, nearest, triangle
 from photogram.comparator.listing.residuals import residual_lines
 from photogram.comparator.polynomial import TERMS
 
@@ -37,7 +38,7 @@ def linear_lines(scale_x: float, scale_y: float, lean: float, covariance: Floats
         f"  SCALER X {scale_x:14.8f}   SIGMA {sd[0]:12.5E}   SX - 1 = {_ppm(scale_x)}",
         f"  SCALER Y {scale_y:14.8f}   SIGMA {sd[1]:12.5E}   SY - 1 = {_ppm(scale_y)}",
         f"  SX/SY    {ratio:14.8f}   {'':18}   SX/SY-1= {_ppm(ratio)}",
-        f"  LACK OF ORTHOGONALITY ALPHA {angle(lean)}   SIGMA {sd[2] * ARCSEC:8.3f} SEC",
+        f"  LACK OF ORTHOGONALITY ALPHA {angle(lean)}   SIGMA {sd[2] / ARCSEC:8.3f} SEC",
         "  VARIANCES AND COVARIANCES (ALPHA IN RADIANS)",
         *triangle(NAMES, covariance[:3, :3]),
     ]
@@ -69,7 +70,7 @@ def case_linear_page(case: CaseResult) -> list[str]:
         nearest(case),
         "",
         *linear_lines(own.scale_x, own.scale_y, own.nonorthogonality_rad, fit.covariance),
-        f"  ROTATION {angle(own.rotation_rad)}   SIGMA {math.sqrt(fit.covariance[3, 3]) * ARCSEC:8.3f} SEC",
+        f"  ROTATION {angle(own.rotation_rad)}   SIGMA {math.sqrt(fit.covariance[3, 3]) / ARCSEC:8.3f} SEC",
         "",
         *residual_lines(fit.residuals),
     ]

@@ -33,29 +33,13 @@ pub struct PublishedRows {
 
 impl Calibration {
     /// The equations of all images at the initial values as the report's program formed them.
-    ///
-    /// `corrections` (right ascension, declination) are added to the refracted places of the stars, refraction as it was.
-    pub fn published(
-        &self,
-        corrections: &[[f64; 2]],
-        tolerances: &Tolerances,
-    ) -> Result<Vec<PublishedRows>, StellarError> {
+    pub fn published(&self, tolerances: &Tolerances) -> Result<Vec<PublishedRows>, StellarError> {
         self.check()?;
-        if corrections.len() != self.stars.len() {
-            return Err(StellarError::Index("a correction".into()));
-        }
         let sight = self.initial();
-        let rows = |image: &Image| self.published_image(&sight, image, corrections[image.star], tolerances);
-        Ok(self.images.iter().map(rows).collect())
+        Ok(self.images.iter().map(|image| self.published_image(&sight, image, tolerances)).collect())
     }
 
-    fn published_image(
-        &self,
-        sight: &Sight,
-        image: &Image,
-        correction: [f64; 2],
-        tolerances: &Tolerances,
-    ) -> PublishedRows {
+    fn published_image(&self, sight: &Sight, image: &Image, tolerances: &Tolerances) -> PublishedRows {
         let place = self.stars[image.star].place;
         let place = [place[0] + image.shift[0], place[1] + image.shift[1]];
         let (equatorial, _) = self.station.aberrated(place, image.sidereal_time);
@@ -63,11 +47,12 @@ impl Calibration {
         let sin = direction[0].hypot(direction[1]);
         let zenith_distance = sin.atan2(direction[2]);
         let angle = self.station.air.published(zenith_distance, &sight.tau, tolerances.refraction);
-        let tangent = (zenith_distance - angle).tan();
+        let (across, height) = (zenith_distance - angle).sin_cos();
+        // Below the horizon the tangent would come back as that of a direction above it.
+        let tangent = if height > 0.0 { across / height } else { f64::NAN };
         let along = if sin > 0.0 { tangent / sin } else { 1.0 };
         let apparent = [direction[0] * along, direction[1] * along, 1.0];
-        let [hour, dec] = self.station.equatorial(&apparent);
-        let refracted = [hour - correction[0], dec + correction[1]];
+        let refracted = self.station.equatorial(&apparent);
         let direction = self.station.direction(refracted);
         let standard = [direction[0] / direction[2], direction[1] / direction[2]];
         let star = self.station.standard_by_refracted(refracted, direction[2], standard[0]);
@@ -102,6 +87,8 @@ fn approximate(
     let offset = [undistorted[0] - xp - dx, undistorted[1] - yp - dy];
     let lens = camera.distortion().linearize(offset);
     let [m, n, q] = Attitude::turned(&attitude.matrix, standard);
+    // A direction behind the camera has no image.
+    let q = if q > 0.0 { q } else { f64::NAN };
     let computed = [cx * m / q + xp + lens.shift[0] - epsilon * measured[1], cy * n / q + yp + lens.shift[1]];
     let [[a1, b1, _], [a2, b2, _], [d, e, _]] = attitude.matrix;
     let (p1, p2) = ((computed[0] - xp) / cx, (computed[1] - yp) / cy);

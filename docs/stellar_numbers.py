@@ -1,0 +1,87 @@
+"""The numbers of docs/stellar-camera.md: `python docs/regenerate.py stellar-camera.md`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+from importlib.resources import as_file, files
+
+import erfa
+import numpy as np
+
+from photogram.angles import ARCSEC
+from photogram.stellar import Air, Result, calibrate, refraction
+from photogram.stellar.listing import summary
+from photogram.stellar.night import CalibratedNight, calibrate_night
+from photogram.stellar.night_file import read_night
+from photogram.stellar.night_report import summary as night_summary
+from photogram.stellar.parameters import GRAD, NAMES, UNITS
+from photogram.stellar.plain import read_plain
+
+
+@cache
+def plate(as_published: bool = False) -> Result:
+    """Calibrate the packaged plate."""
+    with as_file(files("photogram") / "examples" / "stellar") as folder:
+        problem = read_plain(folder / "plate.toml")
+    return calibrate(replace(problem, options=replace(problem.options, as_published=as_published)))
+
+
+@cache
+def night() -> CalibratedNight:
+    """Calibrate the packaged night."""
+    with as_file(files("photogram") / "examples" / "exposures") as folder:
+        return calibrate_night(read_night(folder / "night.toml"))
+
+
+def adjustment_lines() -> list[str]:
+    """Show the figures of the packaged plate."""
+    (_, problems), (_, figures) = summary(plate())
+    # The digits of sums that vanish, and the last ones of parts of a minimum, are noise.
+    noisy = ("sums of", "weighted sum of squares, plate", "weighted sum of squares, stars")
+    return [*problems, "", *(line for line in figures if not line.startswith(noisy))]
+
+
+def parameter_lines() -> list[str]:
+    """Show the camera and one attitude, strict and as published."""
+    strict, published = plate(), plate(as_published=True)
+    lines = [f"{'':13}{'unit':6}{'strict':>15}{'mean error':>13}{'as published':>15}{'difference':>12}"]
+    for name in NAMES[:3] + NAMES[9:22]:
+        unit, shown = (GRAD, "grad") if UNITS[name] == "rad" else (1.0, UNITS[name])
+        value, other = strict.parameters[name] / unit, published.parameters[name] / unit
+        error = strict.mean_errors[name] / unit
+        # To the second digit of the mean error.
+        digits = max(0, 1 - math.floor(math.log10(error)))
+        lines.append(
+            f"{name:13}{shown:6}{value:15.{digits}f}{error:13.2g}{other:15.{digits}f}"
+            f"{(other - value) / error:9.2f} me"
+        )
+    m = 1e6 * strict.mean_error, 1e6 * published.mean_error
+    return [*lines, f"{'m':13}{'um':6}{m[0]:15.4f}{'':13}{m[1]:15.4f}"]
+
+
+def refraction_lines() -> list[str]:
+    """Compare refraction with that of ERFA."""
+    degrees = np.array([10.0, 30.0, 45.0, 60.0, 70.0, 74.0, 75.0, 80.0])
+    z = np.radians(degrees)
+    a, b = erfa.refco(1013.25, 0.0, 0.0, 0.574)
+    ours = refraction(z, Air(273.15, 760.0), observed=True) / ARCSEC
+    theirs = (a * np.tan(z) + b * np.tan(z) ** 3) / ARCSEC
+    lines = [f"{'z deg':>6}{'report':>12}{'refco':>12}{'difference':>12}  arcsec"]
+    rows = zip(degrees, ours, theirs, strict=True)
+    return lines + [f"{d:6.0f}{r:12.3f}{e:12.3f}{r - e:12.3f}" for d, r, e in rows]
+
+
+def night_lines() -> list[str]:
+    """Show the figures and the camera of the packaged night."""
+    _, (_, figures), (_, camera) = night_summary(night())
+    return [*figures, "", *camera]
+
+
+BLOCKS = {
+    "adjustment": adjustment_lines,
+    "parameters": parameter_lines,
+    "refraction": refraction_lines,
+    "night": night_lines,
+}

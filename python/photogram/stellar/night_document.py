@@ -1,0 +1,137 @@
+"""The JSON document of a calibrated night; `docs/stellar-camera.md` describes it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import orjson
+
+from photogram import _photocore
+from photogram.angles import ARCSEC
+from photogram.stellar.cameras import BrownCamera
+from photogram.stellar.night import CalibratedNight
+
+__all__ = ["axis_of", "to_json"]
+
+_FORMAT = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
+
+
+def axis_of(attitude: np.ndarray) -> tuple[float, float]:
+    """Return azimuth (from south, positive west) and elevation of the axis, radians."""
+    alpha, omega = float(attitude[0]), float(attitude[1])
+    north, east = math.sin(alpha) * math.cos(omega), math.sin(omega)
+    zenith = math.cos(alpha) * math.cos(omega)
+    return math.atan2(-east, -north) % math.tau, math.atan2(zenith, math.hypot(north, east))
+
+
+def to_json(result: CalibratedNight) -> bytes:
+    """Return the whole result as JSON (UTF-8). What is not a number is null."""
+    found, night = result.calibration, result.night
+    errors = np.sqrt(np.diag(result.camera.covariance))
+    return orjson.dumps(
+        {
+            "program": f"photogram {_photocore.__version__}",
+            "title": night.title,
+            "conventions": {
+                "frame": "north, east, zenith (left-handed); azimuth from south, positive west",
+                "pixels": "right and down",
+                "residual": "measured minus computed; of stars adjusted minus catalogue",
+                "standardized": "residual over its mean error",
+                "covariance": "cofactors times m squared, in the units of the parameters",
+            },
+            "m": found.mean_error,
+            "m_unit": "standard deviation of an image coordinate",
+            "sd_px": night.pixel_sd,
+            "degrees_of_freedom": found.degrees_of_freedom,
+            "iterations": found.iterations,
+            "stop": found.status,
+            "converged": result.converged,
+            "messages": [str(message) for message in result.messages],
+            "parameters": {
+                name: {
+                    "value": float(value),
+                    "mean_error": float(error),
+                    "unit": "pixel" if name[0] in "fc" else "",
+                }
+                for name, value, error in zip(BrownCamera.NAMES, result.camera.values, errors, strict=True)
+            },
+            "covariance": {"order": BrownCamera.NAMES, "matrix": result.camera.covariance},
+            "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],
+            "significance": result.significance(),
+            "exposures": _exposures(result),
+            "stars": _stars(result),
+            "images": _images(result),
+        },
+        option=_FORMAT,
+    )
+
+
+def _exposures(result: CalibratedNight) -> list[dict[str, Any]]:
+    found = result.calibration
+    return [
+        {
+            "name": name,
+            "utc": exposure.utc,
+            "alpha_omega_kappa_rad": attitude,
+            "covariance": covariance,
+            "covariance_with_camera": cross,
+            "azimuth_deg": math.degrees(axis_of(attitude)[0]),
+            "elevation_deg": math.degrees(axis_of(attitude)[1]),
+            "images": len(exposure.xy),
+            "identified": identified,
+            "rejected": rejected,
+        }
+        for name, exposure, attitude, covariance, cross, identified, rejected in zip(
+            result.names,
+            result.exposures,
+            found.attitudes,
+            found.attitude_covariances,
+            found.cross_covariances,
+            result.identified.tolist(),
+            result.rejected.tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _stars(result: CalibratedNight) -> list[dict[str, Any]]:
+    """List the stars that were estimated."""
+    found, ids = result.calibration, result.night.catalogue.ids
+    rows = zip(
+        found.catalogue.tolist(),
+        (found.star_residuals / ARCSEC).tolist(),
+        found.star_redundancy.tolist(),
+        found.star_standardized.tolist(),
+        strict=True,
+    )
+    return [
+        {"id": ids[star], "residual": residual, "redundancy": redundancy, "standardized": standardized}
+        for star, residual, redundancy, standardized in rows
+        if not math.isnan(residual[0])
+    ]
+
+
+def _images(result: CalibratedNight) -> list[dict[str, Any]]:
+    found, ids = result.calibration, result.night.catalogue.ids
+    rows = zip(
+        found.exposures.tolist(),
+        found.stars.tolist(),
+        found.xy.tolist(),
+        found.residuals.tolist(),
+        found.redundancy.tolist(),
+        found.standardized.tolist(),
+        strict=True,
+    )
+    return [
+        {
+            "exposure": result.names[exposure],
+            "star": ids[star],
+            "xy_px": xy,
+            "residual_px": residual,
+            "redundancy": redundancy,
+            "standardized": standardized,
+        }
+        for exposure, star, xy, residual, redundancy, standardized in rows
+    ]

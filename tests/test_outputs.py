@@ -1,0 +1,46 @@
+"""No command writes its results over what it has read."""
+
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from photogram import InputError
+from photogram.cli import app
+from photogram.files import spare
+
+EXAMPLES = Path(str(files("photogram") / "examples"))
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("perspective-center", "perspective_center/grid.deck", "--json"),
+        ("perspective-center", "perspective_center/grid.deck", "--listing"),
+        ("absolute-orientation", "absolute_orientation/stations.csv", "--json"),
+        ("absolute-orientation", "absolute_orientation/stations.csv", "--listing"),
+        ("comparator", "comparator/comparator-3.txt", "--no-pictures", "--json"),
+        ("stellar-camera", "stellar/plate.toml", "--json"),
+        ("stellar-camera", "exposures", "exposures/night.toml", "--json"),
+    ],
+)
+def test_inputs_are_spared(tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    name = next(word for word in command if "/" in word)
+    for file in (EXAMPLES / name).parent.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    words = [Path(word).name if "/" in word else word for word in command]
+    given = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    run = CliRunner().invoke(app, [*words, Path(name).name])
+    assert run.exit_code == 1, run.output
+    assert "would be written over the input" in run.output
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == given
+
+
+def test_another_name_of_an_input_is_known(tmp_path):
+    (tmp_path / "a").write_text("a")
+    (tmp_path / "link").symlink_to("a")
+    spare([tmp_path / "new"], [tmp_path / "a", tmp_path / "missing"])
+    with pytest.raises(InputError, match="would be written over the input"):
+        spare([tmp_path / "link"], [tmp_path / "a"])
