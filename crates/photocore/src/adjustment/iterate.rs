@@ -326,7 +326,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let residuals = self.problem.residuals(self.pool, values);
             self.problem.sum_of_squares(&residuals) + self.problem.prior_sum_of_squares(values)
         };
-        let lower = self.problem.model.relocate(&mut other) && sum(&other) < sum(&unknowns);
+        let relocated = self.pool.install(|| self.problem.model.relocate(&mut other));
+        let lower = relocated && sum(&other) < sum(&unknowns);
         if lower { other } else { unknowns }
     }
 
@@ -413,7 +414,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
         let start = Instant::now();
-        let equations = Linearized::new(self.problem, &unknowns);
+        let equations = self.pool.install(|| Linearized::new(self.problem, &unknowns));
         let prior = self.problem.prior_equations(&unknowns);
         let total = self.problem.layout().locals();
         let mut between = between(&mut *self.watch, Phase::Form, total);

@@ -86,7 +86,7 @@ impl<M: Model> Problem<M> {
     pub(super) fn residuals(&self, pool: &ThreadPool, values: &[f64]) -> Vec<f64> {
         let layout = self.layout();
         let rows = layout.rows();
-        let prepared = self.model.prepare(values);
+        let prepared = pool.install(|| self.model.prepare(values));
         let residuals_of = |local: usize| {
             let groups = layout.groups_of(local);
             let mut residuals = vec![0.0; groups.len() * rows];

@@ -1,5 +1,7 @@
 //! Coordinates of points by intersection of their rays from given photographs.
 
+use rayon::prelude::*;
+
 use super::model::CentralPerspective;
 use crate::geometry::vector::{difference, dot, solve, square};
 use crate::geometry::{Photo, Point, Ray, Vector3};
@@ -17,23 +19,21 @@ impl CentralPerspective {
     /// # Errors
     /// The point whose rays give it no place.
     pub fn intersect(&self, photos: &[Photo]) -> Result<Vec<Vector3>, usize> {
-        let points = 0..self.points.len();
-        let met: Vec<Option<Vector3>> = points.clone().map(|point| meet(&self.rays(photos, point))).collect();
+        let points = || (0..self.points.len()).into_par_iter().with_min_len(64);
+        let met: Vec<Option<Vector3>> = points().map(|point| meet(&self.rays(photos, point))).collect();
         let distance = self.median_distance(photos, &met);
-        let mut coordinates = Vec::with_capacity(self.points.len());
-        for (point, met) in points.zip(met) {
+        let place = |point: usize| {
+            let met = met[point];
             let position = met.or_else(|| Some(along(self.rays(photos, point).first()?, distance?)));
             let start = match position {
                 Some(position) => self.space.coordinates(position),
                 None => self.points[point].coordinates,
             };
             let placed = self.hold(photos, point, start);
-            if placed.iter().any(|value| !value.is_finite()) {
-                return Err(point);
-            }
-            coordinates.push(placed);
-        }
-        Ok(coordinates)
+            if placed.iter().all(|value| value.is_finite()) { Ok(placed) } else { Err(point) }
+        };
+        let placed: Vec<Result<Vector3, usize>> = points().map(place).collect();
+        placed.into_iter().collect()
     }
 
     fn rays(&self, photos: &[Photo], point: usize) -> Vec<Ray> {

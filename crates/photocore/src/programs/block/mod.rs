@@ -5,6 +5,7 @@
 
 mod initial;
 mod model;
+mod neighbourhood;
 mod screening;
 mod solution;
 
@@ -160,11 +161,13 @@ impl Block {
             return Err(BlockError::Empty);
         }
         let origin = self.origin();
-        let problem = self.problem(options, &points, images, origin)?;
+        let problem = pool.install(|| self.problem(options, &points, images, origin))?;
         let adjusted =
             adjustment::adjust(&problem, &options.adjustment, pool, watch).map_err(|error| match error {
                 AdjustError::UndeterminedLocals(locals) => {
-                    BlockError::UndeterminedPoints(locals.into_iter().map(|local| points[local]).collect())
+                    let mut points: Vec<usize> = locals.into_iter().map(|local| points[local]).collect();
+                    points.sort_unstable();
+                    BlockError::UndeterminedPoints(points)
                 }
                 AdjustError::Undetermined(combinations) => BlockError::UndeterminedPhotos(combinations),
                 AdjustError::NotFinite => BlockError::NotFinite,
@@ -238,7 +241,7 @@ impl Block {
     }
 }
 
-/// The points that take part, and what was left out.
+/// The points that take part, neighbours together, and what was left out.
 struct Screened {
     points: Vec<usize>,
     images: PointImages,

@@ -1,5 +1,7 @@
 //! The observation equations of a block.
 
+use rayon::prelude::*;
+
 use super::Image;
 use crate::adjustment::Model;
 use crate::geometry::{ObjectSpace, Photo, Point, Projection, Refraction, RotationSense, Vertical};
@@ -72,8 +74,9 @@ impl Model for CentralPerspective {
             at_photos: verticals(&refraction, self.space, photos.as_chunks::<6>().0),
             at_points: verticals(&refraction, self.space, coordinates),
         });
-        let points = coordinates.iter().map(|&coordinates| Point::new(self.space, coordinates));
-        Stations { photos: self.photos(photos), points: points.collect(), refracted }
+        let points = coordinates.par_iter().with_min_len(1024);
+        let points = points.map(|&coordinates| Point::new(self.space, coordinates)).collect();
+        Stations { photos: self.photos(photos), points, refracted }
     }
 
     /// Intersects the points anew.

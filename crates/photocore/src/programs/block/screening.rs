@@ -39,13 +39,11 @@ impl Block {
     /// A point on one photograph stays when at most one of its components is not held: then there are at least four equations for
     /// three unknowns (specification, open point 21).
     pub(super) fn screen(&self) -> Screened {
-        let mut images_of = vec![Vec::new(); self.points.len()];
-        for (index, image) in self.images.iter().enumerate() {
-            images_of[image.point].push(index);
-        }
+        let all = self.point_images();
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
         let mut images = PointImages { start: vec![0], order: Vec::with_capacity(self.images.len()) };
-        for (point, own) in images_of.into_iter().enumerate() {
+        for point in self.along_curve(&all) {
+            let own = all.of(point);
             let first_photo = own.first().map(|&image| self.images[image].photo);
             let one_photo = own.iter().all(|&image| Some(self.images[image].photo) == first_photo);
             let held = self.points[point].held().into_iter().filter(|&held| held).count();
@@ -63,6 +61,29 @@ impl Block {
                 images.start.push(images.order.len());
             }
         }
+        dropped.sort_unstable_by_key(|dropped| dropped.point);
         Screened { points, images, dropped }
+    }
+
+    /// The images of every point.
+    fn point_images(&self) -> PointImages {
+        let mut start = vec![0; self.points.len() + 1];
+        self.images.iter().for_each(|image| start[image.point + 1] += 1);
+        for point in 0..self.points.len() {
+            start[point + 1] += start[point];
+        }
+        let (mut next, mut order) = (start.clone(), vec![0; self.images.len()]);
+        for (index, image) in self.images.iter().enumerate() {
+            order[next[image.point]] = index;
+            next[image.point] += 1;
+        }
+        PointImages { start, order }
+    }
+}
+
+impl PointImages {
+    /// The images of the i-th point.
+    pub fn of(&self, i: usize) -> &[usize] {
+        &self.order[self.start[i]..self.start[i + 1]]
     }
 }
