@@ -292,6 +292,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 let last = Some((iteration, solved.step));
                 return Ok(End { status: Status::Converged, unknowns, basis: Some(solved.basis), last });
             }
+            solved.basis.factor.recycle(&self.problem.system);
             let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
             let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
             let far = solved.change > FAR * (unknowns.len() as f64).sqrt();

@@ -5,7 +5,7 @@ use crate::normals::{Equations, GroupRows, Layout, Prior, System};
 /// How observations follow from unknowns.
 pub trait Model: Sync {
     /// What several observations share, computed once for each set of values of the unknowns.
-    type Prepared: Sync;
+    type Prepared: Send + Sync;
 
     /// Prepares for the given unknowns (in the order of the layout). Called on a thread of the pool, as is [`Model::relocate`].
     fn prepare(&self, unknowns: &[f64]) -> Self::Prepared;

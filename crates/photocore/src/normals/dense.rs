@@ -5,12 +5,13 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::reborrow::{Reborrow, ReborrowMut};
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, MatMut, MatRef, Par};
 use pulp::Simd;
 use rayon::prelude::*;
 
 use super::triangle::PIVOT_TOLERANCE;
 use super::vectorised::{Kernel, run_unsized};
+use super::workspace::Workspace;
 
 /// Columns factored at a time.
 const STEP: usize = 48;
@@ -124,30 +125,35 @@ impl Kernel for Cholesky<'_> {
 /// `z` of the coupled rows (full square), replaces the panel by that of the inverse:
 ///
 /// Y = L_R L_J^-1, Z_RJ = -Z_RR Y, Z_JJ = (L_J L_J^T)^-1 - Y^T Z_RJ.
-pub(super) fn invert_front(mut panel: MatMut<'_, f64>, z: MatRef<'_, f64>) {
+pub(super) fn invert_front(mut panel: MatMut<'_, f64>, z: MatRef<'_, f64>, workspace: &Workspace) {
     let (height, width) = (panel.nrows(), panel.ncols());
     let below_rows = height - width;
     let (mut own, mut below) = panel.rb_mut().split_at_row_mut(width);
-    let mut y = below.rb().to_owned();
+    let mut y_values = workspace.any(below_rows * width);
+    let mut y = MatMut::from_column_major_slice_mut(&mut y_values, below_rows, width);
+    y.copy_from(below.rb());
     let factor = own.rb();
-    for_tiles(row_tiles(y.as_mut()), width * width * below_rows / 2, |_, tile| {
+    for_tiles(row_tiles(y.rb_mut()), width * width * below_rows / 2, |_, tile| {
         solve_upper_triangular_in_place(factor.transpose(), tile.transpose_mut(), Par::Seq);
     });
     for_tiles(row_tiles(below.rb_mut()), width * below_rows * below_rows, |first, tile| {
         let rows = z.subrows(first, tile.nrows());
-        matmul(tile, Accum::Replace, rows, y.as_ref(), -1.0, Par::Seq);
+        matmul(tile, Accum::Replace, rows, y.rb(), -1.0, Par::Seq);
     });
-    let mut inverse = Mat::<f64>::zeros(width, width);
-    invert_lower_triangular(inverse.as_mut(), factor, Par::Seq);
-    let (inverse, below) = (inverse.as_ref(), below.rb());
+    let mut inverse_values = workspace.zeros(width * width);
+    let mut inverse = MatMut::from_column_major_slice_mut(&mut inverse_values, width, width);
+    invert_lower_triangular(inverse.rb_mut(), factor, Par::Seq);
+    let (inverse, below) = (inverse.rb(), below.rb());
     for_tiles(column_tiles(own.rb_mut()), width * width * height, |first, mut tile| {
         let columns = tile.ncols();
         // Rows of L_J^-1 above its diagonal are zero: the product over them is left out.
         let right = inverse.subcols(first, columns).subrows(first, width - first);
         let left = inverse.subrows(first, width - first).transpose();
         matmul(tile.rb_mut(), Accum::Replace, left, right, 1.0, Par::Seq);
-        matmul(tile, Accum::Add, y.as_ref().transpose(), below.subcols(first, columns), -1.0, Par::Seq);
+        matmul(tile, Accum::Add, y.rb().transpose(), below.subcols(first, columns), -1.0, Par::Seq);
     });
+    workspace.put_back(y_values);
+    workspace.put_back(inverse_values);
 }
 
 fn row_tiles(matrix: MatMut<'_, f64>) -> Vec<(usize, MatMut<'_, f64>)> {

@@ -101,7 +101,8 @@ impl System {
 impl<E: Equations> Formation<'_, E> {
     fn factor(&self) -> Factor {
         let symbolic = &self.system.symbolic;
-        let mut panels = Panels::zeros(Arc::clone(symbolic));
+        let values = self.system.workspace.zeros(symbolic.values());
+        let mut panels = Panels { symbolic: Arc::clone(symbolic), values };
         let updates = Handover::new(symbolic.supernode_count());
         let visited = Handover::new(symbolic.supernode_count());
         let divided = panels.divide();
@@ -121,7 +122,7 @@ impl<E: Equations> Formation<'_, E> {
             deficient_locals: Vec::new(),
             formation_share: 1.0,
         };
-        let homeless = self.assemble(&mut Front::new(0, 0, &mut []), symbolic.supernode_count());
+        let homeless = self.assemble(&mut Front::new(0, 0, &mut [], Vec::new()), symbolic.supernode_count());
         factor.add(homeless);
         let (mut formation, mut factorisation) = (0.0, 0.0);
         for visited in visited.into_values().flatten() {
@@ -145,10 +146,12 @@ impl<E: Equations> Formation<'_, E> {
         let symbolic = &*self.system.symbolic;
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
-        let mut front = Front::new(s.width, s.height(), panel);
+        let update = self.system.workspace.zeros(s.below() * s.below());
+        let mut front = Front::new(s.width, s.height(), panel, update);
         for &child in &s.children {
             if let Some(update) = updates.take(child) {
                 front.add(&update, &symbolic.rows_in_parent(child));
+                self.system.workspace.put_back(update.matrix);
             }
         }
         let sums = self.assemble(&mut front, index);
@@ -290,6 +293,11 @@ impl Factor {
         self.sum_of_squares += sums.sum_of_squares;
         self.decrease += sums.decrease;
         self.deficient_locals.extend(sums.deficient);
+    }
+
+    /// Gives its memory back to the system that it is of, for the next one.
+    pub fn recycle(self, system: &System) {
+        system.workspace.put_back(self.panels.values);
     }
 
     /// The combinations of unknowns that the equations do not determine, if any.

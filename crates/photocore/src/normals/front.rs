@@ -25,10 +25,9 @@ pub(super) struct Front<'a> {
 }
 
 impl<'a> Front<'a> {
-    pub fn new(width: usize, height: usize, panel: &'a mut [f64]) -> Self {
-        let below = height - width;
-        let (right, diagonal) = (vec![0.0; height], vec![0.0; height]);
-        Self { width, height, panel, update: vec![0.0; below * below], right, diagonal }
+    /// A front of zeros, but for the panel; `update` must hold as many zeros as its square takes.
+    pub fn new(width: usize, height: usize, panel: &'a mut [f64], update: Vec<f64>) -> Self {
+        Self { width, height, panel, update, right: vec![0.0; height], diagonal: vec![0.0; height] }
     }
 
     /// All columns.

@@ -125,21 +125,25 @@ impl<E: Equations> Walk<'_, E> {
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
         let (height, width) = (s.height(), s.width);
-        let mut front = vec![0.0; height * height];
+        let workspace = &self.system.workspace;
+        let mut front = workspace.any(height * height);
         if let Some(parent) = above.take(index) {
             take_coupled_rows(symbolic, index, &parent, &mut front);
+            Arc::into_inner(parent).into_iter().for_each(|last| workspace.put_back(last));
         }
         let z = MatRef::from_column_major_slice(&front, height, height);
         let below = z.submatrix(width, width, height - width, height - width);
-        invert_front(MatMut::from_column_major_slice_mut(panel, height, width), below);
+        invert_front(MatMut::from_column_major_slice_mut(panel, height, width), below, workspace);
         for (j, column) in panel.chunks_exact(height.max(1)).enumerate() {
             front[j * height + j..(j + 1) * height].copy_from_slice(&column[j..]);
             (j..height).for_each(|i| front[i * height + j] = column[i]);
         }
         let seconds = start.elapsed().as_secs_f64();
         let front = Arc::new(front);
+        let at_home = self.at_home(index, &front, height);
         s.children.iter().for_each(|&child| above.put(child, Arc::clone(&front)));
-        (self.at_home(index, &front, height), seconds)
+        Arc::into_inner(front).into_iter().for_each(|last| workspace.put_back(last));
+        (at_home, seconds)
     }
 
     fn at_home(&self, index: usize, front: &[f64], height: usize) -> AtHome {

@@ -32,6 +32,7 @@ mod tree;
 mod triangle;
 mod vectorised;
 mod watch;
+mod workspace;
 
 pub use cofactors::Cofactors;
 pub use equations::{Equations, GroupRows, Prior};

@@ -13,11 +13,6 @@ pub(super) struct Panels {
 }
 
 impl Panels {
-    pub fn zeros(symbolic: Arc<Symbolic>) -> Self {
-        let values = vec![0.0; symbolic.values()];
-        Self { symbolic, values }
-    }
-
     /// The panel of a supernode.
     pub fn panel(&self, supernode: usize) -> &[f64] {
         &self.values[self.symbolic.supernodes()[supernode].panel.clone()]

@@ -7,6 +7,7 @@ use super::layout::Layout;
 use super::ordering::Ordering;
 use super::symbolic::Symbolic;
 use super::tree::Tree;
+use super::workspace::Workspace;
 
 /// A system ready to be formed again and again: the pattern and the order are found once.
 #[derive(Debug)]
@@ -15,6 +16,7 @@ pub struct System {
     pub(super) symbolic: Arc<Symbolic>,
     pub(super) incidence: Incidence,
     pub(super) tree: Tree,
+    pub(super) workspace: Workspace,
 }
 
 impl System {
@@ -28,7 +30,7 @@ impl System {
             supernode.operations() + formation.sum::<f64>()
         };
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());
-        Self { layout, symbolic, incidence, tree }
+        Self { layout, symbolic, incidence, tree, workspace: Workspace::default() }
     }
 
     /// The unknowns and groups.
