@@ -84,7 +84,7 @@ class AdjustedBlock:
     messages
         Remarks on the block that did not stop the adjustment.
     initial_weighted_sum_of_squares, iterations
-        The history.
+        The history; with a robust loss, sums of losses.
     sums_of_squares, degrees_of_freedom
         Weighted sums by group, and the degrees of freedom of the chosen unit variance.
     unit_variance
@@ -117,6 +117,8 @@ class AdjustedBlock:
     standardized
         (m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight (Baarda's w);
         NaN without redundancy.
+    image_weights
+        (m,) factor by which a robust loss has changed the weight of an image point; 1 without a loss.
     dropped
         Points left out, with the reason.
     ordering, photo_order, predictions
@@ -149,6 +151,7 @@ class AdjustedBlock:
     residuals: Floats
     redundancy: Floats
     standardized: Floats
+    image_weights: Floats
     dropped: Mapping[str, str]
     ordering: str
     predictions: Mapping[str, float]
@@ -185,6 +188,7 @@ class AdjustedBlock:
             residuals=solution.residuals,
             redundancy=solution.redundancy,
             standardized=solution.standardized,
+            image_weights=solution.image_weights,
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
             ordering=solution.ordering,
             predictions=solution.predictions,

@@ -1,0 +1,8 @@
+"""Collections of photos of unknown cameras: bundle adjustment "in the large", with the covariance of every result."""
+
+from photogram.collection.adjust import adjust
+from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.bal import read, to_bytes
+from photogram.collection.collection import PARAMETERS, Collection
+
+__all__ = ["PARAMETERS", "AdjustedCollection", "Collection", "adjust", "read", "to_bytes"]
