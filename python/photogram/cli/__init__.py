@@ -14,6 +14,7 @@ import typer
 from photogram.cli import (
     absolute_orientation,
     check,
+    collection,
     comparator,
     giant,
     perspective_center,
@@ -51,6 +52,7 @@ orientation_app.command("transform")(absolute_orientation.transform)
 app.add_typer(giant_app)
 app.add_typer(orientation_app)
 app.add_typer(comparator_app)
+app.command("collection")(collection.collection)
 app.command("perspective-center")(perspective_center.perspective_center)
 app.command("stellar-camera")(stellar_camera.stellar_camera)
 app.command()(plan.plan)

@@ -4,5 +4,6 @@ from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.bal import read, to_bytes
 from photogram.collection.collection import PARAMETERS, Collection
+from photogram.collection.simulation import Simulation, simulate
 
-__all__ = ["PARAMETERS", "AdjustedCollection", "Collection", "adjust", "read", "to_bytes"]
+__all__ = ["PARAMETERS", "AdjustedCollection", "Collection", "Simulation", "adjust", "read", "simulate", "to_bytes"]

@@ -4,8 +4,10 @@
 /// point), in what is minimised; `scale` is the root of s at which it sets in, in standard deviations a priori.
 ///
 /// The observations of a group are reweighted by the slope of the loss in every iteration (iteratively reweighted least
-/// squares), which gives the gradient of the loss exactly. Both losses are concave in s, so the second-order term of Triggs
-/// (2000, section 4.3) is not positive; it is left out, as Ceres does, and the normal matrix stays positive definite.
+/// squares), which gives the gradient of the loss exactly. Both losses are concave in s, so that the reweighted sum lies nowhere
+/// below the loss and a step that lowers the one lowers the other. The second-order term of Triggs and others (2000, section
+/// 4.3) is left out, as Ceres does: it takes nearly all weight from what fits badly along its residual, and far starts then end in
+/// wrong places. The price is linear convergence at the end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Loss {
     /// Huber 1964: s, and beyond scale^2 a straight line in the root of s: 2 scale sqrt(s) - scale^2.
