@@ -171,7 +171,7 @@ def adjust(
     messages = _messages(block, solution) + remark(row, solution.image_weights)
     if as_published:
         messages += _rises([Iteration(*row) for row in solution.iterations])
-    return Result.from_solution(block, solution, unit_variance, messages)
+    return Result.from_solution(block, solution, unit_variance, row, messages)
 
 
 def teller(

@@ -36,7 +36,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 #[pyfunction]
 fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> Bound<'py, PyArray1<f64>> {
-    let number = |word: &[u8]| str::from_utf8(word).ok()?.parse().ok().filter(|value: &f64| value.is_finite());
+    let number =
+        |word: &[u8]| str::from_utf8(word).ok()?.parse().ok().filter(|value: &f64| value.is_finite());
     let words = || text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     PyArray1::from_vec(py, py.detach(|| words().map_while(number).collect()))
 }

@@ -2,7 +2,7 @@
 
 use rayon::ThreadPool;
 
-use super::loss::Loss;
+use super::loss::Reweighting;
 use crate::normals::{Equations, GroupRows, Layout, Prior, System};
 
 /// How observations follow from unknowns.
@@ -86,15 +86,20 @@ pub(super) struct Linearized<'a, M: Model> {
     prepared: M::Prepared,
     /// Which unknowns are fixed or held; None where none is.
     fixed: Option<Vec<bool>>,
-    loss: Option<Loss>,
+    reweighting: Option<Reweighting>,
 }
 
 impl<'a, M: Model> Linearized<'a, M> {
-    pub fn new(problem: &'a Problem<M>, values: &[f64], held: &[usize], loss: Option<Loss>) -> Self {
+    pub fn new(
+        problem: &'a Problem<M>,
+        values: &[f64],
+        held: &[usize],
+        reweighting: Option<Reweighting>,
+    ) -> Self {
         let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
         held.iter().for_each(|&unknown| fixed[unknown] = true);
         let fixed = fixed.contains(&true).then_some(fixed);
-        Self { problem, prepared: problem.model.prepare(values), fixed, loss }
+        Self { problem, prepared: problem.model.prepare(values), fixed, reweighting }
     }
 
     /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).
@@ -140,12 +145,8 @@ impl<M: Model> Equations for Linearized<'_, M> {
                 part[row * width..][..width].iter_mut().for_each(|value| *value *= weight);
             }
         }
-        if let Some(loss) = self.loss {
-            let square = dot(rows.constant, rows.constant);
-            let factor = loss.weight(square).sqrt();
-            for part in [&mut *rows.constant, &mut *rows.local, &mut *rows.kept, &mut *rows.border] {
-                part.iter_mut().for_each(|value| *value *= factor);
-            }
+        if let Some(reweighting) = self.reweighting {
+            reweighting.apply(rows);
         }
         if let Some(fixed) = &self.fixed {
             let start = layout.border_range().start;

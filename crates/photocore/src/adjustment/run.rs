@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
+use super::loss::Reweighting;
 use super::options::{Criterion, Event, Iteration, Options, Phase, Status};
 use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
@@ -34,6 +35,7 @@ pub fn adjust<M: Model>(
         history: vec![problem.initial[problem.layout().all_locals().end..].to_vec()],
         last_local_corrections: vec![0.0; problem.layout().all_locals().len()],
         datum: vec![],
+        curved: false,
     };
     let damping = if matches!(options.criterion, Criterion::Decrease(_)) { FIRST_DAMPING } else { 0.0 };
     let start = run.form(problem.initial.clone(), damping)?;
@@ -50,6 +52,10 @@ pub fn adjust<M: Model>(
     run.finish(end, initial_sum_of_squares)
 }
 
+/// A step that changes the unknowns by less than this multiple of their standard deviations leads to where the second-order term of
+/// a loss does no harm.
+const SHORT: f64 = 1.0;
+
 /// The problem linearized at some values, and its normal equations.
 pub(super) struct State<'a, M: Model> {
     pub unknowns: Vec<f64>,
@@ -57,6 +63,8 @@ pub(super) struct State<'a, M: Model> {
     pub prior: Prior,
     pub normals: Normals,
     pub damping: f64,
+    /// Whether the second-order term of the loss is taken in.
+    pub curved: bool,
     pub sum_of_squares: f64,
 }
 
@@ -104,13 +112,18 @@ pub(super) struct Run<'a, 'w, M: Model> {
     last_local_corrections: Vec<f64>,
     /// Unknowns held for a datum; empty until the iterations are over.
     pub datum: Vec<usize>,
+    /// Whether to take in the second-order term of the loss from now on: once the steps are short.
+    pub curved: bool,
 }
 
 impl<'a, M: Model> Run<'a, '_, M> {
-    /// Ends at the values reached, without a further step.
+    /// Ends at the values reached, without a further step. Cofactors are those of the reweighted equations, whose weights can be
+    /// told, without second-order term.
     pub(super) fn stay(&mut self, state: State<'a, M>, status: Status) -> Result<End<'a, M>, AdjustError> {
         let unknowns = state.unknowns.clone();
-        let state = if state.damping == 0.0 { state } else { self.form(state.unknowns, 0.0)? };
+        let plain = state.damping == 0.0 && !state.curved;
+        self.curved = false;
+        let state = if plain { state } else { self.form(state.unknowns, 0.0)? };
         match self.factor(state.normals) {
             Ok(factor) => {
                 let basis = Some(Basis { equations: state.equations, prior: state.prior, factor });
@@ -153,7 +166,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
         let start = Instant::now();
-        let equations = Linearized::new(self.problem, &unknowns, &self.datum, self.options.loss);
+        let reweighting = self.options.loss.map(|loss| Reweighting { loss, curved: self.curved });
+        let equations = Linearized::new(self.problem, &unknowns, &self.datum, reweighting);
         let prior = self.problem.prior_equations(&unknowns, &self.datum);
         let total = self.problem.layout().locals();
         let formed = {
@@ -167,7 +181,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         };
         self.seconds.form += start.elapsed().as_secs_f64();
         self.formations += 1;
-        Ok(State { unknowns, equations, prior, normals, damping, sum_of_squares })
+        Ok(State { unknowns, equations, prior, normals, damping, curved: self.curved, sum_of_squares })
     }
 
     fn factor(&mut self, normals: Normals) -> Result<Factor, AdjustError> {
@@ -275,6 +289,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let corrections =
             before[locals.clone()].iter().zip(&after[locals.clone()]).map(|(from, to)| to - from);
         self.last_local_corrections = corrections.collect();
+        self.curved = self.options.loss.is_some() && iteration.largest_change <= SHORT;
         self.history.push(after[locals.end..].to_vec());
         self.iterations.push(iteration);
         stopped((self.watch)(Event::Iteration(iteration)))

@@ -29,7 +29,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut state = start;
         let mut best = state.sum_of_squares;
         while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
-            let (unknowns, damping) = (state.unknowns.clone(), state.damping);
+            let (unknowns, damping, curved) = (state.unknowns.clone(), state.damping, state.curved);
             let harder = (10.0 * damping).max(FIRST_DAMPING);
             let Some(solved) = self.solve_unless_lost(state)? else {
                 state = self.form(unknowns, harder)?;
@@ -38,6 +38,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let number = self.iterations.len() + 1;
             let iteration =
                 Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
+            if damping == 0.0 && solved.change <= fraction && curved {
+                return self.stay_after(iteration, &unknowns, &solved.step);
+            }
             if damping == 0.0 && solved.change <= fraction {
                 let last = Some((iteration, solved.step));
                 return Ok(End {
@@ -73,5 +76,20 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let lower =
             self.problem.model.relocate(&mut other) && self.objective(&other) < self.objective(&unknowns);
         if lower { other } else { unknowns }
+    }
+
+    /// Takes the last step and ends there.
+    fn stay_after(
+        &mut self,
+        last: Iteration,
+        unknowns: &[f64],
+        step: &[f64],
+    ) -> Result<End<'a, M>, AdjustError> {
+        let values: Vec<f64> = unknowns.iter().zip(step).map(|(x, dx)| x + dx).collect();
+        let sum_of_squares = self.objective(&values);
+        self.accept(Iteration { sum_of_squares, ..last }, unknowns, &values)?;
+        self.curved = false;
+        let state = self.form(values, 0.0)?;
+        self.stay(state, Status::Converged)
     }
 }

@@ -95,6 +95,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         if !self.options.covariance {
             return Ok(End { status, unknowns, basis: None, undetermined: None, last: None });
         }
+        self.curved = false;
         let state = self.form(unknowns, 0.0)?;
         let end = self.stay(state, status)?;
         Ok(End { status, ..end })
