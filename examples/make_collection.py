@@ -1,6 +1,6 @@
 """Build the packaged example `collection`: eight simulated photos around sixty points.
 
-    python examples/make_collection.py
+python examples/make_collection.py
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ SEED = 2010
 
 
 def main() -> None:
-    """Write the example; image coordinates to a hundredth of a pixel, initial values to what their coarseness deserves."""
+    """Write the example, with no more digits than the numbers deserve."""
     made = simulate(coarseness=2.0, seed=SEED).collection
     rounded = made.replace(
         photo_parameters=np.round(made.photo_parameters, 4),

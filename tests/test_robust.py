@@ -7,13 +7,19 @@ import json
 import numpy as np
 import pytest
 
-from photogram import InputError, adjust, simulate
+from photogram import AsPublished, InputError, adjust, simulate
 
 
 @pytest.fixture(scope="module")
 def simulation():
     return simulate(
-        strips=2, photos_per_strip=5, points_per_photo=40, control="corners", check_points=0, seed=4, blunders=8
+        strips=2,
+        photos_per_strip=5,
+        points_per_photo=40,
+        control="corners",
+        check_points=0,
+        seed=4,
+        blunders=8,
     )
 
 
@@ -26,12 +32,14 @@ def test_gross_errors_hardly_move_a_robust_adjustment(simulation, loss):
     plain, robust = adjust(simulation.block), adjust(simulation.block, loss=loss)
     assert robust.converged
     assert errors(robust, simulation) < 0.5 * errors(plain, simulation)
-    assert robust.variance_of_unit_weight < 0.2 * plain.variance_of_unit_weight
+    assert robust.variance_of_unit_weight < 0.3 * plain.variance_of_unit_weight
     assert any("modified weights" in message.text for message in robust.messages)
     used = robust.used_images
     assert ((robust.image_weights[used] > 0) & (robust.image_weights[used] <= 1)).all()
     assert (robust.image_weights[used] < 0.5).sum() < 30
-    weighted = (robust.image_weights[:, None] * (robust.residuals / simulation.block.image_sd) ** 2)[used].sum()
+    weighted = (robust.image_weights[:, None] * (robust.residuals / simulation.block.image_sd) ** 2)[
+        used
+    ].sum()
     assert robust.sums_of_squares.plates == pytest.approx(weighted, rel=1e-9)
     document = json.loads(robust.to_json())
     assert document["loss"] == {"name": loss, "scale": robust.loss[1]}
@@ -56,6 +64,7 @@ def test_without_a_loss_all_weights_stand(simulation):
 
 
 def test_options_that_cannot_be_are_refused(simulation):
-    for options in ({"loss": "l1"}, {"scale": 1.0}, {"loss": "huber", "scale": 0.0}):
+    published = {"loss": "huber", "as_published": AsPublished()}
+    for options in ({"loss": "l1"}, {"scale": 1.0}, {"loss": "huber", "scale": 0.0}, published):
         with pytest.raises(InputError):
             adjust(simulation.block, **options)

@@ -1033,8 +1033,8 @@ def bundler_images(photo_parameters: _Floats, points: _Floats) -> _Floats:
 
     Returns
     -------
-    (n, 2) pixels; not finite in the plane of the projection centre. A point behind the camera has the image that the
-    formula gives.
+    (n, 2) pixels; not finite in the plane of the projection centre. A point behind the camera has the image
+    that the formula gives.
 
     Raises
     ------
@@ -1065,8 +1065,8 @@ def adjust_collection(
     Parameters
     ----------
     photo_parameters, photo_sd
-        (P, 9) initial (and, where weighted, observed) parameters and their standard deviations, infinite for free ones,
-        zero for fixed ones; see :func:`bundler_images`.
+        (P, 9) initial (and, where weighted, observed) parameters and their standard deviations, infinite
+        for free ones, zero for fixed ones; see :func:`bundler_images`.
     point_positions, point_sd
         (n, 3) likewise.
     image_photos, image_points

@@ -68,7 +68,7 @@ def adjust(
     block: Block,
     *,
     unit_variance: UnitVariance = "constrained",
-    max_iterations: int = 50,
+    max_iterations: int | None = None,
     tolerance: float = 1e-5,
     as_published: AsPublished | None = None,
     covariance: bool = True,
@@ -94,7 +94,8 @@ def adjust(
         (`constrained`), image coordinates and ground control only (`free`), or 1 (`unity`). Covariances are
         scaled by it.
     max_iterations
-        Iterations at the most.
+        Iterations at the most. When None, 50 without a loss, and 200 with one: reweighting takes more of
+        them.
     tolerance
         Iterate until no unknown changes by more than this fraction of its standard deviation (a priori unit
         weight). A step that raises the sum of squares is damped (Levenberg-Marquardt).
@@ -103,11 +104,12 @@ def adjust(
     covariance
         Whether to compute covariances, redundancy numbers and standardized residuals.
     loss
-        Robust loss in place of the squares of image coordinates: `huber` or `cauchy`, of both coordinates of an image
-        point together; None for least squares. Variance, covariances and redundancy numbers hold for the weights
-        as the loss has modified them (`image_weights`).
+        Robust loss in place of the squares of image coordinates: `huber` or `cauchy`, of both coordinates
+        of an image point together; None for least squares. Variance, covariances and redundancy numbers
+        hold for the weights as the loss has modified them (`image_weights`).
     scale
-        Where the loss sets in, in standard deviations a priori; 1.50 for `huber` and 2.55 for `cauchy` when None.
+        Where the loss sets in, in standard deviations a priori; 1.50 for `huber` and 2.55 for `cauchy` when
+        None.
     fix_photos
         Keep positions and attitudes as they are: every point by itself.
     ordering
@@ -134,8 +136,12 @@ def adjust(
     KeyboardInterrupt
         Ctrl-C.
     """
+    if max_iterations is None:
+        max_iterations = 50 if loss is None else 200
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads)
     row = loss_row(loss, scale)
+    if row and as_published:
+        raise InputError("the 1987 program has no robust loss: as_published or loss")
     check_cameras(block)
     if fix_photos:
         block = block.replace(photo_position_sd=np.array(0.0), photo_attitude_sd=np.array(0.0))

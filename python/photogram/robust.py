@@ -47,10 +47,11 @@ def remark(row: tuple[str, float] | None, weights: NDArray[np.float64]) -> list[
     if row is None:
         return []
     used = weights[np.isfinite(weights)]
+    modified, halved = np.count_nonzero(used < 1), np.count_nonzero(used < NOTABLE)
     return [
         Message(
-            f"{row[0].capitalize()} loss of scale {row[1]:g}: weights of {np.count_nonzero(used < 1)} of"
-            f" {len(used)} image points were modified, of {np.count_nonzero(used < NOTABLE)} to less than half;"
-            " sums of squares, variance, covariances and redundancy numbers hold for the modified weights"
+            f"{row[0].capitalize()} loss of scale {row[1]:g}: weights of {modified} of {len(used)} image"
+            f" points were modified, of {halved} to less than half; sums of squares, variance, covariances"
+            " and redundancy numbers hold for the modified weights"
         )
     ]

@@ -24,7 +24,9 @@ def jacobian(collection: Collection) -> np.ndarray:
     for k, value in enumerate(start):
         step = np.zeros_like(start)
         step[k] = 1e-5 * max(abs(value), 0.1)
-        columns.append((computed(collection, start + step) - computed(collection, start - step)) / (2 * step[k]))
+        columns.append(
+            (computed(collection, start + step) - computed(collection, start - step)) / (2 * step[k])
+        )
     return np.stack(columns, axis=1)
 
 
@@ -65,7 +67,9 @@ def test_cofactors_are_those_of_the_dense_normal_equations_in_the_same_datum():
         np.testing.assert_allclose(cofactors / scale, dense[own, own] / scale, atol=1e-5)
     for point, cofactors in enumerate(result.point_cofactors):
         own = slice(45 + 3 * point, 48 + 3 * point)
-        np.testing.assert_allclose(cofactors, dense[own, own], rtol=1e-4, atol=1e-6 * np.trace(dense[own, own]))
+        np.testing.assert_allclose(
+            cofactors, dense[own, own], rtol=1e-4, atol=1e-6 * np.trace(dense[own, own])
+        )
     shares = np.einsum("ij,jk,ik->i", rows, dense, rows)
     np.testing.assert_allclose(result.redundancy.ravel(), 1 - shares, atol=1e-6)
 
@@ -122,7 +126,9 @@ def test_a_robust_adjustment_ends_where_the_gradient_of_the_loss_vanishes(loss):
     assert (np.abs(gradient) < 1e-4 * size).all()
     squares = (residuals**2).reshape(-1, 2).sum(axis=1)
     inside = squares <= 4
-    losses = np.where(inside, squares, 4 * np.sqrt(squares) - 4) if loss == "huber" else 4 * np.log1p(squares / 4)
+    losses = (
+        np.where(inside, squares, 4 * np.sqrt(squares) - 4) if loss == "huber" else 4 * np.log1p(squares / 4)
+    )
     assert result.cost == pytest.approx(0.5 * losses.sum(), rel=1e-12)
     assert result.weighted_sum_of_squares == pytest.approx((result.image_weights * squares).sum(), rel=1e-12)
 
@@ -149,7 +155,7 @@ def test_weighted_points_give_the_datum_and_covariances_that_hold_in_it():
         assert redundancy == pytest.approx(result.degrees_of_freedom, rel=1e-8)
         error = result.point_positions - made.truth.point_positions
         scores.append(np.einsum("ni,nij,nj->n", error, np.linalg.inv(result.point_cofactors), error).mean())
-    # Chi squares of three; those of a sample share the errors of the datum, so that a mean scatters by one or so.
+    # Chi squares of three; those of a sample share the errors of the datum, and scatter together.
     assert np.mean(scores) == pytest.approx(3, abs=1)
 
 

@@ -11,7 +11,16 @@ from photogram.collection import read, simulate, to_bytes
 
 def test_the_example_converges_and_everything_is_written(run, tmp_path):
     done = run(
-        "collection", "--example", "--sd", "0.5", "--out", "out.txt.bz2", "--report", "report.txt", "--json", "all.json"
+        "collection",
+        "--example",
+        "--sd",
+        "0.5",
+        "--out",
+        "out.txt.bz2",
+        "--report",
+        "report.txt",
+        "--json",
+        "all.json",
     )
     assert done.exit_code == 0, done.output
     assert "converged" in done.output
@@ -29,7 +38,9 @@ def test_the_example_converges_and_everything_is_written(run, tmp_path):
 def test_a_robust_loss_by_option(run, tmp_path):
     made = simulate(outlier_share=0.05, seed=3)
     (tmp_path / "problem.txt").write_bytes(to_bytes(made.collection))
-    done = run("collection", "problem.txt", "--loss", "cauchy", "--scale", "2", "--sd", "0.5", "--json", "all.json")
+    done = run(
+        "collection", "problem.txt", "--loss", "cauchy", "--scale", "2", "--sd", "0.5", "--json", "all.json"
+    )
     assert done.exit_code == 0, done.output
     assert "modified weights" in done.output
     assert json.loads((tmp_path / "all.json").read_bytes())["loss"] == {"name": "cauchy", "scale": 2.0}

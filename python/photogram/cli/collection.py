@@ -16,6 +16,7 @@ from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threa
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
+    from photogram import robust
     from photogram.collection import AdjustedCollection
 
 __all__ = ["collection"]
@@ -30,6 +31,9 @@ class Loss(StrEnum):
     SQUARES = "squares"
     HUBER = "huber"
     CAUCHY = "cauchy"
+
+
+_LOSSES: dict[Loss, robust.Loss | None] = {Loss.SQUARES: None, Loss.HUBER: "huber", Loss.CAUCHY: "cauchy"}
 
 
 def collection(
@@ -71,7 +75,8 @@ def collection(
     tolerance: Annotated[
         float | None,
         typer.Option(
-            help="Stop when a step lowers the cost by less than this fraction. Default: 1e-8, with a loss 1e-6.",
+            help="Stop when a step lowers the cost by less than this fraction."
+            " Default: 1e-8, with a loss 1e-6.",
             show_default=False,
         ),
     ] = None,
@@ -83,7 +88,7 @@ def collection(
     threads: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Adjust photos of unknown cameras by Levenberg-Marquardt steps: orientation, focal length, distortion, points."""
+    """Adjust photos of unknown cameras by Levenberg-Marquardt steps, however far the start."""
     if example == (problem is not None):
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
     with failures(), ExitStack() as resources:
@@ -100,7 +105,7 @@ def collection(
                 photos,
                 tolerance=tolerance,
                 max_iterations=max_iterations,
-                loss=None if loss is Loss.SQUARES else loss.value,
+                loss=_LOSSES[loss],
                 scale=scale,
                 covariance=covariance,
                 ordering=ordering.value,

@@ -201,7 +201,12 @@ def _refracted(
 
 
 def _adjust(
-    project: Project, block: Block, as_published: bool, ordering: OrderingName, threads: int | None, quiet: bool
+    project: Project,
+    block: Block,
+    as_published: bool,
+    ordering: OrderingName,
+    threads: int | None,
+    quiet: bool,
 ) -> Result:
     """Adjust the block as COMMON asks, with the progress on standard error."""
     from photogram import AsPublished, adjust

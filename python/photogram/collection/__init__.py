@@ -1,4 +1,4 @@
-"""Collections of photos of unknown cameras: bundle adjustment "in the large", with the covariance of every result."""
+"""Collections of photos of unknown cameras: bundle adjustment "in the large"."""
 
 from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
@@ -6,4 +6,13 @@ from photogram.collection.bal import read, to_bytes
 from photogram.collection.collection import PARAMETERS, Collection
 from photogram.collection.simulation import Simulation, simulate
 
-__all__ = ["PARAMETERS", "AdjustedCollection", "Collection", "Simulation", "adjust", "read", "simulate", "to_bytes"]
+__all__ = [
+    "PARAMETERS",
+    "AdjustedCollection",
+    "Collection",
+    "Simulation",
+    "adjust",
+    "read",
+    "simulate",
+    "to_bytes",
+]

@@ -34,25 +34,26 @@ def adjust(
 ) -> AdjustedCollection:
     """Adjust a collection by Levenberg-Marquardt steps from given values, however far.
 
-    Points with a free coordinate and images on one photo only are left out; photos that have no image then stay as
-    they are. Where nothing weighted or fixed gives a datum, cofactors are those of minimum constraints: position and
-    attitude of the first photo and one component of the translation of another are held. Residuals, redundancy
-    numbers and the variance of unit weight do not depend on which.
+    Points with a free coordinate and images on one photo only are left out; photos that have no image then
+    stay as they are. Where nothing weighted or fixed gives a datum, cofactors are those of minimum
+    constraints: position and attitude of the first photo and one component of the translation of another
+    are held. Residuals, redundancy numbers and the variance of unit weight do not depend on which.
 
     Parameters
     ----------
     collection
         The collection, with its initial values.
     tolerance
-        Iterate until a step lowers what is minimised by less than this fraction of it. When None, 1e-8 without a loss, and
-        1e-6 with one: reweighting converges linearly.
+        Iterate until a step lowers what is minimised by less than this fraction of it. When None, 1e-8
+        without a loss, and 1e-6 with one: reweighting converges linearly.
     max_iterations
         Iterations (accepted steps) at the most.
     loss
-        Robust loss in place of the squares: `huber` or `cauchy`, of both coordinates of an image point together;
-        None for least squares.
+        Robust loss in place of the squares: `huber` or `cauchy`, of both coordinates of an image point
+        together; None for least squares.
     scale
-        Where the loss sets in, in standard deviations a priori; 1.50 for `huber` and 2.55 for `cauchy` when None.
+        Where the loss sets in, in standard deviations a priori; 1.50 for `huber` and 2.55 for `cauchy` when
+        None.
     covariance
         Whether to compute covariances, redundancy numbers and standardized residuals.
     ordering
@@ -64,8 +65,8 @@ def adjust(
 
     Returns
     -------
-    The result; its `status` says whether the adjustment converged, its `messages` why covariances are missing, where
-    the observations do not determine everything.
+    The result; its `status` says whether the adjustment converged, its `messages` why covariances are
+    missing, where the observations do not determine everything.
 
     Raises
     ------
@@ -148,10 +149,14 @@ def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
         error = _named(*solution.undetermined)
         messages.append(Message(f"there are no covariances: {error}"))
     if (solution.photo_images == 0).any():
-        messages.append(Message(f"left as they are, photos without image points: {_numbers(solution.photo_images == 0)}"))
+        messages.append(
+            Message(f"left as they are, photos without image points: {_numbers(solution.photo_images == 0)}")
+        )
     if (solution.point_rays == 0).any():
         messages.append(
-            Message(f"left out, points with images on fewer than two photos: {_numbers(solution.point_rays == 0)}")
+            Message(
+                f"left out, points with images on fewer than two photos: {_numbers(solution.point_rays == 0)}"
+            )
         )
     if solution.point_rays_behind.any():
         rays, names = solution.point_rays_behind.sum(), _numbers(solution.point_rays_behind > 0)

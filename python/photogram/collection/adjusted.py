@@ -19,9 +19,9 @@ __all__ = ["AdjustedCollection"]
 class AdjustedCollection:
     """An adjusted collection of P photos, n points and m image points, in the order of the collection.
 
-    What was left out of the adjustment is NaN. Cofactors hold for a priori unit weight and for the datum that the
-    observations and weights give; where these give none, for that of the held parameters in `datum`. Covariances are
-    cofactors times the variance of unit weight.
+    What was left out of the adjustment is NaN. Cofactors hold for a priori unit weight and for the datum
+    that the observations and weights give; where these give none, for that of the held parameters in
+    `datum`. Covariances are cofactors times the variance of unit weight.
 
     Attributes
     ----------
@@ -36,8 +36,8 @@ class AdjustedCollection:
     loss
         Name and scale of the robust loss; None for least squares.
     weighted_sum_of_squares, degrees_of_freedom, variance_of_unit_weight
-        Of images and weighted unknowns, weights as the loss has modified them; the variance is None without degrees of
-        freedom, and covariances are then scaled by 1.
+        Of images and weighted unknowns, weights as the loss has modified them; the variance is None without
+        degrees of freedom, and covariances are then scaled by 1.
     photo_parameters
         (P, 9) adjusted; see :class:`Collection`.
     photo_cofactors
@@ -104,7 +104,7 @@ class AdjustedCollection:
 
     @property
     def cost(self) -> float:
-        """Half the sum that was minimised at the adjusted values, as "Bundle Adjustment in the Large" counts it."""
+        """Half the sum that was minimised, at the adjusted values."""
         last = self.iterations[-1].weighted_sum_of_squares if self.iterations else None
         return 0.5 * (self.initial_weighted_sum_of_squares if last is None else last)
 
@@ -149,9 +149,7 @@ class AdjustedCollection:
         positions = np.where(
             self.used_points[:, np.newaxis], self.point_positions, self.collection.point_positions
         )
-        return self.collection.replace(
-            photo_parameters=self.photo_parameters, point_positions=positions
-        )
+        return self.collection.replace(photo_parameters=self.photo_parameters, point_positions=positions)
 
     def report(self) -> str:
         """Return the report as text."""

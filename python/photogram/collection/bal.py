@@ -1,7 +1,7 @@
 """The text format of "Bundle Adjustment in the Large", plain or compressed.
 
-First line: photos, points, images; then for each image `photo point x y`; then nine parameters of each photo and three
-coordinates of each point, one number a line. Any white space separates numbers.
+First line: photos, points, images; then for each image `photo point x y`; then nine parameters of each
+photo and three coordinates of each point, one number a line. Any white space separates numbers.
 """
 
 from __future__ import annotations
@@ -27,10 +27,14 @@ COMPRESSED: dict[bytes, Callable[[bytes], bytes]] = {b"BZh": bz2.decompress, b"\
 """How files that begin like this are unpacked."""
 HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3
 """Numbers of the first line, of an image, of a photo, of a point."""
+SHOWN = 120
+"""Characters of a faulty line that are shown."""
 
 
 def read(path: Path) -> Collection:
-    """Read a collection; `.bz2` and `.gz` files are unpacked on the way. All unknowns are free, image points have 1 pixel.
+    """Read a collection, packed by bzip2 or gzip or not.
+
+    All unknowns are free, and the standard deviation of image coordinates is one pixel.
 
     Raises
     ------
@@ -48,9 +52,7 @@ def read(path: Path) -> Collection:
     first_point = first_photo + PHOTO * photos
     expected = first_point + POINT * points
     if len(numbers) != expected:
-        wanted = (
-            f"{expected} numbers of {photos} photos, {points} points and {images} images ({len(numbers)} are good)"
-        )
+        wanted = f"{expected} numbers of {photos} photos, {points} points and {images} images"
         raise _fault(path, text, len(numbers), expected, wanted)
     rows = numbers[HEAD:first_photo].reshape(images, IMAGE)
     for column, (name, count) in enumerate((("photo", photos), ("point", points))):
@@ -68,7 +70,10 @@ def read(path: Path) -> Collection:
 
 
 def to_bytes(collection: Collection, suffix: str = "") -> bytes:
-    """Return a collection in the format, packed as the suffix (`.bz2`, `.gz`) says; numbers read back to the last bit."""
+    """Return a collection in the format, packed as the suffix (`.bz2`, `.gz`) says.
+
+    Numbers read back to the last bit.
+    """
     head = f"{len(collection.photo_parameters)} {len(collection.point_positions)} {len(collection.image_xy)}"
     columns = zip(
         collection.image_photos.tolist(),
@@ -107,7 +112,7 @@ def _whole(numbers: Floats) -> NDArray[np.bool_]:
 
 
 def _fault(path: Path, text: bytes, read: int, expected: int, wanted: str) -> InputError:
-    """Return what is wrong after `read` good numbers: a word that is none, the end, or more numbers than there should be."""
+    """Return what is wrong after `read` good numbers: a bad word, the end, or too many."""
     if read > expected:
         return _at(path, text, expected, f"numbers beyond the {wanted}")
     if len(text.split(maxsplit=read)) > read:
@@ -123,7 +128,3 @@ def _at(path: Path, text: bytes, index: int, message: str) -> InputError:
         if words > index:
             return InputError(message, file=path, record=record, text=line.decode("latin-1")[:SHOWN])
     return InputError(message, file=path)
-
-
-SHOWN = 120
-"""Characters of a faulty line that are shown."""

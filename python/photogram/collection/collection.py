@@ -18,16 +18,16 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 PARAMETERS = ("w1", "w2", "w3", "t1", "t2", "t3", "f", "k1", "k2")
-"""The nine parameters of a photo: angle-axis vector w (rad), translation t, focal length f (pixels), distortion."""
+"""Of a photo: angle-axis vector w (rad), translation t, focal length f (pixels), distortion k1, k2."""
 
 
 @dataclass(frozen=True, eq=False)
 class Collection:
     """P photos with unknown cameras, n points, m image points.
 
-    A photo maps a point X to f (1 + k1 p^2 + k2 p^4) p with P = R(w) X + t and p = -(P1, P2) / P3: it looks along its
-    -z axis (Bundler; Agarwal and others 2010). Any unknown may be weighted, from free (infinite standard deviation)
-    to fixed (zero).
+    A photo maps a point X to f (1 + k1 p^2 + k2 p^4) p with P = R(w) X + t and p = -(P1, P2) / P3: it looks
+    along its -z axis (Bundler; Agarwal and others 2010). Any unknown may be weighted, from free (infinite
+    standard deviation) to fixed (zero).
 
     Attributes
     ----------
@@ -42,8 +42,8 @@ class Collection:
     image_sd
         (m, 2) standard deviations, pixels; one number stands for all.
     photo_sd, point_sd
-        (P, 9) and (n, 3) standard deviations of the given values as observations; infinite free, zero fixed; one
-        number stands for all.
+        (P, 9) and (n, 3) standard deviations of the given values as observations; infinite free, zero
+        fixed; one number stands for all.
     """
 
     photo_parameters: Floats

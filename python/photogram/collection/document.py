@@ -70,7 +70,9 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
 
 
 def _photos(result: AdjustedCollection) -> list[dict[str, Any]]:
-    columns = zip(result.photo_parameters, result.photo_covariances, result.photo_images.tolist(), strict=True)
+    columns = zip(
+        result.photo_parameters, result.photo_covariances, result.photo_images.tolist(), strict=True
+    )
     return [
         {"parameters": parameters, "covariance": np.ascontiguousarray(covariance), "images": images}
         for parameters, covariance, images in columns

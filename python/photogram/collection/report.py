@@ -1,4 +1,4 @@
-"""The report of an adjusted collection as text: problems, then how good it is, then values with their deviations."""
+"""The report of an adjusted collection: problems, how good it is, values with their deviations."""
 
 from __future__ import annotations
 
@@ -61,7 +61,10 @@ def _adjustment(result: AdjustedCollection) -> list[str]:
         ("iterations", f"{len(result.iterations)}"),
         ("cost at first (half the sum)", f"{0.5 * result.initial_weighted_sum_of_squares:.6e}"),
         ("cost", f"{result.cost:.6e}"),
-        ("minimised", f"{result.loss[0]} loss, scale {result.loss[1]:g}" if result.loss else "sum of squares"),
+        (
+            "minimised",
+            f"{result.loss[0]} loss, scale {result.loss[1]:g}" if result.loss else "sum of squares",
+        ),
         (
             "standard deviation of unit weight",
             f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
@@ -98,11 +101,12 @@ def _suspects(result: AdjustedCollection) -> list[str]:
 
 
 def _iterations(result: AdjustedCollection) -> list[str]:
-    lines = [" no.            cost   damping"]
-    lines.append(f"   0{0.5 * result.initial_weighted_sum_of_squares:16.6e}")
-    for each in result.iterations:
-        lines.append(f"{each.number:4d}{0.5 * each.weighted_sum_of_squares:16.6e}{each.damping:10.1e}")
-    return lines
+    head = [" no.            cost   damping", f"   0{0.5 * result.initial_weighted_sum_of_squares:16.6e}"]
+    lines = [
+        f"{each.number:4d}{0.5 * each.weighted_sum_of_squares:16.6e}{each.damping:10.1e}"
+        for each in result.iterations
+    ]
+    return head + lines
 
 
 def _photos(result: AdjustedCollection) -> list[str]:

@@ -62,8 +62,8 @@ def simulate(
     noise
         Standard deviation of image coordinates, pixels.
     coarseness
-        Of the initial values: 1 gives standard deviations of 0.05 rad, of 0.5 for translations and points and of 10
-        percent for focal lengths, and starts without distortion; 0 starts at the truth.
+        Of the initial values: 1 gives standard deviations of 0.05 rad, of 0.5 for translations and points
+        and of 10 percent for focal lengths, and starts without distortion; 0 starts at the truth.
     outlier_share, outlier_size
         Share of image points with a gross error, and its standard deviation in pixels.
     seed

@@ -52,7 +52,7 @@ impl Loss {
 }
 
 /// Keeps the normal matrix positive definite.
-const LEAST_CURVATURE: f64 = 1e-2;
+const LEAST_CURVATURE: f64 = 1e-3;
 
 /// What a loss makes of the equations of a group.
 #[derive(Debug, Clone, Copy)]
