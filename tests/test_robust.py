@@ -43,6 +43,8 @@ def test_gross_errors_hardly_move_a_robust_adjustment(simulation, loss):
     assert robust.sums_of_squares.plates == pytest.approx(weighted, rel=1e-9)
     document = json.loads(robust.to_json())
     assert document["loss"] == {"name": loss, "scale": robust.loss[1]}
+    factors = [observation["weight_factor"] for observation in document["observations"]]
+    np.testing.assert_array_equal(factors, robust.image_weights[used])
 
 
 def test_redundancy_numbers_still_sum_to_the_degrees_of_freedom(simulation):

@@ -155,7 +155,7 @@ def _observations(result: AdjustedBlock) -> list[dict[str, Any]]:
             "residual_mm": residual,
             "redundancy": redundancy,
             "standardized": standardized,
-            "weight_factor": weight,
+            **({"weight_factor": weight} if result.loss else {}),
         }
         for photo, point, residual, redundancy, standardized, weight in columns
     ]
