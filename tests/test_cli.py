@@ -338,6 +338,7 @@ def test_weights_too_weak_for_a_datum_are_an_error_with_the_remark_that_explains
         (["perspective-center", "--example", "--plot", "p.png"], "matplotlib", "plots"),
         (["absolute-orientation", "--example", "--plot", "p.png"], "matplotlib", "plots"),
         (["stellar-camera", "--example", "--plots"], "matplotlib", "plots"),
+        (["plan", "--strips", "1", "--plot", "p.png"], "matplotlib", "plots"),
     ],
 )
 def test_a_package_of_an_extra_that_is_not_there_is_named(
@@ -347,7 +348,8 @@ def test_a_package_of_an_extra_that_is_not_there_is_named(
     for name in loaded:
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, package, None)
-    monkeypatch.delitem(sys.modules, "photogram.perspective_center.plot", raising=False)
+    for module in ("photogram.perspective_center.plot", "photogram.planning.plot"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
     result = run(*command)
     assert result.exit_code == 1
     assert f"{package} is needed: pip install 'photogram[{extra}]'" in result.stderr

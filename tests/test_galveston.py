@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
 from importlib.resources import as_file, files
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 
+from example_scripts import load
 from photogram.giant import Project, read_project
-
-SCRIPT = Path(__file__).parents[1] / "examples" / "make_galveston.py"
 
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_galveston", SCRIPT)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load("make_galveston")
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from noise import measured
 from photogram import (
     AdjustmentError,
     Block,
@@ -133,23 +134,7 @@ def test_section_1_errors_of_adjustments_scatter_as_predicted(kind):
     truth = network(photos_per_strip=3, points_per_photo=12, control_sd=0.1, **{"control": "corners", **kind})
     predicted = predict(truth)
     random = np.random.default_rng(2024)
-
-    def noisy(values, sd):
-        return values + np.where(np.isfinite(sd), sd, 0.0) * random.standard_normal(values.shape)
-
-    held = np.isfinite(truth.point_sd)
-    results = [
-        adjust(
-            truth.replace(
-                image_xy=noisy(truth.image_xy, truth.image_sd),
-                point_positions=np.where(held, noisy(truth.point_positions, truth.point_sd), np.nan),
-                photo_positions=noisy(truth.photo_positions, truth.photo_position_sd),
-            ),
-            covariance=False,
-            threads=1,
-        )
-        for _ in range(RUNS)
-    ]
+    results = [adjust(measured(truth, random), covariance=False, threads=1) for _ in range(RUNS)]
     for name, sd in (
         ("point_positions", predicted.point_sd),
         ("photo_positions", predicted.photo_sd[:, :3]),
@@ -471,7 +456,7 @@ def test_plan_writes_a_document_and_a_picture(run, tmp_path):
 
     result = run("plan", *SMALL, "--json", "other.json", "--plot", "plan.xyz")
     assert result.exit_code == 1
-    assert "plan.xyz: a picture is one of" in result.stderr
+    assert "plan.xyz: matplotlib draws no 'xyz'" in result.stderr
     assert not (tmp_path / "other.json").exists()
 
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
+from noise import measured
 from photogram import Block, Result, Simulation, Spheroid, adjust, geometry, simulate
 from photogram.errors import RankError
 
@@ -188,25 +189,8 @@ def campaign(kind: str) -> tuple[Simulation, list[Result]]:
         **weighted,
         **space,
     )
-    block, truth = simulation.block, simulation.truth
     random = np.random.default_rng(2024)
-
-    def noisy(values: Floats, sd: Floats) -> Floats:
-        return values + np.where(np.isfinite(sd), sd, 0.0) * random.standard_normal(values.shape)
-
-    held = np.isfinite(block.point_sd)
-    results = [
-        adjust(
-            block.replace(
-                image_xy=noisy(truth.image_xy, block.image_sd),
-                point_positions=np.where(held, noisy(truth.point_positions, block.point_sd), np.nan),
-                photo_positions=noisy(truth.photo_positions, block.photo_position_sd),
-                photo_attitudes=noisy(truth.photo_attitudes, block.photo_attitude_sd),
-            ),
-            threads=1,
-        )
-        for _ in range(RUNS)
-    ]
+    results = [adjust(measured(simulation.truth, random), threads=1) for _ in range(RUNS)]
     assert all(result.converged for result in results)
     return simulation, results
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from example_scripts import load
 from photogram import Block, InputError, Refraction, Simulation, Spheroid, adjust, geometry, simulate
 from photogram.giant import Common, Project, read_project, write_project
 from photogram.giant.assembly import job_refraction
@@ -424,12 +424,7 @@ def test_options_apply_refraction_that_common_does_not_ask_for(run):
 
 @pytest.fixture(scope="module")
 def tables() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("tables", ROOT / "examples" / "refraction_tables.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load("refraction_tables")
 
 
 def test_the_tables_of_the_documentation_are_those_of_the_script(tables):

@@ -15,17 +15,14 @@ from dataclasses import dataclass
 
 import gtsam
 import numpy as np
+from covariances import Place, moved
 from gtsam.symbol_shorthand import L, X
-from numpy.typing import NDArray
+from solution import HALF_TURN, Floats, Solution, to_object_space
 
 from photogram import Block
-from photogram.geometry import rotation_angles, rotation_matrix
-
-Floats = NDArray[np.float64]
+from photogram.geometry import rotation_angles
 
 Optimizer = Callable[[gtsam.NonlinearFactorGraph, gtsam.Values], gtsam.NonlinearOptimizer]
-
-_HALF_TURN = np.diag([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True)
@@ -34,17 +31,6 @@ class Problem:
 
     graph: gtsam.NonlinearFactorGraph
     initial: gtsam.Values
-
-
-@dataclass(frozen=True)
-class Solution:
-    """What gtsam found: the counterparts of the fields of photogram's `Result`."""
-
-    iterations: int
-    weighted_sum_of_squares: float
-    photo_positions: Floats
-    photo_attitudes: Floats
-    point_positions: Floats
 
 
 def factor_graph(block: Block, points: Floats) -> Problem:
@@ -81,11 +67,7 @@ def factor_graph(block: Block, points: Floats) -> Problem:
 
 def poses(block: Block) -> list[gtsam.Pose3]:
     """Camera poses of the initial photographs: rotation camera to object space, projection centre."""
-    matrices = rotation_matrix(block.photo_attitudes)
-    if block.photo_to_ground:
-        matrices = matrices.transpose(0, 2, 1)
-    to_object_space = (_HALF_TURN @ matrices).transpose(0, 2, 1)
-    pairs = zip(to_object_space, block.photo_positions, strict=True)
+    pairs = zip(to_object_space(block), block.photo_positions, strict=True)
     return [gtsam.Pose3(gtsam.Rot3(matrix), centre) for matrix, centre in pairs]
 
 
@@ -100,19 +82,45 @@ def solve(problem: Problem, optimizer: Optimizer) -> tuple[gtsam.NonlinearOptimi
     return run, run.optimize()
 
 
-def read_out(block: Block, optimizer: gtsam.NonlinearOptimizer, values: gtsam.Values) -> Solution:
+def read_out(
+    block: Block, problem: Problem, optimizer: gtsam.NonlinearOptimizer, values: gtsam.Values
+) -> Solution:
     """Arrays of what gtsam found; the weighted sum of squares is twice its error."""
     photos = gtsam.utilities.extractPose3(values)
-    matrices = _HALF_TURN @ photos[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
+    matrices = HALF_TURN @ photos[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
     if block.photo_to_ground:
         matrices = matrices.transpose(0, 2, 1)
     return Solution(
+        converged=optimizer.iterations() < gtsam.GaussNewtonParams().getMaxIterations(),
         iterations=optimizer.iterations(),
+        initial_weighted_sum_of_squares=2.0 * problem.graph.error(problem.initial),
         weighted_sum_of_squares=2.0 * optimizer.error(),
         photo_positions=photos[:, 9:],
         photo_attitudes=rotation_angles(matrices),
         point_positions=gtsam.utilities.extractPoint3(values),
     )
+
+
+def photo_cofactors(
+    block: Block, marginals: gtsam.Marginals, values: gtsam.Values, photos: list[int]
+) -> Floats:
+    """(k, 6, 6) cofactors of some photographs, position and attitude, as photogram states them."""
+    found = []
+    for photo in photos:
+        pose = values.atPose3(X(photo))
+        rotation, centre = pose.rotation().matrix(), pose.translation()
+
+        def place(turn: Floats, shift: Floats, rotation: Floats = rotation, centre: Floats = centre) -> Place:
+            """Move the pose in its own frame, as gtsam's tangent space does."""
+            return (rotation @ turn).T, centre + rotation @ shift
+
+        found.append(moved(block, place, marginals.marginalCovariance(X(photo))))
+    return np.array(found)
+
+
+def point_cofactors(marginals: gtsam.Marginals, points: list[int]) -> Floats:
+    """(k, 3, 3) cofactors of some points."""
+    return np.array([marginals.marginalCovariance(L(point)) for point in points])
 
 
 def _gauss_newton(ordering: str) -> Optimizer:
@@ -149,3 +157,4 @@ SETTINGS: dict[str, Optimizer] = {
     "lm-colamd": _levenberg_marquardt,
     "lm-schur": _schur,
 }
+FASTEST = "gn-colamd"

@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 from photogram.errors import InputError
 
-__all__ = ["read_lines", "whole", "write_whole"]
+__all__ = ["read_bytes", "read_lines", "reading", "whole", "write_whole"]
 
 
 def write_whole(files: Mapping[Path, bytes]) -> None:
@@ -36,6 +36,27 @@ def write_whole(files: Mapping[Path, bytes]) -> None:
             temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Name the file that the system cannot read: an :class:`OSError` becomes an :class:`InputError`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+    with reading(path):
+        return path.read_bytes()
+
+
 def read_lines(path: Path) -> list[str]:
     """Read the lines of a text file (UTF-8, else Latin-1; any line ends), without their ends.
 
@@ -44,10 +65,7 @@ def read_lines(path: Path) -> list[str]:
     InputError
         The file cannot be read.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+    data = read_bytes(path)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:

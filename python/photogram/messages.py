@@ -26,10 +26,10 @@ def locate(message: str, file: Path | None, record: int | None, text: str | None
     return f"{head}\n    |{shown}|"
 
 
-def listed(names: list[str]) -> str:
-    """Name all of a few, and some of many."""
-    shown = ", ".join(names[:MOST_NAMES])
-    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
+def listed(names: list[str], most: int = MOST_NAMES) -> str:
+    """Name all of a few, and some of many: `most` of them."""
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
 @dataclass(frozen=True)

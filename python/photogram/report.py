@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.angles import degrees_minutes_seconds
 from photogram.reliability import TESTABLE
+from photogram.sections import Section, composed, headline
 from photogram.structuring import structure
 
 if TYPE_CHECKING:
     from photogram.adjusted import AdjustedBlock, Floats
 
-__all__ = ["bandwidths", "composed", "report", "summary"]
+__all__ = ["bandwidths", "report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
@@ -45,17 +45,10 @@ def report(result: AdjustedBlock) -> str:
         ("Points", _points(result)),
         ("Work", _work(result)),
     ]
-    head = f"photogram {_photocore.__version__}  block adjustment  {result.block.title}".rstrip()
-    return composed(head, sections)
+    return composed(headline("block adjustment", result.block.title), sections)
 
 
-def composed(head: str, sections: Iterable[tuple[str, list[str]]]) -> str:
-    """Return a report: its first line, then titled sections; those without lines are left out."""
-    parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
-    return "\n\n".join([head, *parts]) + "\n"
-
-
-def summary(result: AdjustedBlock) -> list[tuple[str, list[str]]]:
+def summary(result: AdjustedBlock) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
     return [
         ("Problems", _problems(result)),

@@ -9,9 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from orientation_golden import cards_of, cases, csv_of
-from typer.testing import CliRunner
-
-from photogram.cli import app
 
 EXAMPLE = files("photogram") / "examples" / "absolute_orientation"
 PAGE = Path(__file__).parents[2] / "docs" / "absolute-orientation.md"
@@ -28,13 +25,9 @@ MEMBERS = {
 
 
 @pytest.fixture
-def run(monkeypatch, tmp_path):
+def run(run):
     """Run the command in an empty directory."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setenv("NO_COLOR", "1")
-    runner = CliRunner()
-    return lambda *arguments: runner.invoke(app, ["absolute-orientation", *map(str, arguments)])
+    return lambda *arguments: run("absolute-orientation", *arguments)
 
 
 def test_the_example(run, tmp_path):

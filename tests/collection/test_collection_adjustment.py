@@ -52,6 +52,14 @@ def test_far_starts_lead_to_the_minimum_near_the_truth(seed):
     assert near.variance_of_unit_weight == pytest.approx(1, abs=0.15)
 
 
+def test_flawless_images_give_the_truth_up_to_a_similarity():
+    made = simulate(noise=0, seed=9)
+    result = adjust(made.collection)
+    assert result.converged
+    assert result.cost < 1e-12
+    np.testing.assert_allclose(result.photo_parameters[:, 6:], made.truth.photo_parameters[:, 6:], rtol=1e-6)
+
+
 def test_cofactors_are_those_of_the_dense_normal_equations_in_the_same_datum():
     made = simulate(photos=5, points=15, seed=4)
     result = adjust(made.truth, tolerance=1e-12)

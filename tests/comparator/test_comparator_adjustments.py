@@ -125,7 +125,7 @@ def test_feature_12_the_linear_adjustment_is_least_squares():
     assert fit.coefficients == pytest.approx(solution[:2].T / 1e5, abs=1e-12)
     assert fit.shift_um == pytest.approx(solution[2], abs=1e-6)
     assert fit.residuals.squares_um2[:2] == pytest.approx(tuple(squares), rel=1e-9)
-    assert fit.sigma0_um == pytest.approx(math.sqrt(squares.sum() / 44), rel=1e-9)
+    assert fit.residuals.sigma0_um == pytest.approx(math.sqrt(squares.sum() / 44), rel=1e-9)
     moved = measured @ fit.parameters.matrix.T + fit.translation_um
     assert moved - GRID == pytest.approx(fit.residuals.grid_um, abs=1e-7)
 
@@ -137,7 +137,7 @@ def test_feature_12_linear_adjustment_of_case_2():
     assert 1e6 * (own.scale_y - 1) == pytest.approx(expected["SY_minus1_um_per_m"], rel=1e-6)
     assert own.nonorthogonality_rad / ARCSEC == pytest.approx(expected["alpha_arcsec"], rel=1e-6)
     assert math.degrees(own.rotation_rad) == pytest.approx(expected["theta_deg"], rel=1e-6)
-    assert fit.sigma0_um == pytest.approx(expected["sigma0_um"], rel=1e-6)
+    assert fit.residuals.sigma0_um == pytest.approx(expected["sigma0_um"], rel=1e-6)
     assert fit.residuals.squares_um2 == pytest.approx(tuple(expected["sum_vv_um2"].values()), rel=1e-6)
     vectors = np.column_stack([expected["vx_um"], expected["vy_um"]])
     order = np.argsort(fit.residuals.points)
@@ -231,7 +231,7 @@ def test_feature_15_polynomials_of_case_2():
     assert np.abs(single.polynomial.evaluate(places) - reference).max() < 1e-5
     assert found[:, :6] == pytest.approx(coefficients[:, :6], rel=1e-6)
     assert single.residuals.squares_um2[:2] == pytest.approx(tuple(expected["sum_vv_um2"].values()), rel=1e-6)
-    assert single.sigma0_um == pytest.approx(expected["sigma0_um"], rel=1e-6)
+    assert single.residuals.sigma0_um == pytest.approx(expected["sigma0_um"], rel=1e-6)
 
 
 def test_feature_15_the_sign_of_the_listing_has_a_name():

@@ -24,7 +24,7 @@ SPACES = pytest.mark.parametrize("geographic", [False, True], ids=["rectangular"
 
 
 def source(*lines, strip=""):
-    return Source(Path("FILE"), list(lines), strip)
+    return Source(Path("FILE"), list(lines), strip=strip)
 
 
 def at(column, text, name="A"):

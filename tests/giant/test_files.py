@@ -21,7 +21,7 @@ ARCSEC = math.radians(1 / 3600)
 
 
 def source(*lines, strip=""):
-    return Source(Path("FILE"), list(lines), strip)
+    return Source(Path("FILE"), list(lines), strip=strip)
 
 
 # The sample of the report

@@ -1,4 +1,8 @@
-//! A block of parallel strips adjusted, as a whole and phase by phase.
+//! A block of parallel strips adjusted, as a whole and phase by phase, beside the machine's dense matrix product.
+//!
+//! The size is that of the environment: `STRIPS=50 PHOTOS=100 cargo bench --package photocore --bench block`. Criterion's
+//! elements are multiply-adds where they are counted, so that the phases' rates stand against that of `dense/product`; those of
+//! `linearize` are image points, those of `adjust` photographs.
 
 // A benchmark that cannot run has nobody to report to.
 #![allow(clippy::expect_used, missing_docs)]
@@ -6,15 +10,17 @@
 use std::hint::black_box;
 use std::ops::ControlFlow;
 
-use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par};
 use photocore::adjustment;
 use photocore::geometry::{self, ObjectSpace, RotationSense};
 use photocore::normals::{Equations, Factor, GroupRows, Layout, Normals, Ordering, Prior, System};
 use photocore::programs::block::{Block, Image, Options, Photo, Point, UnitVariance};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-const STRIPS: usize = 20;
-const PHOTOS_PER_STRIP: usize = 50;
+/// Rows and columns of the dense product.
+const DENSE: usize = 1024;
 
 /// Wide-angle photographs from 4,500 m, 60 % forward and 30 % side overlap, a hundred points on each.
 const PRINCIPAL_DISTANCE: f64 = -152.74;
@@ -24,10 +30,21 @@ const BASE: f64 = 2710.0;
 const SEPARATION: f64 = 4743.0;
 /// Between ground points: four columns to a base, seven rows to a separation.
 const SPACING: f64 = 677.5;
+/// No photograph sees a point farther away than this along or across the strip.
+const REACH: f64 = 1.2 * FLYING_HEIGHT * HALF_FRAME / -PRINCIPAL_DISTANCE;
 const IMAGE_SD: f64 = 0.01;
 /// One point in so many is control.
 const CONTROL: usize = 50;
 const CONTROL_SD: f64 = 0.05;
+
+/// The block of the size that the environment asks for, and a name for it.
+fn block() -> (Block, String) {
+    let number = |name: &str, default: usize| {
+        std::env::var(name).map_or(default, |text| text.parse().expect("a number of strips or photographs"))
+    };
+    let (count, photos) = (number("STRIPS", 20), number("PHOTOS", 50));
+    (strips(count, photos), format!("{count}x{photos}"))
+}
 
 /// A flawless block, but for initial stations that lie off by some ten metres and some milliradians.
 fn strips(strips: usize, photos_per_strip: usize) -> Block {
@@ -67,6 +84,10 @@ fn strips(strips: usize, photos_per_strip: usize) -> Block {
         let images: Vec<Image> = cameras
             .iter()
             .enumerate()
+            .filter(|&(photo, _)| {
+                let position = true_photos[photo].0;
+                (0..2).all(|k| (position[k] - coordinates[k]).abs() < REACH)
+            })
             .map(|(photo, camera)| Image { photo, point, xy: camera.project(&at), sd: [IMAGE_SD; 2] })
             .filter(|image| image.xy.iter().all(|value| value.abs() < HALF_FRAME))
             .collect();
@@ -151,6 +172,18 @@ impl Phases {
     fn factor(&self) -> Factor {
         self.form().factor(&self.pool).expect("a determined block")
     }
+
+    /// Multiply-adds of the formation with its reduction, and of the cofactors of points and image points, from the numbers of
+    /// photographs that the points are on. An image point takes 146 besides the reduction: the point's normal matrix and right-hand
+    /// side (20), the coupling and its triangular solution (72), the photograph's own block and right-hand side (54). H Q_oo
+    /// takes 3 (6 k)^2 for k photographs, the redundancy numbers of an image point about 100.
+    fn operations(&self) -> (f64, f64) {
+        let layout = self.system.layout();
+        let reduction = self.system.symbolic().operations(layout).reduction;
+        let rays = (0..layout.locals()).map(|local| layout.groups_of(local).len() as f64);
+        let cofactors = rays.map(|k| 108.0 * k * k + 100.0 * k).sum();
+        (reduction + 146.0 * layout.groups() as f64, cofactors)
+    }
 }
 
 fn pool() -> ThreadPool {
@@ -168,9 +201,28 @@ fn done<T>(flow: ControlFlow<(), T>) -> T {
     }
 }
 
-/// The whole adjustment, with all cofactors and redundancy numbers.
+/// Multiply-adds as criterion's elements.
+fn elements(operations: f64) -> Throughput {
+    Throughput::Elements(operations as u64)
+}
+
+/// The rate that all others are judged by: a dense matrix product on all processors.
+fn product(criterion: &mut Criterion) {
+    let matrix =
+        |shift: usize| Mat::from_fn(DENSE, DENSE, |i, j| ((7 * i + 3 * j + shift) % 11) as f64 - 5.0);
+    let (a, b, mut c) = (matrix(0), matrix(1), Mat::<f64>::zeros(DENSE, DENSE));
+    let mut group = criterion.benchmark_group("dense");
+    group.throughput(elements((DENSE as f64).powi(3)));
+    group.bench_function("product", |bencher| {
+        bencher.iter(|| matmul(c.as_mut(), Accum::Replace, a.as_ref(), b.as_ref(), 1.0, Par::rayon(0)));
+    });
+    group.finish();
+}
+
+/// The whole adjustment, with all cofactors and redundancy numbers; the collinearity equations and their partials alone, on one
+/// thread.
 fn adjust(criterion: &mut Criterion) {
-    let block = strips(STRIPS, PHOTOS_PER_STRIP);
+    let (block, size) = block();
     let pool = pool();
     let options = Options {
         adjustment: adjustment::Options {
@@ -184,31 +236,43 @@ fn adjust(criterion: &mut Criterion) {
     };
     let adjust =
         || block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).expect("a determined block");
-    criterion.bench_function("block/adjust", |bencher| bencher.iter(|| black_box(adjust())));
+    let mut group = criterion.benchmark_group(format!("block/{size}"));
+    group.throughput(Throughput::Elements(block.photos.len() as u64));
+    group.bench_function("adjust", |bencher| bencher.iter(|| black_box(adjust())));
+    group.throughput(Throughput::Elements(block.images.len() as u64));
+    group.bench_function("linearize", |bencher| bencher.iter(|| black_box(Linear::new(&block))));
+    group.finish();
 }
 
 /// The phases of the normal equations, each once.
 fn phases(criterion: &mut Criterion) {
-    let phases = Phases::new(&strips(STRIPS, PHOTOS_PER_STRIP));
+    let (block, size) = block();
+    let phases = Phases::new(&block);
     let Phases { pool, system, equations, prior } = &phases;
-    let mut group = criterion.benchmark_group("normals");
+    let predicted = system.symbolic().operations(system.layout());
+    let (formation, cofactors) = phases.operations();
+    let mut group = criterion.benchmark_group(format!("normals/{size}"));
     group.bench_function("order", |bencher| {
         let layout = || system.layout().clone();
         bencher.iter_batched(layout, |layout| System::new(layout, Ordering::Auto), BatchSize::PerIteration);
-    });
-    group.bench_function("form", |bencher| bencher.iter(|| phases.form()));
-    group.bench_function("factor", |bencher| {
-        bencher.iter_batched(|| phases.form(), |normals| normals.factor(pool), BatchSize::PerIteration);
     });
     let factor = phases.factor();
     group.bench_function("solve", |bencher| {
         bencher.iter(|| done(system.solve(pool, &factor, equations, prior, 0.0, &mut go)));
     });
+    group.throughput(elements(formation));
+    group.bench_function("form", |bencher| bencher.iter(|| phases.form()));
+    group.throughput(elements(predicted.factor));
+    group.bench_function("factor", |bencher| {
+        bencher.iter_batched(|| phases.form(), |normals| normals.factor(pool), BatchSize::PerIteration);
+    });
+    group.throughput(elements(predicted.inverse));
     group.bench_function("invert", |bencher| {
         let invert = |factor: Factor| factor.into_selected_inverse(pool);
         bencher.iter_batched(|| phases.factor(), invert, BatchSize::PerIteration);
     });
     let inverse = phases.factor().into_selected_inverse(pool);
+    group.throughput(elements(cofactors));
     group.bench_function("cofactors", |bencher| {
         bencher.iter(|| done(system.cofactors(pool, &inverse, equations, prior, &mut go)));
     });
@@ -218,6 +282,6 @@ fn phases(criterion: &mut Criterion) {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(10);
-    targets = adjust, phases
+    targets = product, adjust, phases
 }
 criterion_main!(benches);

@@ -1,6 +1,6 @@
 //! Rows of NumPy arrays: shapes are checked here, and what is wrong is said with the name of the argument.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -44,6 +44,15 @@ pub fn indices(name: &str, array: &PyReadonlyArrayDyn<'_, i64>) -> PyResult<Vec<
 pub fn table<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
     let count = rows.len();
     PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
+}
+
+/// Square matrices as an (n, N, N) array.
+pub fn squares<const N: usize>(
+    py: Python<'_>,
+    matrices: Vec<[[f64; N]; N]>,
+) -> PyResult<Bound<'_, PyArray3<f64>>> {
+    let count = matrices.len();
+    PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, N, N])
 }
 
 /// Refuses arrays whose lengths differ from the first one's.

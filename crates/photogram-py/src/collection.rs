@@ -10,12 +10,11 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{check_lengths, indices, rows, table};
+use crate::arrays::{check_lengths, indices, rows, squares, table};
 use crate::block::watched;
 use crate::options::{named_loss, named_ordering};
 use crate::solution::{
-    IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, squares,
-    status_name,
+    IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
 };
 
 create_exception!(

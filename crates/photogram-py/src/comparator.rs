@@ -11,8 +11,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{check_lengths, indices, rows, table};
-use crate::solution::squares;
+use crate::arrays::{check_lengths, indices, rows, squares, table};
 
 create_exception!(
     _photocore,

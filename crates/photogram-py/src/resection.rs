@@ -14,9 +14,9 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::arrays::{check_lengths, numbers, rows, table};
+use crate::arrays::{check_lengths, numbers, rows, squares, table};
 use crate::geometry::{object_space, rotation_sense};
-use crate::solution::{IterationRow, iteration_row, squares, status_name};
+use crate::solution::{IterationRow, iteration_row, status_name};
 
 create_exception!(_photocore, ResectionError, PyException, "The photo cannot be resected: (kind, message).");
 

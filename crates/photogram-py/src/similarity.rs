@@ -12,8 +12,8 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{check_lengths, rows, table};
-use crate::solution::{IterationRow, iteration_row, squares, status_name};
+use crate::arrays::{check_lengths, rows, squares, table};
+use crate::solution::{IterationRow, iteration_row, status_name};
 
 create_exception!(
     _photocore,

@@ -6,7 +6,7 @@ use photocore::programs::block::Solution;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::table;
+use crate::arrays::{squares, table};
 
 /// Number, weighted sum of squares, largest change in standard deviations, damping.
 pub type IterationRow = (usize, f64, f64, f64);
@@ -236,13 +236,4 @@ pub fn image_table<'py>(
 pub fn image_weights<'py>(py: Python<'py>, images: &[Option<Observed<2>>]) -> Bound<'py, PyArray1<f64>> {
     let weights = images.iter().map(|image| image.map_or(f64::NAN, |image| image.weight));
     PyArray1::from_vec(py, weights.collect())
-}
-
-/// Square matrices as an (n, N, N) array.
-pub fn squares<const N: usize>(
-    py: Python<'_>,
-    matrices: Vec<[[f64; N]; N]>,
-) -> PyResult<Bound<'_, PyArray3<f64>>> {
-    let count = matrices.len();
-    PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, N, N])
 }

@@ -12,7 +12,7 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{check_lengths, indices, matrices, numbers, rows, table};
+use crate::arrays::{check_lengths, indices, matrices, numbers, rows, squares, table};
 use crate::block::watched;
 use crate::solution::iteration_row;
 
@@ -344,11 +344,6 @@ fn tests(dict: &Bound<'_, PyDict>, name: &str, all: &[Tested]) -> PyResult<()> {
     let py = dict.py();
     dict.set_item(format!("{name}_redundancy"), table(py, all.iter().map(|t| t.redundancy).collect())?)?;
     dict.set_item(format!("{name}_standardized"), table(py, all.iter().map(|t| t.standardized).collect())?)
-}
-
-fn squares(py: Python<'_>, all: Vec<[[f64; 2]; 2]>) -> PyResult<Bound<'_, numpy::PyArray3<f64>>> {
-    let count = all.len();
-    PyArray1::from_vec(py, all.into_flattened().into_flattened()).reshape([count, 2, 2])
 }
 
 fn failure(error: &Failure) -> PyErr {

@@ -14,6 +14,7 @@ from photogram import _photocore
 from photogram.absolute_orientation.oriented import OrientedModel
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.errors import InputError
+from photogram.files import read_bytes
 
 __all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
 
@@ -131,9 +132,7 @@ def read_similarity(path: Path) -> Similarity:
         The file cannot be read or is no such document.
     """
     try:
-        found = orjson.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+        found = orjson.loads(read_bytes(path))
     except orjson.JSONDecodeError as error:
         raise InputError(f"is no JSON document: {error}", file=path) from None
     try:

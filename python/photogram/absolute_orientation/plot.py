@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.absolute_orientation.oriented import OrientedModel
+from photogram.pictures import round_length
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,9 +100,7 @@ def _key(axes: Axes, plan: Floats, size: float, factor: float, unit: str) -> Non
     """Draw a bar of a round length below the plan."""
     if factor == 0:
         return
-    longest = LONGEST * size / factor
-    power = 10.0 ** np.floor(np.log10(longest))
-    length = max(step * power for step in (1, 2, 5) if step * power <= longest)
+    length = round_length(LONGEST * size / factor)
     corner = plan.min(axis=0) - [0.0, 0.2 * size]
     axes.plot([corner[0], corner[0] + length * factor], [corner[1]] * 2, color="0.25", linewidth=2)
     axes.annotate(f"{length:g} {unit}", corner, (0, -12), textcoords="offset points", fontsize=8)

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram import _photocore
 from photogram.absolute_orientation.cards import restart_record, transformation_records
 from photogram.absolute_orientation.oriented import OrientedModel
+from photogram.sections import Section, composed, headline
 
 __all__ = ["report", "summary"]
 
@@ -33,12 +33,10 @@ def report(result: OrientedModel) -> str:
         ("Transformation, as part II reads it", transformation_records(result.similarity, "0")),
         ("Parameters, as a new solution starts from them", [restart_record(result.similarity, "0")]),
     ]
-    head = f"photogram {_photocore.__version__}  absolute orientation"
-    parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
-    return "\n\n".join([head, *parts]) + "\n"
+    return composed(headline("absolute orientation"), sections)
 
 
-def summary(result: OrientedModel) -> list[tuple[str, list[str]]]:
+def summary(result: OrientedModel) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, figures, parameters, control."""
     return [
         ("Problems", _problems(result)),

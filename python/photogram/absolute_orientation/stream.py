@@ -18,7 +18,7 @@ from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
 from photogram.errors import InputError
-from photogram.files import whole
+from photogram.files import reading, whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -181,11 +181,8 @@ def _chunks(source: Path) -> Iterator[tuple[list[str], Floats, Floats | None]]:
 
 def _layout(source: Path) -> tuple[list[str], dict[str, Any]]:
     """Find the columns of a file of points, and how pandas is to read them."""
-    try:
-        with source.open(encoding="utf-8-sig", errors="replace") as file:
-            first = next((line for line in file if line.strip()), "")
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=source) from None
+    with reading(source), source.open(encoding="utf-8-sig", errors="replace") as file:
+        first = next((line for line in file if line.strip()), "")
     names = header(first.rstrip("\r\n").split(","))
     if "x" not in names:
         if not first:

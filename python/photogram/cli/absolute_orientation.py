@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+from photogram.cli.console import NOT_CONVERGED, errors, failures, output, print_sections, print_written
 from photogram.cli.options import JsonFile, Quiet
 
 if TYPE_CHECKING:
@@ -146,6 +146,7 @@ def absolute_orientation(
     with failures(), ExitStack() as resources:
         from photogram import orient
         from photogram.absolute_orientation.document import read_similarity
+        from photogram.absolute_orientation.report import summary
         from photogram.files import write_whole
 
         if file is None:
@@ -171,9 +172,8 @@ def absolute_orientation(
             written = [target, *([json] if json else []), *written]
         write_whole(made)
         if not quiet:
-            _summarize(result)
-            if written:
-                output.print("written: " + escape(", ".join(str(path) for path in written)))
+            print_sections(summary(result), "the listing", SHOWN)
+            print_written(written)
     if not result.converged:
         raise typer.Exit(NOT_CONVERGED)
 
@@ -283,15 +283,3 @@ def _progress(points: Path, quiet: bool) -> Iterator[Callable[[int], None] | Non
         return
     with errors.status(f"transforming {escape(points.name)}", spinner="line") as status:
         yield lambda done: status.update(f"transforming {escape(points.name)}: {done} points")
-
-
-def _summarize(result: Orientation) -> None:
-    """Print the first sections of the listing."""
-    from photogram.absolute_orientation.report import summary
-
-    for title, lines in summary(result):
-        output.print(f"[bold]{escape(title)}[/]")
-        for line in lines[:SHOWN]:
-            output.print(f"  {escape(line)}")
-        if len(lines) > SHOWN:
-            output.print(f"  and {len(lines) - SHOWN} more lines in the listing")

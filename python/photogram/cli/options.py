@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-__all__ = ["JsonFile", "Ordering", "OrderingName", "Quiet", "Threads"]
+__all__ = ["JsonFile", "Ordering", "OrderingName", "Quiet", "Threads", "default_out"]
 
 JsonFile = Annotated[
     Path | None,
@@ -33,3 +34,13 @@ Threads = Annotated[
     int | None,
     typer.Option(min=1, help="Threads; the results do not depend on it. Default: all.", show_default=False),
 ]
+
+
+def default_out(source: Path, ending: str) -> Path:
+    """Return the directory for the results where no option names one: the name of the input with an ending.
+
+    It is beside the input, or, as published data are often read-only, else where the command is given.
+    """
+    place = source.resolve()
+    parent = place.parent if os.access(place.parent, os.W_OK) else Path()
+    return parent / f"{place.name if place.is_dir() else place.stem}{ending}"

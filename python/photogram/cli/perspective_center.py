@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, errors, failures, output
+from photogram.cli.console import NOT_CONVERGED, failures, output, print_remark, print_written
 from photogram.cli.options import JsonFile, Quiet
 
 if TYPE_CHECKING:
@@ -84,8 +84,7 @@ def perspective_center(
         write_whole(written)
         if not quiet:
             _summarize(run)
-            if written:
-                output.print("written: " + escape(", ".join(str(path) for path in written)))
+            print_written(written)
         if run.stop is not None:
             raise run.stop.error
     if not run.converged:
@@ -121,4 +120,4 @@ def _summarize(run: Run) -> None:
         for line in summary(result):
             output.print(escape(line))
     for message in run.messages:
-        errors.print(f"[yellow]remark:[/] {escape(str(message))}")
+        print_remark(message)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import errors, failures, output
+from photogram.cli.console import errors, failures, output, print_remark, print_written
 from photogram.cli.options import JsonFile
 from photogram.cli.simulated import Control, NetworkOptions, takes_network
 
@@ -81,8 +79,7 @@ def plan(
         written = _documents(made, json, plot)
         write_whole(written)
         output.print(made.report(), markup=False, end="")
-        if written:
-            errors.print("written: " + escape(", ".join(str(path) for path in written)))
+        print_written(written, errors)
 
 
 def _simulated(*networks: NetworkOptions) -> dict[str, Block]:
@@ -126,7 +123,7 @@ def _adjusted(projects: list[Path]) -> dict[str, Block]:
         project = read_project(directory)
         block = project.to_block()
         for message in project.messages:
-            errors.print(f"[yellow]remark:[/] {escape(str(message))}")
+            print_remark(message)
         fixed = project.common.intersection_only
         patterns[name] = at_adjusted(adjust(block, covariance=False, fix_photos=fixed))
     return patterns
@@ -144,12 +141,7 @@ def _names(projects: list[Path]) -> dict[str, Path]:
 def _documents(made: Plan, json: Path | None, plot: Path | None) -> dict[Path, bytes]:
     documents = {json: made.to_json()} if json else {}
     if plot:
-        from photogram.errors import InputError
+        from photogram.pictures import drawn
 
-        figure, picture, kind = made.plot(), BytesIO(), plot.suffix.removeprefix(".")
-        known = figure.canvas.get_supported_filetypes()
-        if kind not in known:
-            raise InputError(f"a picture is one of {', '.join(sorted(known))}", file=plot)
-        figure.savefig(picture, format=kind)
-        documents[plot] = picture.getvalue()
+        documents[plot] = drawn(made.plot(), plot)
     return documents

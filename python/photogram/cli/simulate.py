@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import errors, failures, output
+from photogram.cli.console import failures, output, print_remark
 from photogram.cli.simulated import NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def simulate(
         written = {**project_files(project, out, overwrite=overwrite), out / "truth.json": _truth(simulation)}
         write_whole(written)
         for message in project.messages:
-            errors.print(f"[yellow]remark:[/] {escape(str(message))}")
+            print_remark(message)
         block = simulation.block
         output.print(
             f"{escape(str(out))}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"

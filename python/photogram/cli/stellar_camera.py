@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, failures, output
+from photogram.cli.console import NOT_CONVERGED, failures, print_sections, print_written
 from photogram.cli.options import JsonFile, Quiet
 
 if TYPE_CHECKING:
@@ -18,9 +17,6 @@ if TYPE_CHECKING:
     from photogram.stellar.result import Result
 
 __all__ = ["stellar_camera"]
-
-SHOWN = 24
-"""Lines of a section that the summary shows at most."""
 
 
 def stellar_camera(
@@ -59,6 +55,7 @@ def stellar_camera(
 
         from photogram.files import write_whole
         from photogram.stellar import calibrate
+        from photogram.stellar.listing import summary
 
         if deck is None:
             directory = resources.enter_context(as_file(files("photogram") / "examples" / "stellar"))
@@ -75,10 +72,10 @@ def stellar_camera(
             mark = f"-{number}" if len(problems) > 1 else ""
             written |= _files(result, target, mark, json, plots)
             if not quiet:
-                _summarize(result)
+                print_sections(summary(result), "the listing")
         write_whole(written)
         if not quiet:
-            output.print("written: " + escape(", ".join(str(path) for path in written)))
+            print_written(written)
     if not converged:
         raise typer.Exit(NOT_CONVERGED)
 
@@ -110,14 +107,3 @@ def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool)
             out / name.replace(".png", f"{mark}.png"): content for name, content in figures(result).items()
         }
     return made
-
-
-def _summarize(result: Result) -> None:
-    from photogram.stellar.listing import summary
-
-    for title, lines in summary(result):
-        output.print(f"[bold]{title}[/]")
-        for line in lines[:SHOWN]:
-            output.print(f"  {escape(line)}")
-        if len(lines) > SHOWN:
-            output.print(f"  and {len(lines) - SHOWN} more lines in the listing")

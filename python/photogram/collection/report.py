@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.collection.collection import PARAMETERS
-from photogram.report import composed
+from photogram.sections import Section, composed, headline
 
 if TYPE_CHECKING:
     from photogram.collection.adjusted import AdjustedCollection
@@ -32,10 +31,10 @@ def report(result: AdjustedCollection) -> str:
         ("Points: standard deviations", _points(result)),
         ("Work", _work(result)),
     ]
-    return composed(f"photogram {_photocore.__version__}  collection of photos", sections)
+    return composed(headline("collection of photos"), sections)
 
 
-def summary(result: AdjustedCollection) -> list[tuple[str, list[str]]]:
+def summary(result: AdjustedCollection) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, suspects."""
     return [
         ("Problems", _problems(result)),

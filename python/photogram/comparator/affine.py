@@ -45,14 +45,9 @@ class AffineFit:
     residuals: Residuals
 
     @property
-    def sigma0_um(self) -> float:
-        """Standard error of unit weight (equation 52)."""
-        return self.residuals.sigma0_um
-
-    @property
     def covariance(self) -> Floats:
         """(4, 4) of scale x, scale y, lack of orthogonality (rad), rotation (rad) (equation 53)."""
-        return self.sigma0_um**2 * self.cofactors
+        return self.residuals.sigma0_um**2 * self.cofactors
 
     @property
     def translation_um(self) -> Floats:

@@ -15,9 +15,8 @@ import numpy as np
 from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid
 from photogram.comparator.readings import Reading, Session, collect_cases
 from photogram.errors import InputError
-from photogram.giant.records import Record, Source
 from photogram.messages import Message
-from photogram.places import Place
+from photogram.records import Record, Source
 
 __all__ = ["Header", "join_least_count", "read_cards", "to_cards"]
 
@@ -188,7 +187,7 @@ class _Deck:
         master = own or built_in_grid(BUILT_IN[min(header.master, 2)])
         self.grids = {grid.number: grid for grid in (given or [master])}
         if own is not None:
-            self.messages.append(_message(first, f"SPECIAL MASTER GRID NO. {own.number} COORDINATES USED"))
+            self.messages.append(first.message(f"SPECIAL MASTER GRID NO. {own.number} COORDINATES USED"))
 
     def _special_grid(self) -> Grid:
         """Read the cards of a special grid; a mark in column 80 is on the last one."""
@@ -211,7 +210,7 @@ class _Deck:
             reading = self._reading(card, layout)
             if reading.xy_um == (0.0, 0.0):
                 self.messages.append(
-                    _message(card, f"point {reading.point} is missing: both readings are zero")
+                    card.message(f"point {reading.point} is missing: both readings are zero")
                 )
             else:
                 readings.append(reading)
@@ -252,7 +251,7 @@ class _Deck:
             leg=leg,
             point=_integer(card, *layout.point),
             xy_um=(xy[0], xy[1]),
-            place=_place(card),
+            place=card.place,
         )
 
     def _plate(self, card: Record, digits: int) -> int:
@@ -264,14 +263,6 @@ class _Deck:
             listed = ", ".join(str(number) for number in self.grids)
             raise card.error(f"plate {digits:02d} is not that of the header ({listed})")
         return found[0]
-
-
-def _place(record: Record) -> Place:
-    return Place(record.source.path, record.number, record.text)
-
-
-def _message(record: Record, text: str) -> Message:
-    return _place(record).message(text)
 
 
 def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | None = None) -> list[Session]:

@@ -62,14 +62,9 @@ class SinglePolynomial:
     residuals: Residuals
 
     @property
-    def sigma0_um(self) -> float:
-        """Standard error of unit weight (equation 60)."""
-        return self.residuals.sigma0_um
-
-    @property
     def covariance(self) -> Floats:
         """(18, 18) of the coefficients in metre units (m^2 times powers of 1/m), x first (equation 61)."""
-        return self.sigma0_um**2 * self.polynomial.cofactors
+        return self.residuals.sigma0_um**2 * self.polynomial.cofactors
 
 
 @dataclass(frozen=True, eq=False)

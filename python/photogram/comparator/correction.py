@@ -13,6 +13,7 @@ import orjson
 
 from photogram.comparator.polynomial import Frame, Polynomial, design
 from photogram.errors import InputError
+from photogram.files import read_bytes
 
 if TYPE_CHECKING:
     from photogram.adjusted import Floats
@@ -192,10 +193,9 @@ class Correction:
         InputError
             The file cannot be read or holds none.
         """
+        data = read_bytes(path)
         try:
-            document = orjson.loads(path.read_bytes())
+            document = orjson.loads(data)
             return cls.from_document(document.get("correction", document))
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}", file=path) from None
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise InputError(f"holds no correction of a comparator: {error}", file=path) from None

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.errors import InputError
+from photogram.files import read_bytes
 from photogram.places import Place
 
 __all__ = ["Row", "Table", "read_table"]
@@ -136,9 +137,7 @@ def read_table(path: Path) -> Table:
         The file cannot be read, has no names of columns, mixes units, or has a row of another length.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+        lines = read_bytes(path).decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
         raise InputError("is not a text file in UTF-8", file=path) from None
     settings: dict[str, str] = {}

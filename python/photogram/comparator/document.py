@@ -102,8 +102,8 @@ def _case(calibration: Calibration, index: int) -> dict[str, Any]:
         "translation_um": combined.translation_um.tolist(),
         "sigma0_um": {
             "free": case.free.residuals.sigma0_um,
-            "linear": case.linear.sigma0_um,
-            "nonlinear": case.polynomial.sigma0_um if case.polynomial else None,
+            "linear": case.linear.residuals.sigma0_um,
+            "nonlinear": case.polynomial.residuals.sigma0_um if case.polynomial else None,
         },
         "sigma0_combined_um": {
             "linear": combined.residuals.sigma0_um,

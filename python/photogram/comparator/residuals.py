@@ -51,7 +51,7 @@ class Residuals:
 
     @property
     def sigma0_um(self) -> float:
-        """Standard error of unit weight, of both comparator axes; NaN without redundancy."""
+        """Standard error of unit weight, comparator x and y (equations 52, 60); NaN without redundancy."""
         return self._sigma(sum(self.squares_um2[:2]), 2)
 
     def _sigma(self, square: float, axes: int) -> float:

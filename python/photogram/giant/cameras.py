@@ -40,7 +40,7 @@ def parse_cameras(source: Source) -> list[Camera]:
     """
     cameras: list[Camera] = []
     spellings: dict[str, Record] = {}
-    for record in source.filled():
+    for record in source.records():
         name = record.identification(spellings)
         first = spellings[name]
         if first is not record:

@@ -152,7 +152,7 @@ def parse_common(source: Source) -> Common:
             deviations.deviation(11, 20, angle=angle),
             deviations.deviation(21, 30),
         )
-    for record in source.filled():
+    for record in source.records():
         if record.number > 3:
             record.remark("COMMON has three records: this one is ignored")
     return common

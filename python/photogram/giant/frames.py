@@ -52,7 +52,7 @@ def parse_frames(source: Source, geographic: bool) -> list[Frame]:
         A field that is no number or no angle, a record without its partner, or a frame that stands there
         twice.
     """
-    records = source.filled()
+    records = source.records()
     positions = Columns([record.text for record in records[::2]])
     attitudes = Columns([record.text for record in records[1::2]])
     plain = zip(

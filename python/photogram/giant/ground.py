@@ -58,7 +58,7 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
     InputError
         A field that is no number or no angle, a type code above 7, or a point without a name.
     """
-    records = source.filled()
+    records = source.records()
     names = source.point_names([record.number for record in records])
     columns = Columns([record.text for record in records])
     plain = columns.rows(

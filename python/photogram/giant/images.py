@@ -69,7 +69,7 @@ def parse_images(source: Source) -> list[ImageFrame]:
     InputError
         A field that is no number, a point without a name or coordinates, or a frame without its terminator.
     """
-    numbers = [number for number, line in enumerate(source.lines, 1) if line.strip(" ")]
+    numbers = source.filled()
     ends = [row for row, number in enumerate(numbers) if source.lines[number - 1].startswith(TERMINATOR)]
     starts = [0, *(end + 1 for end in ends)]
     if starts[-1] != len(numbers):

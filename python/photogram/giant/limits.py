@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from photogram.errors import InputError
 from photogram.giant.records import error_at, message_at
-from photogram.messages import Message
+from photogram.messages import Message, listed
 
 if TYPE_CHECKING:
     from photogram.giant.contents import Contents
@@ -149,9 +149,8 @@ def allowed_images(
     allowed[by_point] = number < limit
     over = np.unique(image_points[~allowed]).tolist()
     if over:
-        listed = ", ".join(names[point] for point in over[:SHOWN])
-        more = f" and {len(over) - SHOWN} more" if len(over) > SHOWN else ""
-        text = f"PASS POINTS APPEARING ON MORE THAN {limit} PHOTOGRAPHS: {listed}{more}"
+        shown = listed([names[point] for point in over], SHOWN)
+        text = f"PASS POINTS APPEARING ON MORE THAN {limit} PHOTOGRAPHS: {shown}"
         messages.append(Message(f"{text}: of each the first {limit} images are kept"))
     return allowed
 

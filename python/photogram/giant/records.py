@@ -1,71 +1,49 @@
-"""A file as numbered records of 80 columns, and the fields of one record by their columns."""
+"""The records of the GIANT files: their fields by columns (GIANT guide, section II.B)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Self, TypeVar
 
+from photogram import records
 from photogram.errors import InputError
-from photogram.files import read_lines
 from photogram.giant.fields import format_deviations, parse_angle, parse_integer, parse_name, parse_real
 from photogram.messages import Message
 
 __all__ = ["Record", "Source", "error_at", "message_at"]
 
 T = TypeVar("T")
-WIDTH = 80
 QUARTER_CIRCLE = math.pi / 2 + 1e-12
 """The largest latitude, rounding allowed for."""
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class Source(records.Source):
     """The records of one file.
 
     Attributes
     ----------
-    path
-        Where the file is.
-    lines
-        Its records without their line ends, cut after column 80.
     strip
         The leading character removed from names (COMMON column 15), or nothing.
-    messages
-        Remarks made while the records are read.
     """
 
-    path: Path
-    lines: list[str]
     strip: str = ""
-    messages: list[Message] = field(default_factory=list)
 
     @classmethod
-    def read(cls, path: Path, strip: str = "") -> Source:
-        """Read a text file (UTF-8, else Latin-1; any line ends).
-
-        Raises
-        ------
-        InputError
-            The file cannot be read, or a record holds a tab or another control character, which would move
-            its columns.
-        """
-        source = cls(path, [line[:WIDTH] for line in read_lines(path)], strip)
-        if not "".join(source.lines).isprintable():
-            record = next(record for record in source.filled() if not record.text.isprintable())
-            what = next(character for character in record.text if not character.isprintable())
-            raise record.error(f"the character {what!r} has no place in a record of fixed columns")
-        return source
+    def read(cls, path: Path, strip: str = "") -> Self:
+        """Read a file, as :meth:`photogram.records.Source.read` does."""
+        return replace(super().read(path), strip=strip)
 
     def record(self, number: int) -> Record:
         """Return the record of a number, from 1."""
         return Record(self, number)
 
-    def filled(self) -> list[Record]:
+    def records(self) -> list[Record]:
         """Return the records that are not blank."""
-        return [Record(self, number) for number, line in enumerate(self.lines, 1) if line.strip(" ")]
+        return [self.record(number) for number in self.filled()]
 
     def point_names(self, numbers: list[int]) -> list[str]:
         """Read the names of points in columns 1-8 of many records.
@@ -84,42 +62,12 @@ class Source:
                     raise self.record(number).error("columns 1-8: the point has no name")
         return [names[text] for text in fields]
 
-    def error(self, text: str) -> InputError:
-        """Return an error about the file as a whole."""
-        return InputError(text, file=self.path)
-
 
 @dataclass(frozen=True, slots=True)
-class Record:
-    """One record; columns are counted from 1, first and last included."""
+class Record(records.Record):
+    """One record, with the fields that GIANT files have."""
 
     source: Source
-    number: int
-
-    @property
-    def text(self) -> str:
-        """The characters of the record."""
-        return self.source.lines[self.number - 1]
-
-    def error(self, text: str) -> InputError:
-        """Return an error that names file, record number and record."""
-        return InputError(text, file=self.source.path, record=self.number, text=self.text)
-
-    def message(self, text: str) -> Message:
-        """Return a remark that names file, record number and record."""
-        return Message(text, self.source.path, self.number, self.text)
-
-    def remark(self, text: str) -> None:
-        """Add a remark on this record to the messages of the file."""
-        self.source.messages.append(self.message(text))
-
-    def columns(self, first: int, last: int) -> str:
-        """Return the characters of a field."""
-        return self.text[first - 1 : last]
-
-    def blank(self, first: int, last: int) -> bool:
-        """Whether a field is blank."""
-        return not self.columns(first, last).strip(" ")
 
     def name(self, first: int) -> str:
         """Read an eight-character name (2A4)."""

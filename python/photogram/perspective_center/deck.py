@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.giant.records import Record, Source
 from photogram.messages import Message
 from photogram.perspective_center.formats import CardFormat
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Coordinatograph, Grid, reduce
+from photogram.records import Record, Source
 
 __all__ = ["OUT_OF_ORDER", "Deck", "Job", "read_deck"]
 
@@ -73,9 +73,8 @@ class Deck:
 
     def __init__(self, path: Path) -> None:
         self._source = Source.read(path)
-        filled = self._source.filled()
         # The flag card of the last set may be blank; cards after it hold nothing.
-        self._end = filled[-1].number if filled else 0
+        self._end = max(self._source.filled(), default=0)
         self._next = 1
         self.title: str | None = None
         self.number = 0

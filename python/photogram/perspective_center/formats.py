@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import fortranformat
 
-from photogram.giant.records import Record
+from photogram.records import Record
 
 __all__ = ["CardFormat"]
 

@@ -5,7 +5,6 @@ matplotlib is an extra (`pip install 'photogram[plots]'`) and is imported only h
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from photogram.errors import InputError
+from photogram.pictures import drawn, round_length
 
 if TYPE_CHECKING:
     from photogram.perspective_center.solution import Floats, PerspectiveCenter
@@ -40,18 +40,12 @@ def draw(results: list[PerspectiveCenter], path: Path) -> bytes:
     """
     if not results:
         raise InputError("no set was solved: there is nothing to draw", file=path)
-    drawing = figure(results)
-    suffix = path.suffix.lower().removeprefix(".") or "png"
-    if suffix not in drawing.canvas.get_supported_filetypes():
-        raise InputError(f"matplotlib draws no {suffix!r}; png, pdf and svg are possible", file=path)
-    content = io.BytesIO()
-    drawing.savefig(content, format=suffix, dpi=150)
-    return content.getvalue()
+    return drawn(figure(results), path)
 
 
 def figure(results: list[PerspectiveCenter]) -> Figure:
     """Return a figure with a row for each set: residual vectors, radial distortion."""
-    drawing = Figure(figsize=(WIDTH, ROW * len(results)), layout="constrained")
+    drawing = Figure(figsize=(WIDTH, ROW * len(results)), layout="constrained", dpi=150)
     axes = drawing.subplots(len(results), 2, squeeze=False, width_ratios=(1.0, 1.15))
     # One scale for all sets, so that they can be compared.
     longest = max(float(np.hypot(*result.residual.T).max()) for result in results)
@@ -82,7 +76,7 @@ def residual_vectors(axes: Axes, result: PerspectiveCenter, longest: float) -> N
         "color": ACCENT,
     }
     axes.quiver(x, y, *(result.residual.T * enlargement), **arrows)
-    known = _round_length(longest)
+    known = round_length(longest)
     margin = 0.12 * extent
     corner = np.array([x.min(), y.min() - 1.35 * margin])
     axes.quiver(*corner, known * enlargement, 0.0, **arrows)
@@ -135,14 +129,6 @@ def _means(radius: Floats, values: Floats) -> tuple[Floats, Floats]:
     groups = np.split(order, np.flatnonzero(steps) + 1)
     means = np.array([[radius[group].mean(), values[group].mean()] for group in groups])
     return means[:, 0], means[:, 1]
-
-
-def _round_length(longest: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that is not above a length."""
-    if longest <= 0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(longest))
-    return float(max(factor for factor in (1, 2, 5) if factor * power <= longest * (1 + 1e-9)) * power)
 
 
 def _name(result: PerspectiveCenter) -> str:

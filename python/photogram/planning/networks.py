@@ -63,10 +63,12 @@ class Plan:
     def plot(self) -> Figure:
         """Return a figure: the patterns in plan, the expected standard deviation in height as colour.
 
+        Needs matplotlib (`pip install 'photogram[plots]'`).
+
         Raises
         ------
         PhotogramError
-            matplotlib (`pip install photogram[plots]`) is not there.
+            There are no new points to be shown.
         """
         from photogram.planning.plot import figure  # matplotlib takes long to import
 

@@ -1,4 +1,7 @@
-"""A plan as a picture: the patterns in plan, the expected standard deviation in height as colour."""
+"""A plan as a picture: the patterns in plan, the expected standard deviation in height as colour.
+
+matplotlib is an extra (`pip install 'photogram[plots]'`) and takes long to import; it is imported only here.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from photogram.errors import PhotogramError
-
-try:
-    from matplotlib.figure import Figure
-except ImportError as error:
-    raise PhotogramError("pictures need matplotlib: pip install 'photogram[plots]'") from error
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

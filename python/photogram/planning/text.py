@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 from itertools import compress
 from typing import TYPE_CHECKING
 
-from photogram import _photocore
 from photogram.planning.statistics import PointQuality
-from photogram.report import composed
+from photogram.sections import composed, headline
 
 if TYPE_CHECKING:
     from photogram.planning.pattern import Pattern
@@ -39,8 +38,7 @@ def report(patterns: Sequence[Pattern]) -> str:
         ("Control: reliability", _control(patterns)),
         ("Comparison: expected standard deviations of all new points", _comparison(patterns)),
     ]
-    head = f"photogram {_photocore.__version__}  plan  {patterns[0].block.title}".rstrip()
-    return composed(head, sections)
+    return composed(headline("plan", patterns[0].block.title), sections)
 
 
 def _network(patterns: Sequence[Pattern]) -> list[str]:

@@ -7,7 +7,7 @@ use rayon::ThreadPool;
 use super::problem::{Model, Problem};
 use crate::normals::Cofactors;
 
-/// What an adjustment counts. The degrees of freedom are `observations + weighted - unknowns`.
+/// What an adjustment counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
     /// Observations proper.
@@ -19,7 +19,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Observations and weighted unknowns less unknowns.
+    /// Observations, those of unknowns themselves among them, minus unknowns.
     pub fn degrees_of_freedom(&self) -> i64 {
         (self.observations + self.weighted) as i64 - self.unknowns as i64
     }
@@ -125,7 +125,7 @@ impl<M> Problem<M> {
     }
 
     /// Weighted sum of squares of observed minus computed unknowns.
-    pub(super) fn prior_sum_of_squares(&self, values: &[f64]) -> f64 {
+    pub fn prior_sum_of_squares(&self, values: &[f64]) -> f64 {
         values.iter().enumerate().map(|(unknown, &value)| self.prior_square(unknown, value)).sum()
     }
 }

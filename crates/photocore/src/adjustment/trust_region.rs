@@ -14,8 +14,10 @@ const LEAST_DAMPING: f64 = 1e-10;
 const MOST_DAMPING: f64 = 1e16;
 /// A step is accepted when it lowers the sum of squares by this fraction of what the linearized equations predict.
 const LEAST_GAIN: f64 = 1e-3;
-/// A predicted decrease below this fraction of the sum of squares is rounding error.
+/// A predicted decrease below this fraction of the sum of squares is rounding error,
 const ROUNDING: f64 = 1e-14;
+/// and so may be one by which no unknown changes by more than this multiple of its standard deviation.
+const NEGLIGIBLE: f64 = 1e-6;
 
 /// The damping, and by how much the next failure raises it.
 struct Damping {
@@ -67,7 +69,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let sum_of_squares = self.objective(&trial);
             let gain = (lowest - sum_of_squares) / predicted;
             // Written so that a gain that is not a number is a failure.
-            if gain > LEAST_GAIN {
+            if gain > LEAST_GAIN && sum_of_squares <= lowest {
                 let decrease = lowest - sum_of_squares;
                 let number = self.iterations.len() + 1;
                 let iteration =
@@ -79,7 +81,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                     return self.rest(trial, Status::Converged);
                 }
                 state = self.form(trial, damping.value)?;
-            } else if whole || predicted <= ROUNDING * lowest {
+            } else if whole || predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE) {
                 return self.rest(unknowns, Status::Converged);
             } else {
                 damping.rise();

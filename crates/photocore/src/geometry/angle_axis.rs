@@ -1,6 +1,6 @@
 //! Rotations as one vector: its direction is the axis, its length the angle in radians.
 
-use super::vector::{Matrix3, Vector3, dot};
+use super::vector::{Matrix3, Vector3, square};
 
 /// Square of the angle below which the closed form of (a - sin a) / a^3 loses digits, and its series does not.
 const SMALL: f64 = 0.1;
@@ -30,15 +30,15 @@ fn combined(w: Vector3, a: f64, b: f64, c: f64) -> Matrix3 {
 
 /// The rotation by an angle-axis vector (Rodrigues).
 pub fn angle_axis_rotation(w: Vector3) -> Matrix3 {
-    let (sine, versine, _) = ratios(dot(&w, &w));
-    combined(w, 1.0 - versine * dot(&w, &w), sine, versine)
+    let (sine, versine, _) = ratios(square(&w));
+    combined(w, 1.0 - versine * square(&w), sine, versine)
 }
 
 /// The rotation R and its left Jacobian J: a small change dw turns further by J dw, d(R v) = (J dw) x R v.
 ///
 /// J is singular at full turns.
 pub fn angle_axis_with_jacobian(w: Vector3) -> (Matrix3, Matrix3) {
-    let (sine, versine, rest) = ratios(dot(&w, &w));
-    let rotation = combined(w, 1.0 - versine * dot(&w, &w), sine, versine);
+    let (sine, versine, rest) = ratios(square(&w));
+    let rotation = combined(w, 1.0 - versine * square(&w), sine, versine);
     (rotation, combined(w, sine, versine, rest))
 }

@@ -14,6 +14,18 @@ pub fn dot(a: &Vector3, b: &Vector3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// |v|^2
+#[inline(always)]
+pub fn square(v: &Vector3) -> f64 {
+    dot(v, v)
+}
+
+/// v / |v|; None for a vector without direction.
+pub fn unit(v: &Vector3) -> Option<Vector3> {
+    let length = square(v).sqrt();
+    (length > 0.0 && length.is_finite()).then(|| v.map(|value| value / length))
+}
+
 /// a x b
 #[inline(always)]
 pub fn cross(a: &Vector3, b: &Vector3) -> Vector3 {
@@ -55,7 +67,7 @@ pub fn solve(matrix: &Matrix3, b: &Vector3, tolerance: f64) -> Option<Vector3> {
     let [p, q, r] = transposed(matrix);
     let (qr, rp, pq) = (cross(&q, &r), cross(&r, &p), cross(&p, &q));
     let determinant = dot(&p, &qr);
-    let largest = (dot(&p, &p) * dot(&q, &q) * dot(&r, &r)).sqrt();
+    let largest = (square(&p) * square(&q) * square(&r)).sqrt();
     let regular = determinant.abs() > tolerance * largest;
     regular.then(|| [&qr, &rp, &pq].map(|minor| dot(b, minor) / determinant))
 }

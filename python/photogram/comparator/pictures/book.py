@@ -6,7 +6,6 @@ import base64
 import html
 import io
 from collections.abc import Iterator
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from photogram import _photocore
@@ -20,7 +19,6 @@ from photogram.comparator.pictures.vectors import (
     grid_vectors,
     joint_grid,
 )
-from photogram.errors import PhotogramError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,13 +40,8 @@ pre { background: #f4f6f8; padding: 1em; overflow-x: auto; font-size: 0.78em; li
 def figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
     """Make the pictures one after the other, with short names.
 
-    Raises
-    ------
-    PhotogramError
-        matplotlib is not installed.
+    Needs matplotlib (`pip install 'photogram[plots]'`).
     """
-    if find_spec("matplotlib") is None:
-        raise PhotogramError("pictures need matplotlib: pip install 'photogram[plots]'")
     for name, figure in _figures(calibration):
         # Panels of equal scales are laid out well only when their limits are known.
         figure.draw_without_rendering()
@@ -80,10 +73,7 @@ def _title(calibration: Calibration) -> str:
 def html_report(calibration: Calibration) -> bytes:
     """Return one page with the summary, the tests, the remarks and all pictures inside (UTF-8).
 
-    Raises
-    ------
-    PhotogramError
-        matplotlib is not installed.
+    Needs matplotlib (`pip install 'photogram[plots]'`).
     """
     parts = []
     for name, figure in figures(calibration):
@@ -110,20 +100,15 @@ def html_report(calibration: Calibration) -> bytes:
 def pdf_report(calibration: Calibration) -> bytes:
     """Return the summary and all pictures as a PDF.
 
-    Raises
-    ------
-    PhotogramError
-        matplotlib is not installed.
+    Needs matplotlib (`pip install 'photogram[plots]'`).
     """
-    pictures = figures(calibration)
-    first = next(pictures)
     from matplotlib.backends.backend_pdf import PdfPages
 
     buffer = io.BytesIO()
     # Without a date equal calibrations give equal files.
     with PdfPages(buffer, metadata={"Title": _title(calibration), "CreationDate": None}) as pdf:
         pdf.savefig(_text_page(calibration))
-        for _, figure in (first, *pictures):
+        for _, figure in figures(calibration):
             pdf.savefig(figure)
     return buffer.getvalue()
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, new_figure, plain, round_length
+from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, new_figure, plain
+from photogram.pictures import round_length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,8 +16,8 @@ from photogram.comparator.pictures.style import (
     new_figure,
     panels,
     plain,
-    round_length,
 )
+from photogram.pictures import round_length
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

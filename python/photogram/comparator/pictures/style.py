@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from photogram.adjusted import Floats
 
-__all__ = ["ACCENT", "FAINT", "MAIN", "arrows", "key", "new_figure", "panels", "plain", "round_length"]
+__all__ = ["ACCENT", "FAINT", "MAIN", "arrows", "key", "new_figure", "panels", "plain"]
 
 MAIN = "#1f4e79"
 ACCENT = "#b5432a"
@@ -54,14 +54,6 @@ def plain(axes: Axes, xlabel: str, ylabel: str) -> None:
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
         axes.spines[side].set_color(FAINT)
-
-
-def round_length(value: float) -> float:
-    """Return the nearest of 1, 2, 5 times a power of ten below a value."""
-    if not value > 0:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(value))
-    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9))
 
 
 def magnification(places_mm: Floats, vectors_um: Floats) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import orjson
 
 from photogram import _photocore
+from photogram.sections import composed, headline
 
 if TYPE_CHECKING:
     from photogram.result import Result
@@ -108,13 +109,8 @@ class Check:
     def report(self) -> str:
         """Return the check as text."""
         grave, look = len(self.grave), len(self.findings) - len(self.grave)
-        head = f"photogram {_photocore.__version__}  check  {self.title}".rstrip()
-        parts = [f"{head}\n{grave} grave, {look} to look at"]
-        parts += [
-            f"{section.title}\n{'-' * len(section.title)}\n" + "\n".join(section.text())
-            for section in self.sections
-        ]
-        return "\n\n".join(parts) + "\n"
+        head = f"{headline('check', self.title)}\n{grave} grave, {look} to look at"
+        return composed(head, ((section.title, section.text()) for section in self.sections))
 
     def to_json(self) -> bytes:
         """Return the findings as a JSON document (UTF-8); `docs/giant-check.md` lists its members."""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from photogram.block import Block
 from photogram.giant.checks.findings import Finding, Section
 from photogram.giant.remarks import FEWEST_TIES, ties
+from photogram.messages import listed
 from photogram.report import bandwidths
 from photogram.result import Result
 from photogram.structuring import structure
@@ -15,8 +16,6 @@ from photogram.structuring import structure
 __all__ = ["parts_of", "structure_section"]
 
 Indices = NDArray[np.int64]
-
-SHOWN = 12
 
 
 def structure_section(block: Block, result: Result | None) -> Section:
@@ -79,8 +78,7 @@ def _parts(block: Block, section: Section) -> None:
     largest = numbers[sizes.argmax()]
     for number in numbers[numbers != largest].tolist():
         names = [block.photo_ids[photo] for photo in np.flatnonzero(parts == number).tolist()]
-        listed = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
-        text = f"no point ties the photos {listed} to the others: are names of points spelt alike?"
+        text = f"no point ties the photos {listed(names)} to the others: are names of points spelt alike?"
         section.findings.append(Finding("separate-part", "grave", text, names))
 
 

@@ -1,7 +1,7 @@
 //! Coordinates of points by intersection of their rays from given photographs.
 
 use super::model::CentralPerspective;
-use crate::geometry::vector::{difference, dot, solve};
+use crate::geometry::vector::{difference, dot, solve, square};
 use crate::geometry::{Photo, Point, Ray, Vector3};
 
 /// Determinant of the normal matrix, relative to its largest possible value, below which rays count as parallel
@@ -45,7 +45,7 @@ impl CentralPerspective {
     fn median_distance(&self, photos: &[Photo], met: &[Option<Vector3>]) -> Option<f64> {
         let distance = |(&first, met): (&usize, &Option<Vector3>)| {
             let offset = difference(met.as_ref()?, &photos[self.images[first].photo].centre());
-            Some(dot(&offset, &offset).sqrt())
+            Some(square(&offset).sqrt())
         };
         let mut distances: Vec<f64> = self.start.iter().zip(met).filter_map(distance).collect();
         distances.sort_unstable_by(f64::total_cmp);

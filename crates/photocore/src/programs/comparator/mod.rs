@@ -12,7 +12,7 @@ use std::ops::{ControlFlow, Range};
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use crate::adjustment::{self, AdjustError, Adjustment, Event, Problem};
+use crate::adjustment::{self, AdjustError, Adjustment, Event, Problem, leading_matrix};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 pub use measure::{Basis, Comparator, Measured, Placement};
@@ -214,9 +214,7 @@ impl Solution {
         let prior_redundancy = adjustment.prior_redundancy.take();
         let residuals = std::mem::take(&mut adjustment.residuals);
         let redundancy = adjustment.redundancy.take();
-        let prior = |range: Range<usize>| range.map(|i| problem.prior_square(i, unknowns[i])).sum::<f64>();
-        let sum_of_squares = problem.sum_of_squares(&residuals) + prior(0..unknowns.len());
-        let counts = adjustment.counts;
+        let sum_of_squares = problem.sum_of_squares(&residuals) + problem.prior_sum_of_squares(&unknowns);
         let border = layout.border_range();
         let missing = || vec![f64::NAN; border.len() * border.len()];
         Self {
@@ -230,7 +228,7 @@ impl Solution {
             residuals: problem.model.in_given_order(pairs(Some(&residuals), 0..layout.groups())),
             redundancy: problem.model.in_given_order(pairs(redundancy.as_deref(), 0..layout.groups())),
             sum_of_squares,
-            degrees_of_freedom: (counts.observations + counts.weighted) as i64 - counts.unknowns as i64,
+            degrees_of_freedom: adjustment.counts.degrees_of_freedom(),
             adjustment,
         }
     }
@@ -241,10 +239,5 @@ fn pairs(values: Option<&[f64]>, range: Range<usize>) -> Vec<[f64; 2]> {
 }
 
 fn squares<const N: usize>(values: Option<&[f64]>, count: usize) -> Vec<[[f64; N]; N]> {
-    let square = |k: usize| {
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| values.map_or(f64::NAN, |values| values[N * N * k + N * i + j]))
-        })
-    };
-    (0..count).map(square).collect()
+    (0..count).map(|k| leading_matrix(values.map(|all| &all[N * N * k..]))).collect()
 }

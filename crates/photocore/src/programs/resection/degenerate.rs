@@ -1,8 +1,7 @@
 //! Configurations that do not determine a pose.
 
-use super::three_points::{square, unit};
 use crate::geometry::Vector3;
-use crate::geometry::vector::{cross, difference, dot};
+use crate::geometry::vector::{cross, difference, dot, square, unit};
 
 /// Distances of all points from a line, relative to their extent, below which they count as collinear.
 const COLLINEAR: f64 = 1e-7;

@@ -111,7 +111,6 @@ impl Solution {
         let pose = solved.pose();
         let Solved { problem, mut adjustment, start, origin } = solved;
         let unknowns = std::mem::take(&mut adjustment.unknowns);
-        let counts = adjustment.counts;
         let cofactors = adjustment.cofactors.take();
         let own = adjustment.prior_redundancy.take();
         let redundancy_of = |unknown: usize| own.as_ref().map_or(f64::NAN, |all| all[unknown]);
@@ -134,7 +133,7 @@ impl Solution {
             points: (0..resection.points.len()).map(control).collect(),
             images: images(&problem.model, &unknowns, &problem.observation_sd, &mut adjustment),
             sum_of_squares,
-            degrees_of_freedom: (counts.observations + counts.weighted) as i64 - counts.unknowns as i64,
+            degrees_of_freedom: adjustment.counts.degrees_of_freedom(),
             start,
             history,
             alternatives: vec![],

@@ -1,9 +1,11 @@
 //! Initial poses without initial values: well-spread triples of points, each checked against all others.
 
 use super::degenerate::collinear;
-use super::three_points::{Placement, square, three_points, unit};
+use super::three_points::{Placement, three_points};
 use super::{ControlPoint, Known, Pose, Resection, ResectionError};
-use crate::geometry::vector::{IDENTITY, Vector3, apply, cross, difference, dot, product, transposed};
+use crate::geometry::vector::{
+    IDENTITY, Vector3, apply, cross, difference, dot, product, square, transposed, unit,
+};
 use crate::geometry::{ObjectSpace, RotationSense, local_vertical, rotation_angles};
 
 /// Points among which triples are formed, and triples that are solved.

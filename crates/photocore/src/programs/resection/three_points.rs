@@ -5,7 +5,9 @@
 //! of the three equations are homogeneous, l^T D1 l = 0 and l^T D2 l = 0: two cones. A cone D1 + g D2 with zero determinant is
 //! a pair of planes; on each plane one distance is a linear function of the other two, and a quadratic equation is left.
 
-use crate::geometry::vector::{apply, apply_transposed, cross, difference, dot, product, solve, transposed};
+use crate::geometry::vector::{
+    apply, apply_transposed, cross, difference, dot, product, solve, square, transposed, unit,
+};
 use crate::geometry::{Matrix3, Vector3};
 
 /// Where a photo stands in cartesian object space: u = G (P - C).
@@ -159,17 +161,6 @@ fn axes(corners: &[Vector3; 3]) -> Option<Matrix3> {
     let along = unit(&difference(&corners[1], &corners[0]))?;
     let normal = unit(&cross(&along, &difference(&corners[2], &corners[0])))?;
     Some(transposed(&[along, cross(&normal, &along), normal]))
-}
-
-/// |v|^2
-pub(super) fn square(v: &Vector3) -> f64 {
-    dot(v, v)
-}
-
-/// v / |v|; None for a vector without direction.
-pub(super) fn unit(v: &Vector3) -> Option<Vector3> {
-    let length = square(v).sqrt();
-    (length > 0.0 && length.is_finite()).then(|| v.map(|value| value / length))
 }
 
 /// a A + b B

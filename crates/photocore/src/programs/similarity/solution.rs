@@ -6,7 +6,7 @@ use super::published::Cycles;
 use super::start::{Chosen, Started};
 use super::transform::{Matrix7, Similarity};
 use super::{SimilarityError, Station, determinacy, misclosures};
-use crate::adjustment::{Adjustment, Iteration, Problem, Status};
+use crate::adjustment::{Adjustment, Iteration, Problem, Status, leading_matrix};
 use crate::geometry::{Matrix3, Vector3};
 
 /// A station after the orientation. What is unknown is NaN.
@@ -111,13 +111,12 @@ impl AdjustedStation {
             let exact = known[k] && station.control_sd[k] == 0.0;
             if exact { station.control[k] } else { values[k] + similarity.control_centre[k] }
         };
-        let local = adjustment.cofactors.as_ref().map(|all| &all.local[9 * index..]);
-        let cofactor = |i: usize, j: usize| local.map_or(f64::NAN, |own| own[3 * i + j] / (inner * inner));
+        let own: Matrix3 = leading_matrix(adjustment.cofactors.as_ref().map(|all| &all.local[9 * index..]));
         Self {
             misclosure: std::array::from_fn(|k| if known[k] { u[k] } else { f64::NAN }),
             model_residual: std::array::from_fn(|k| -adjustment.residuals[3 * index + k]),
             control: std::array::from_fn(control),
-            cofactors: std::array::from_fn(|i| std::array::from_fn(|j| cofactor(i, j))),
+            cofactors: own.map(|row| row.map(|cofactor| cofactor / (inner * inner))),
             redundancy,
             standardized,
         }

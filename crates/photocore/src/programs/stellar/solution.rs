@@ -2,7 +2,7 @@
 
 use super::model::{Group, Sight, StarImages};
 use super::{COMMON, Calibration, Options};
-use crate::adjustment::{Adjustment, Problem};
+use crate::adjustment::{Adjustment, Problem, standardized};
 
 /// What an equation of unit weight shows after the adjustment.
 #[derive(Debug, Clone, Copy)]
@@ -99,11 +99,7 @@ impl Solution {
             let weighted = [residuals[2 * group], residuals[2 * group + 1]];
             let redundancy: [f64; 2] =
                 std::array::from_fn(|row| redundancy.as_ref().map_or(f64::NAN, |all| all[2 * group + row]));
-            let standardized = std::array::from_fn(|row| {
-                // What rounding leaves of a redundancy of zero would make a test value of noise.
-                let testable = redundancy[row] > 1e-10;
-                if testable { weighted[row] / (unit * redundancy[row].sqrt()) } else { f64::NAN }
-            });
+            let standardized = std::array::from_fn(|row| standardized(weighted[row], unit, redundancy[row]));
             let tested = Tested { redundancy, standardized };
             let square = weighted[0] * weighted[0] + weighted[1] * weighted[1];
             match *kind {
