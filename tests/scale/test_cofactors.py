@@ -22,7 +22,8 @@ def test_cofactors_are_those_of_unit_vectors() -> None:
     all photos that show them. To 1e-10 of the variances.
     """
     block = simulate(strips=50, photos_per_strip=100, seed=1).block
-    result = adjust(block)
+    # Cofactors hold before the last step, which is therefore made next to nothing.
+    result = adjust(block, tolerance=1e-9)
     images = np.random.default_rng(7).choice(len(block.image_photos), IMAGES, replace=False)
     around = UnitVectors(result).around(images)
     for image, (of_photo, of_point, of_image) in zip(images, around, strict=True):

@@ -15,7 +15,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use photocore::adjustment;
 use photocore::geometry::{self, ObjectSpace, RotationSense};
-use photocore::normals::{Equations, Factor, GroupRows, Layout, Normals, Ordering, Prior, System};
+use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, System};
 use photocore::programs::block::{Block, Image, Options, Photo, Point, UnitVariance};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -165,12 +165,8 @@ impl Phases {
         Self { pool: pool(), system: System::new(layout, Ordering::Auto), equations, prior }
     }
 
-    fn form(&self) -> Normals {
-        done(self.system.form(&self.pool, &self.equations, &self.prior, 0.0, &mut go))
-    }
-
     fn factor(&self) -> Factor {
-        self.form().factor(&self.pool).expect("a determined block")
+        done(self.system.factor(&self.pool, &self.equations, &self.prior, 0.0, &mut go))
     }
 
     /// Multiply-adds of the formation with its reduction, and of the cofactors of points and image points, from the numbers of
@@ -260,21 +256,13 @@ fn phases(criterion: &mut Criterion) {
     group.bench_function("solve", |bencher| {
         bencher.iter(|| done(system.solve(pool, &factor, equations, prior, 0.0, &mut go)));
     });
-    group.throughput(elements(formation));
-    group.bench_function("form", |bencher| bencher.iter(|| phases.form()));
-    group.throughput(elements(predicted.factor));
-    group.bench_function("factor", |bencher| {
-        bencher.iter_batched(|| phases.form(), |normals| normals.factor(pool), BatchSize::PerIteration);
-    });
-    group.throughput(elements(predicted.inverse));
+    // Formation, reduction and factorisation go together, front by front; so do the selected inverse and the cofactors.
+    group.throughput(elements(formation + predicted.factor));
+    group.bench_function("factor", |bencher| bencher.iter(|| phases.factor()));
+    group.throughput(elements(predicted.inverse + cofactors));
     group.bench_function("invert", |bencher| {
-        let invert = |factor: Factor| factor.into_selected_inverse(pool);
+        let invert = |factor: Factor| done(system.invert(pool, factor, equations, prior, &mut go));
         bencher.iter_batched(|| phases.factor(), invert, BatchSize::PerIteration);
-    });
-    let inverse = phases.factor().into_selected_inverse(pool);
-    group.throughput(elements(cofactors));
-    group.bench_function("cofactors", |bencher| {
-        bencher.iter(|| done(system.cofactors(pool, &inverse, equations, prior, &mut go)));
     });
     group.finish();
 }

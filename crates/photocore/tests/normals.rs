@@ -166,19 +166,18 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let pool = pool(2);
     let system = System::new(dense.layout.clone(), ordering);
     let layout = system.layout();
-    let normals = done(system.form(&pool, dense, &dense.prior, 0.0, &mut go));
-    assert!(normals.deficient_locals.is_empty());
-    let factor = normals.factor(&pool).unwrap();
+    let factor = done(system.factor(&pool, dense, &dense.prior, 0.0, &mut go));
+    assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
     let solution = done(system.solve(&pool, &factor, dense, &dense.prior, 0.0, &mut go));
     let cholesky = dense.normal_matrix().llt(faer::Side::Lower).unwrap();
     let expected = cholesky.solve(dense.normal_right());
-    for (i, value) in solution.values.iter().enumerate() {
+    for (i, value) in solution.iter().enumerate() {
         assert_close(*value, expected[(i, 0)], 1e-9 * expected.norm_max(), "solution");
     }
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
-    let selected = factor.into_selected_inverse(&pool);
+    let found = done(system.invert(&pool, factor, dense, &dense.prior, &mut go));
+    let (cofactors, selected) = (found.cofactors, found.selected);
     compare_blocks(layout, &selected, &inverse);
-    let cofactors = done(system.cofactors(&pool, &selected, dense, &dense.prior, &mut go));
     let l = layout.local_dim();
     for local in 0..layout.locals() {
         let range = layout.local_range(local);
@@ -245,12 +244,10 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     let run = |threads: usize| {
         let pool = pool(threads);
         let system = System::new(dense.layout.clone(), Ordering::Auto);
-        let factor = done(system.form(&pool, &dense, &dense.prior, 0.0, &mut go)).factor(&pool).unwrap();
+        let factor = done(system.factor(&pool, &dense, &dense.prior, 0.0, &mut go));
         let solution = done(system.solve(&pool, &factor, &dense, &dense.prior, 0.0, &mut go));
-        let selected = factor.into_selected_inverse(&pool);
-        let cofactors = done(system.cofactors(&pool, &selected, &dense, &dense.prior, &mut go));
-        let numbers =
-            [solution.values, cofactors.local, cofactors.kept, cofactors.border, cofactors.equations];
+        let cofactors = done(system.invert(&pool, factor, &dense, &dense.prior, &mut go)).cofactors;
+        let numbers = [solution, cofactors.local, cofactors.kept, cofactors.border, cofactors.equations];
         numbers.concat().into_iter().map(f64::to_bits).collect::<Vec<u64>>()
     };
     let one = run(1);
@@ -269,8 +266,8 @@ fn what_the_equations_do_not_determine_is_named() {
         dense.matrix[(row, range.start + 4)] = dense.matrix[(row, range.start + 1)];
     }
     let system = System::new(layout, Ordering::ReverseCuthillMckee);
-    let normals = done(system.form(&pool(2), &dense, &dense.prior, 0.0, &mut go));
-    let deficiency = normals.factor(&pool(2)).unwrap_err();
+    let factor = done(system.factor(&pool(2), &dense, &dense.prior, 0.0, &mut go));
+    let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.defect(), 1);
     assert_eq!(deficiency.blocks(), vec![vec![3]]);
 }
@@ -281,8 +278,8 @@ fn local_block_without_equations_is_named() {
     let mut dense = Dense::new(layout.clone(), 5);
     dense.prior.weight[layout.local_range(1)].fill(0.0);
     let system = System::new(layout, Ordering::Auto);
-    let normals = done(system.form(&pool(1), &dense, &dense.prior, 0.0, &mut go));
-    assert_eq!(normals.deficient_locals, vec![1]);
+    let factor = done(system.factor(&pool(1), &dense, &dense.prior, 0.0, &mut go));
+    assert_eq!(factor.deficient_locals, vec![1]);
 }
 
 #[test]

@@ -5,8 +5,9 @@ use super::loss::Loss;
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Criterion {
-    /// When no unknown changes by more than this fraction of its standard deviation (a priori unit weight). Steps that
-    /// raise the sum of squares are damped (Levenberg-Marquardt).
+    /// When no unknown changes by more than this fraction of its standard deviation (a priori unit weight), or when the rate of
+    /// convergence shows that none would in the next iteration. Steps that raise the sum of squares are damped
+    /// (Levenberg-Marquardt).
     Fraction(f64),
     /// When the weighted sum of squares changes by less than this percentage from one iteration to the next, as in the
     /// 1987 program (GIANT guide, section 6); no damping.

@@ -10,7 +10,7 @@ use super::options::{Criterion, Event, Iteration, Options, Phase, Status};
 use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
 use super::trust_region::FIRST_DAMPING;
-use crate::normals::{Cofactors, Factor, Normals, Prior};
+use crate::normals::{Cofactors, Factor, Inversion, Prior};
 
 /// Adjusts a problem by least squares.
 ///
@@ -56,12 +56,12 @@ pub fn adjust<M: Model>(
 /// a loss does no harm.
 const SHORT: f64 = 1.0;
 
-/// The problem linearized at some values, and its normal equations.
+/// The problem linearized at some values, and its normal equations factored.
 pub(super) struct State<'a, M: Model> {
     pub unknowns: Vec<f64>,
     pub equations: Linearized<'a, M>,
     pub prior: Prior,
-    pub normals: Normals,
+    pub factor: Factor,
     pub damping: f64,
     /// Whether the second-order term of the loss is taken in.
     pub curved: bool,
@@ -124,12 +124,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let plain = state.damping == 0.0 && !state.curved;
         self.curved = false;
         let state = if plain { state } else { self.form(state.unknowns, 0.0)? };
-        match self.factor(state.normals) {
-            Ok(factor) => {
-                let basis = Some(Basis { equations: state.equations, prior: state.prior, factor });
+        match self.determined(&state.factor) {
+            Ok(()) => {
+                let State { equations, prior, factor, .. } = state;
+                let basis = Some(Basis { equations, prior, factor });
                 Ok(End { status, unknowns, basis, undetermined: None, last: None })
             }
-            Err(AdjustError::Interrupted) => Err(AdjustError::Interrupted),
             Err(error) => Ok(End::lost(unknowns, Some(error))),
         }
     }
@@ -170,46 +170,41 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let equations = Linearized::new(self.problem, &unknowns, &self.datum, reweighting);
         let prior = self.problem.prior_equations(&unknowns, &self.datum);
         let total = self.problem.layout().locals();
-        let formed = {
+        let factored = {
             let mut between = between(&mut *self.watch, Phase::Form, total);
-            self.problem.system.form(self.pool, &equations, &prior, damping, &mut between)
+            self.problem.system.factor(self.pool, &equations, &prior, damping, &mut between)
         };
-        let ControlFlow::Continue(normals) = formed else { return Err(AdjustError::Interrupted) };
+        let ControlFlow::Continue(factor) = factored else { return Err(AdjustError::Interrupted) };
+        let seconds = start.elapsed().as_secs_f64();
+        self.seconds.form += seconds * factor.formation_share;
+        self.seconds.factor += seconds * (1.0 - factor.formation_share);
         let sum_of_squares = match self.options.loss {
-            None => normals.sum_of_squares + self.problem.prior_sum_of_squares(&unknowns),
+            None => factor.sum_of_squares + self.problem.prior_sum_of_squares(&unknowns),
             Some(_) => self.objective(&unknowns),
         };
-        self.seconds.form += start.elapsed().as_secs_f64();
         self.formations += 1;
-        Ok(State { unknowns, equations, prior, normals, damping, curved: self.curved, sum_of_squares })
+        Ok(State { unknowns, equations, prior, factor, damping, curved: self.curved, sum_of_squares })
     }
 
-    fn factor(&mut self, normals: Normals) -> Result<Factor, AdjustError> {
-        let start = Instant::now();
-        self.enter(Phase::Factor)?;
-        if !normals.deficient_locals.is_empty() {
-            return Err(AdjustError::UndeterminedLocals(normals.deficient_locals));
+    /// Whether everything is determined.
+    fn determined(&self, factor: &Factor) -> Result<(), AdjustError> {
+        if !factor.deficient_locals.is_empty() {
+            return Err(AdjustError::UndeterminedLocals(factor.deficient_locals.clone()));
         }
-        let factor = normals.factor(self.pool).map_err(|found| AdjustError::Undetermined(found.blocks()))?;
-        self.seconds.factor += start.elapsed().as_secs_f64();
-        Ok(factor)
+        factor.deficiency().map_or(Ok(()), |found| Err(AdjustError::Undetermined(found.blocks())))
     }
 
     fn solve(&mut self, state: State<'a, M>) -> Result<Solved<'a, M>, AdjustError> {
-        let local_decrease = state.normals.local_decrease;
-        let factor = self.factor(state.normals)?;
+        self.determined(&state.factor)?;
+        let State { equations, prior, factor, damping, .. } = state;
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
         let system = &self.problem.system;
-        let solved =
-            system.solve(self.pool, &factor, &state.equations, &state.prior, state.damping, &mut between);
-        let ControlFlow::Continue(solution) = solved else { return Err(AdjustError::Interrupted) };
+        let solved = system.solve(self.pool, &factor, &equations, &prior, damping, &mut between);
+        let ControlFlow::Continue(step) = solved else { return Err(AdjustError::Interrupted) };
         self.seconds.solve += start.elapsed().as_secs_f64();
-        Ok(Solved {
-            basis: Basis { equations: state.equations, prior: state.prior, factor },
-            step: solution.values,
-            change: (local_decrease + solution.decrease).sqrt(),
-        })
+        let change = factor.decrease.sqrt();
+        Ok(Solved { basis: Basis { equations, prior, factor }, step, change })
     }
 
     fn finish(mut self, end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
@@ -261,21 +256,16 @@ impl<'a, M: Model> Run<'a, '_, M> {
     fn cofactors(&mut self, basis: Basis<'a, M>) -> Result<(Cofactors, Vec<f64>), AdjustError> {
         let Basis { equations, prior, factor } = basis;
         let start = Instant::now();
-        self.enter(Phase::Invert)?;
-        let inverse = factor.into_selected_inverse(self.pool);
-        self.seconds.invert = start.elapsed().as_secs_f64();
-        let start = Instant::now();
-        let mut between = between(&mut *self.watch, Phase::Cofactors, self.problem.layout().locals());
-        let found = self.problem.system.cofactors(self.pool, &inverse, &equations, &prior, &mut between);
-        let ControlFlow::Continue(mut cofactors) = found else { return Err(AdjustError::Interrupted) };
+        let mut between = between(&mut *self.watch, Phase::Invert, self.problem.layout().locals());
+        let found = self.problem.system.invert(self.pool, factor, &equations, &prior, &mut between);
+        let ControlFlow::Continue(Inversion { mut cofactors, inversion_share, .. }) = found else {
+            return Err(AdjustError::Interrupted);
+        };
         let prior_redundancy = self.problem.finish_cofactors(&mut cofactors, &self.datum);
-        self.seconds.cofactors = start.elapsed().as_secs_f64();
+        let seconds = start.elapsed().as_secs_f64();
+        self.seconds.invert = seconds * inversion_share;
+        self.seconds.cofactors = seconds * (1.0 - inversion_share);
         Ok((cofactors, prior_redundancy))
-    }
-
-    fn enter(&mut self, phase: Phase) -> Result<(), AdjustError> {
-        let total = self.problem.layout().locals();
-        stopped((self.watch)(Event::Progress { phase, done: 0, total }))
     }
 
     /// Keeps an iteration that stands, with its corrections, and tells of it.

@@ -38,18 +38,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let number = self.iterations.len() + 1;
             let iteration =
                 Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
-            if damping == 0.0 && solved.change <= fraction && curved {
-                return self.stay_after(iteration, &unknowns, &solved.step);
-            }
-            if damping == 0.0 && solved.change <= fraction {
+            let last = solved.change <= fraction || self.leaves_less_than(fraction, solved.change);
+            if damping == 0.0 && last {
+                if curved {
+                    return self.stay_after(iteration, &unknowns, &solved.step);
+                }
                 let last = Some((iteration, solved.step));
-                return Ok(End {
-                    status: Status::Converged,
-                    unknowns,
-                    basis: Some(solved.basis),
-                    undetermined: None,
-                    last,
-                });
+                let basis = Some(solved.basis);
+                return Ok(End { status: Status::Converged, unknowns, basis, undetermined: None, last });
             }
             let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
             let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
@@ -58,7 +54,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let negligible = damping == 0.0 && solved.change <= NEGLIGIBLE;
             let highest = if negligible { f64::MAX } else { best * (1.0 + ROUNDING) };
             // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
-            if next.sum_of_squares <= highest && next.normals.deficient_locals.is_empty() {
+            if next.sum_of_squares <= highest && next.factor.deficient_locals.is_empty() {
                 best = next.sum_of_squares;
                 self.accept(Iteration { sum_of_squares: best, ..iteration }, &unknowns, &next.unknowns)?;
                 state = next;
@@ -68,6 +64,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
         let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
         self.stay(state, status)
+    }
+
+    /// Whether a step is negligible itself and, the steps falling at the rate of the last two, all further ones together would be
+    /// well below a limit (Hairer and Wanner 1996, section IV.8).
+    fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
+        let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
+        let rate = before.map_or(1.0, |iteration| change / iteration.largest_change);
+        change <= NEGLIGIBLE && rate < 1.0 && rate / (1.0 - rate) * change <= limit / 10.0
     }
 
     /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.

@@ -1,16 +1,18 @@
 //! Cofactors of every unknown and of every adjusted equation, from the selected inverse.
 
-use std::ops::ControlFlow;
+use std::time::Instant;
 
-use pulp::Arch;
-use rayon::ThreadPool;
+use pulp::Simd;
 use rayon::prelude::*;
 
-use super::elimination::{Elimination, Equations, LocalPrior, dot};
-use super::floors::skip;
+use super::equations::{Equations, Prior};
+use super::incidence::Stacks;
 use super::invert::SelectedInverse;
-use super::system::{Between, Prior, System};
-use super::triangle::for_local_dim;
+use super::layout::Layout;
+use super::stack::{Slot, Stack, dot};
+use super::system::System;
+use super::vectorised::{Kernel, run, size};
+use super::watch::Control;
 
 /// Cofactors: the inverse normal matrix where it is needed. All blocks are square, row by row.
 #[derive(Debug, Clone)]
@@ -28,177 +30,232 @@ pub struct Cofactors {
     pub equations: Vec<f64>,
 }
 
-impl System {
-    /// Computes all cofactors.
-    ///
-    /// `equations`, `prior` must be those of the formation that the selected inverse comes from, without damping.
-    pub fn cofactors<E: Equations>(
-        &self,
-        pool: &ThreadPool,
-        inverse: &SelectedInverse,
-        equations: &E,
-        prior: &Prior,
-        between: Between<'_>,
-    ) -> ControlFlow<(), Cofactors> {
-        let layout = &self.layout;
+impl Cofactors {
+    /// Puts together what was found at each supernode, and last for the local blocks without equations.
+    pub(super) fn collect(system: &System, inverse: &SelectedInverse, found: &[AtHome]) -> Self {
+        let layout = &system.layout;
         let (rows, l) = (layout.rows(), layout.local_dim());
-        let mut result = Cofactors {
-            local: vec![0.0; layout.locals() * l * l],
-            kept: Vec::new(),
-            border: Vec::new(),
-            kept_border: Vec::new(),
-            equations: vec![0.0; layout.groups() * rows],
-        };
-        let (mut local_rest, mut rest) = (&mut result.local[..], &mut result.equations[..]);
-        let eliminate = |e: &mut Elimination, prior: LocalPrior<'_>| e.eliminate(layout, prior, 0.0);
-        let arch = Arch::new();
-        let done = self.for_locals(pool, equations, prior, between, eliminate, |first, batch| {
-            let mut work = Vec::with_capacity(batch.len());
-            for (i, elimination) in batch.iter().enumerate() {
-                let groups = layout.groups_of(first + i);
-                let own = (skip(&mut local_rest, l * l), skip(&mut rest, groups.len() * rows));
-                work.push((elimination, groups.start, own.0, own.1));
+        let mut local = vec![0.0; layout.locals() * l * l];
+        let mut equations = vec![0.0; layout.groups() * rows];
+        for (index, at_home) in found.iter().enumerate() {
+            let mut values = at_home.equations.chunks_exact(rows.max(1));
+            let blocks = at_home.local.chunks_exact(l * l);
+            for (&block, cofactors) in system.incidence.locals_at(index).iter().zip(blocks) {
+                local[block as usize * l * l..][..l * l].copy_from_slice(cofactors);
+                for (&group, values) in
+                    system.incidence.groups_of(layout, block as usize).iter().zip(&mut values)
+                {
+                    equations[group as usize * rows..][..rows].copy_from_slice(values);
+                }
             }
-            pool.install(|| {
-                work.into_par_iter().with_min_len(32).for_each_init(
-                    Others::default,
-                    |others, (elimination, first_group, local, equations)| {
-                        arch.dispatch(|| {
-                            others.gather(self, elimination, inverse);
-                            for_local_dim!(l, L => {
-                                others.cofactors::<L>(self, elimination, first_group, local, equations);
-                            });
-                        });
-                    },
-                );
-            });
-        });
-        if done.is_break() {
-            return ControlFlow::Break(());
         }
-        for block in 0..layout.kept() {
-            result.kept.extend(inverse.block(block, block).unwrap_or_default());
-        }
+        let blocks = 0..layout.kept();
+        let kept = blocks.clone().filter_map(|block| inverse.block(block, block)).flatten().collect();
+        let (mut border, mut kept_border) = (Vec::new(), Vec::new());
         if layout.border_dim() > 0 {
-            result.border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
-            let with_border = (0..layout.kept()).filter_map(|block| inverse.block(block, layout.kept()));
-            result.kept_border = with_border.flatten().collect();
+            border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
+            kept_border = blocks.filter_map(|block| inverse.block(block, layout.kept())).flatten().collect();
         }
-        ControlFlow::Continue(result)
+        Self { local, kept, border, kept_border, equations }
     }
 }
 
-/// Everything that one local block is tied to: its kept blocks in the order of its slots, then the border.
+/// The cofactors of the local blocks at home in one supernode, and of their equations, in the order of the incidence.
+pub(super) struct AtHome {
+    local: Vec<f64>,
+    equations: Vec<f64>,
+    /// Time that it took.
+    pub seconds: f64,
+}
+
+/// Local blocks at one supernode from which on several threads work at them.
+const MANY: usize = 1024;
+
+impl AtHome {
+    /// `front` is the inverse over the rows of the front of the supernode, full square, of the order `height`.
+    pub fn new<E: Equations>(
+        system: &System,
+        index: usize,
+        equations: &E,
+        prior: &Prior,
+        control: &Control,
+        front: &[f64],
+        height: usize,
+    ) -> Self {
+        let start = Instant::now();
+        let layout = &system.layout;
+        let stacks = system.incidence.stacks_at(index);
+        let part = |stacks: Stacks<'_>| {
+            let (mut stack, mut ties) = (Stack::default(), Ties::default());
+            let mut part = Self { local: Vec::new(), equations: Vec::new(), seconds: 0.0 };
+            for run in stacks.iter().take_while(|_| !control.stopped()) {
+                stack.gather(system, equations, run);
+                stack.eliminate(layout, prior, 0.0);
+                ties.gather(&stack, front, height, system.border_row(index));
+                ties.cofactors(&stack, layout, &mut part);
+                control.count(run.len());
+            }
+            part
+        };
+        let mut found = if stacks.locals() < MANY {
+            part(stacks)
+        } else {
+            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map(part).collect();
+            let empty = Self { local: Vec::new(), equations: Vec::new(), seconds: 0.0 };
+            parts.into_iter().fold(empty, |mut all, part| {
+                all.local.extend(part.local);
+                all.equations.extend(part.equations);
+                all
+            })
+        };
+        found.seconds = start.elapsed().as_secs_f64();
+        found
+    }
+}
+
+/// Everything that the local blocks of a stack are tied to: kept blocks in the order of the slots, then segments of the border.
 #[derive(Default)]
-struct Others {
-    positions: Vec<usize>,
-    /// Where each of them starts; one more at the end, the width.
-    start: Vec<usize>,
-    /// The inverse over them, full square.
+struct Ties {
+    /// The first row in the front, the first row here and the width of each.
+    parts: Vec<(usize, usize, usize)>,
+    width: usize,
+    /// Q, the inverse over them, full square.
     inverse: Vec<f64>,
     /// H = N_ll^-1 N_lo, row by row.
     h: Vec<f64>,
-    /// H times the inverse, row by row.
+    /// H Q, row by row.
     hq: Vec<f64>,
 }
 
-impl Others {
-    /// Collects the inverse over everything that a local block is tied to.
-    #[inline(always)]
-    fn gather(&mut self, system: &System, e: &Elimination, inverse: &SelectedInverse) {
-        let border = system.layout.border_dim();
-        self.positions.clear();
-        self.start.clear();
-        let mut width = 0;
-        for slot in &e.slots {
-            self.positions.push(slot.position);
-            self.start.push(width);
-            width += slot.dim;
+impl Ties {
+    /// Collects the inverse over everything that a stack is tied to; it stays as it is where the last stack was tied to the same.
+    fn gather(&mut self, stack: &Stack, front: &[f64], height: usize, border: usize) {
+        let slots = stack.slots.iter().map(|slot| (slot.row, slot.dim));
+        let segments = stack.segments.iter();
+        let segments = segments.map(|segment| (border + segment.border.start, segment.border.len()));
+        let all = slots.chain(segments);
+        if self.parts.iter().map(|&(row, _, width)| (row, width)).eq(all.clone()) {
+            return;
         }
-        if border > 0 {
-            self.positions.push(system.symbolic.blocks() - 1);
-            self.start.push(width);
-            width += border;
+        self.parts.clear();
+        self.width = 0;
+        for (row, width) in all {
+            self.parts.push((row, self.width, width));
+            self.width += width;
         }
-        self.start.push(width);
-        self.inverse.resize(width * width, 0.0);
-        inverse.gather(&self.positions, &self.start, &mut self.inverse);
-    }
-
-    fn width(&self) -> usize {
-        self.start[self.positions.len()]
-    }
-
-    /// With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and
-    /// a Q a^T for each equation.
-    #[inline(always)]
-    fn cofactors<const L: usize>(
-        &mut self,
-        system: &System,
-        e: &Elimination,
-        first_group: usize,
-        local: &mut [f64],
-        equations: &mut [f64],
-    ) {
-        self.multiply::<L>(system, e);
-        let width = self.width();
-        let mut own = [[0.0; L]; L];
-        for a in 0..L {
-            let mut unit = [0.0; L];
-            unit[a] = 1.0;
-            e.triangle.forward::<L>(&mut unit, 1);
-            e.triangle.backward::<L>(&mut unit, 1);
-            for b in 0..=a {
-                let value = unit[b] + dot(&self.hq[a * width..][..width], &self.h[b * width..][..width]);
-                (own[a][b], own[b][a]) = (value, value);
-            }
-        }
-        local.copy_from_slice(own.as_flattened());
-        let rows = system.layout.rows();
-        let border = width - system.layout.border_dim();
-        for (slot, &start) in e.slots.iter().zip(&self.start) {
-            for place in &e.groups[slot.first..slot.end] {
-                for row in 0..rows {
-                    let a = &e.local_rows[place.local + row * L..][..L];
-                    let kept = (start, &e.kept_rows[place.kept + row * slot.dim..][..slot.dim]);
-                    let common =
-                        &e.border_rows[place.border + row * place.border_width..][..place.border_width];
-                    let common = (border + place.border_first, common);
-                    let mut q = self.product(kept, kept) + self.product(common, common);
-                    q += 2.0 * self.product(kept, common);
-                    for d in 0..L {
-                        let hq = &self.hq[d * width..][..width];
-                        let tied = dot(&hq[kept.0..], kept.1) + dot(&hq[common.0..], common.1);
-                        q += a[d] * (dot(&own[d], a) - 2.0 * tied);
-                    }
-                    equations[(place.group - first_group) * rows + row] = q;
+        self.inverse.resize(self.width * self.width, 0.0);
+        for &(from_column, to_column, columns) in &self.parts {
+            for k in 0..columns {
+                let source = &front[(from_column + k) * height..][..height];
+                let target = &mut self.inverse[(to_column + k) * self.width..][..self.width];
+                for &(from_row, to_row, rows) in &self.parts {
+                    target[to_row..to_row + rows].copy_from_slice(&source[from_row..from_row + rows]);
                 }
             }
         }
     }
 
-    /// Computes H = L^-T V and its product with the inverse.
+    /// With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and
+    /// a Q a^T for each equation.
+    fn cofactors(&mut self, stack: &Stack, layout: &Layout, found: &mut AtHome) {
+        run(layout, Find { ties: self, stack, rows: layout.rows(), found });
+    }
+
     #[inline(always)]
-    fn multiply<const L: usize>(&mut self, system: &System, e: &Elimination) {
-        let (width, border) = (self.width(), system.layout.border_dim());
-        self.h.resize(L * width, 0.0);
-        for d in 0..L {
-            let row = &mut self.h[d * width..][..width];
-            for (slot, &start) in e.slots.iter().zip(&self.start) {
-                row[start..][..slot.dim]
-                    .copy_from_slice(&e.coupling[slot.coupling + d * slot.dim..][..slot.dim]);
+    fn cofactors_of<const R: usize, const L: usize, const D: usize>(
+        &mut self,
+        stack: &Stack,
+        t: usize,
+        rows: usize,
+        found: &mut AtHome,
+    ) {
+        self.multiply::<L, D>(stack, t);
+        let width = self.width;
+        let mut own = [[0.0; L]; L];
+        for a in 0..L {
+            let mut unit = [0.0; L];
+            unit[a] = 1.0;
+            stack.triangles[t].forward::<L>(&mut unit, 1);
+            stack.triangles[t].backward::<L>(&mut unit, 1);
+            for b in 0..=a {
+                let value = unit[b] + dot(&self.hq[a * width..][..width], &self.h[b * width..][..width]);
+                (own[a][b], own[b][a]) = (value, value);
             }
-            row[width - border..].copy_from_slice(&e.border_coupling[d * border..][..border]);
         }
-        e.triangle.backward::<L>(&mut self.h, width);
+        found.local.extend_from_slice(own.as_flattened());
+        for (slot, &(_, start, _)) in stack.slots.iter().zip(&self.parts) {
+            for (k, p) in slot.groups.clone().enumerate() {
+                for row in 0..size::<R>(rows) {
+                    found.equations.push(self.equation::<R, L, D>(
+                        stack,
+                        slot,
+                        start,
+                        (t, k, p, row),
+                        rows,
+                        &own,
+                    ));
+                }
+            }
+        }
+    }
+
+    /// a Q a^T of one row of group `k` of a slot, `p` of the pattern, for local block `t` of the stack.
+    #[inline(always)]
+    fn equation<const R: usize, const L: usize, const D: usize>(
+        &self,
+        stack: &Stack,
+        slot: &Slot,
+        start: usize,
+        (t, k, p, row): (usize, usize, usize, usize),
+        rows: usize,
+        own: &[[f64; L]; L],
+    ) -> f64 {
+        let (rows, dim) = (size::<R>(rows), size::<D>(slot.dim));
+        let a = &stack.local_rows::<L>(t, p, rows)[row];
+        let at = (t * slot.groups.len() + k) * rows + row;
+        let kept = (start, &stack.slot_rows::<D>(slot, rows).rows.values[at * dim..][..dim]);
+        let mut q = self.product(kept, kept);
+        for d in 0..L {
+            let tied = dot(&self.hq[d * self.width + start..][..dim], kept.1);
+            q += a[d] * (dot(&own[d], a) - 2.0 * tied);
+        }
+        let place = &stack.places[p];
+        if !place.border.is_empty() {
+            let (width, segment) = (place.border.len(), place.segment);
+            let shift = place.border.start - stack.segments[segment].border.start;
+            let start = self.parts[stack.slots.len() + segment].1 + shift;
+            let common = (start, &stack.border_rows(t, p, rows)[row * width..][..width]);
+            q += self.product(common, common) + 2.0 * self.product(kept, common);
+            for d in 0..L {
+                q -= 2.0 * a[d] * dot(&self.hq[d * self.width + start..][..width], common.1);
+            }
+        }
+        q
+    }
+
+    /// Computes H = L^-T V and its product with the inverse, for local block `t` of the stack.
+    #[inline(always)]
+    fn multiply<const L: usize, const D: usize>(&mut self, stack: &Stack, t: usize) {
+        let width = self.width;
+        self.h.resize(L * width, 0.0);
+        let slots = stack.slots.iter().map(|slot| stack.slot_coupling::<L, D>(slot));
+        let segments = stack.segments.iter().map(|segment| stack.segment_coupling::<L>(segment, 0));
+        for (v, &(_, start, _)) in slots.chain(segments).zip(&self.parts) {
+            for d in 0..L {
+                let row = &v.rows.values[(t * L + d) * v.rows.width..][..v.rows.width];
+                self.h[d * width + start..][..row.len()].copy_from_slice(row);
+            }
+        }
+        stack.triangles[t].backward::<L>(&mut self.h, width);
         self.hq.clear();
         self.hq.resize(L * width, 0.0);
-        for d in 0..L {
-            let sums = &mut self.hq[d * width..][..width];
-            for (value, row) in
-                self.h[d * width..][..width].iter().zip(self.inverse.chunks_exact(width.max(1)))
-            {
-                sums.iter_mut().zip(row).for_each(|(sum, q)| *sum += value * q);
+        for (i, q) in self.inverse.chunks_exact(width.max(1)).enumerate() {
+            for d in 0..L {
+                let value = self.h[d * width + i];
+                let sums = &mut self.hq[d * width..][..width];
+                for k in 0..width {
+                    sums[k] += value * q[k];
+                }
             }
         }
     }
@@ -206,8 +263,23 @@ impl Others {
     /// x Q y^T for two vectors that are zero but for the given elements from the given places on.
     #[inline(always)]
     fn product(&self, x: (usize, &[f64]), y: (usize, &[f64])) -> f64 {
-        let width = self.width();
-        let row = |i: usize| &self.inverse[(x.0 + i) * width + y.0..][..y.1.len()];
+        let row = |i: usize| &self.inverse[(x.0 + i) * self.width + y.0..][..y.1.len()];
         x.1.iter().enumerate().map(|(i, value)| value * dot(row(i), y.1)).sum()
+    }
+}
+
+struct Find<'a> {
+    ties: &'a mut Ties,
+    stack: &'a Stack,
+    rows: usize,
+    found: &'a mut AtHome,
+}
+
+impl Kernel for Find<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+        for t in 0..self.stack.locals.len() {
+            self.ties.cofactors_of::<R, L, D>(self.stack, t, self.rows, self.found);
+        }
     }
 }

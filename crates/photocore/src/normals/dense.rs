@@ -18,9 +18,13 @@ const TILE: usize = 192;
 const WORTH_SHARING: f64 = 2e6;
 
 /// Factors the leading `width` columns of a symmetric front (lower triangle, `panel` = those columns) in place and
-/// subtracts their product from the `update`, the rest of the front. Returns the columns whose pivot was lost in rounding:
+/// subtracts their product from the `update`, the rest of the front. `diagonal` is that of the columns before any elimination. Returns the columns whose pivot was lost in rounding:
 /// their pivot is set to one and nothing below it.
-pub(super) fn factor_front(mut panel: MatMut<'_, f64>, mut update: MatMut<'_, f64>) -> Vec<usize> {
+pub(super) fn factor_front(
+    mut panel: MatMut<'_, f64>,
+    mut update: MatMut<'_, f64>,
+    diagonal: &[f64],
+) -> Vec<usize> {
     let (height, width) = (panel.nrows(), panel.ncols());
     let mut lost = Vec::new();
     for start in (0..width).step_by(STEP) {
@@ -28,7 +32,7 @@ pub(super) fn factor_front(mut panel: MatMut<'_, f64>, mut update: MatMut<'_, f6
         let (left, right) = panel.rb_mut().split_at_col_mut(start + step);
         let (mut top, mut below) =
             left.subcols_mut(start, step).subrows_mut(start, height - start).split_at_row_mut(step);
-        lost.extend(cholesky(top.rb_mut()).into_iter().map(|column| start + column));
+        lost.extend(cholesky(top.rb_mut(), &diagonal[start..]).into_iter().map(|column| start + column));
         let factor = top.rb();
         for_tiles(row_tiles(below.rb_mut()), step * step * (height - start), |_, tile| {
             solve_lower_triangular_in_place(factor, tile.transpose_mut(), Par::Seq);
@@ -58,12 +62,12 @@ fn subtract_square(target: MatMut<'_, f64>, x: MatRef<'_, f64>) {
 }
 
 /// Cholesky factor of the lower triangle, in place; returns the columns whose pivot was lost in rounding.
-/// The matrix is scaled to unit diagonal before reduction, so a pivot is compared with one.
-fn cholesky(mut a: MatMut<'_, f64>) -> Vec<usize> {
+/// A pivot is compared with the diagonal before any elimination.
+fn cholesky(mut a: MatMut<'_, f64>, diagonal: &[f64]) -> Vec<usize> {
     let mut lost = Vec::new();
     for j in 0..a.ncols() {
         // Written so that a NaN counts as lost.
-        let regular = a[(j, j)] > PIVOT_TOLERANCE;
+        let regular = a[(j, j)] > PIVOT_TOLERANCE * diagonal[j];
         if !regular {
             lost.push(j);
         }

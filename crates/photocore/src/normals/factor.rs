@@ -1,153 +1,356 @@
-//! Block Cholesky factorisation, front by front (multifrontal, Liu 1992).
+//! Formation, reduction and Cholesky factorisation of the normal equations in one walk up the elimination tree
+//! (multifrontal method, Duff and Reid 1983; Liu 1992).
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::time::Instant;
 
-use faer::reborrow::ReborrowMut;
-use faer::{Mat, MatMut};
+use faer::MatMut;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::dense::factor_front;
-use super::floors::Floors;
-use super::form::Normals;
-use super::panels::Panels;
+use super::equations::{Equations, Prior};
+use super::front::Front;
+use super::panels::{Handover, Panels, lock};
+use super::stack::Stack;
 use super::symbolic::Symbolic;
+use super::system::System;
+use super::watch::{Between, Control, watched};
 
-/// The Cholesky factor of the reduced normal equations, scaled to unit diagonal: D N D = L L^T.
+/// The Cholesky factor L of the reduced normal equations.
 #[derive(Debug)]
 pub struct Factor {
-    pub(crate) panels: Panels,
-    pub(crate) scale: Vec<f64>,
-    /// Right-hand side, in the order of elimination.
-    pub(crate) right: Vec<f64>,
+    pub(super) panels: Panels,
+    /// L^-1 n, in the order of elimination.
+    pub(super) right: Vec<f64>,
+    /// Diagonal of the normal equations before any elimination, in the order of elimination.
+    diagonal: Vec<f64>,
+    /// Lost pivots, in the order of elimination.
+    lost: Vec<usize>,
+    /// Sum of squares of the right-hand sides of all equations (priors not counted).
+    pub sum_of_squares: f64,
+    /// Decrease of the sum of squares that a full step predicts, priors and all unknowns counted.
+    pub decrease: f64,
+    /// Local blocks that their equations do not determine, ascending.
+    pub deficient_locals: Vec<usize>,
+    /// Share of the time of all threads that went into formation and reduction; the rest went into the factorisation.
+    pub formation_share: f64,
+}
+
+/// What eliminating a supernode leaves to its parent: lower triangle over the coupled rows, right-hand side and diagonal.
+struct Update {
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+    diagonal: Vec<f64>,
+}
+
+/// What the formation at one supernode adds up.
+#[derive(Default)]
+struct Sums {
+    sum_of_squares: f64,
+    decrease: f64,
+    deficient: Vec<usize>,
+}
+
+/// What a visit to a supernode leaves to the result.
+struct Visited {
+    sums: Sums,
+    lost: Vec<usize>,
+    /// Own part of L^-1 n and of the diagonal.
+    right: Vec<f64>,
+    diagonal: Vec<f64>,
+    formation: f64,
+    factorisation: f64,
+}
+
+/// What is formed.
+struct Formation<'a, E> {
+    system: &'a System,
+    equations: &'a E,
+    prior: &'a Prior,
+    damping: f64,
+    control: &'a Control,
+}
+
+/// Local blocks at one supernode from which on several threads work at them.
+const MANY: usize = 1024;
+/// Stacks gathered by several threads before they are added to the front.
+const WAVE: usize = 128;
+
+impl System {
+    /// Forms the normal equations, with the local blocks reduced out, and factors them. `damping` is added to the diagonal of the normal
+    /// equations as a fraction of it. The result has the same bits for any number of threads: every value is summed by one
+    /// thread, in an order that depends on the pattern only.
+    ///
+    /// Whether everything is determined is for the caller to ask: see [`Factor::deficient_locals`] and [`Factor::deficiency`].
+    pub fn factor<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        equations: &E,
+        prior: &Prior,
+        damping: f64,
+        between: Between<'_>,
+    ) -> ControlFlow<(), Factor> {
+        watched(pool, between, |control| {
+            Formation { system: self, equations, prior, damping, control }.factor()
+        })
+    }
+}
+
+impl<E: Equations> Formation<'_, E> {
+    fn factor(&self) -> Factor {
+        let symbolic = &self.system.symbolic;
+        let mut panels = Panels::zeros(Arc::clone(symbolic));
+        let updates = Handover::new(symbolic.supernode_count());
+        let visited = Handover::new(symbolic.supernode_count());
+        let divided = panels.divide();
+        self.system.tree.upward(|index| {
+            if !self.control.stopped() {
+                visited.put(index, self.visit(index, &mut lock(&divided[index]), &updates));
+            }
+        });
+        drop(divided);
+        let mut factor = Factor {
+            panels,
+            right: Vec::with_capacity(symbolic.unknowns()),
+            diagonal: Vec::with_capacity(symbolic.unknowns()),
+            lost: Vec::new(),
+            sum_of_squares: 0.0,
+            decrease: 0.0,
+            deficient_locals: Vec::new(),
+            formation_share: 1.0,
+        };
+        let homeless = self.assemble(&mut Front::new(0, 0, &mut []), symbolic.supernode_count());
+        factor.add(homeless);
+        let (mut formation, mut factorisation) = (0.0, 0.0);
+        for visited in visited.into_values().flatten() {
+            factor.add(visited.sums);
+            factor.decrease += visited.right.iter().map(|v| v * v).sum::<f64>();
+            factor.lost.extend(visited.lost);
+            factor.right.extend(visited.right);
+            factor.diagonal.extend(visited.diagonal);
+            formation += visited.formation;
+            factorisation += visited.factorisation;
+        }
+        if formation + factorisation > 0.0 {
+            factor.formation_share = formation / (formation + factorisation);
+        }
+        factor.deficient_locals.sort_unstable();
+        factor
+    }
+
+    /// Assembles and factors one front; what it leaves to its parent goes to `updates[index]`.
+    fn visit(&self, index: usize, panel: &mut [f64], updates: &Handover<Update>) -> Visited {
+        let symbolic = &*self.system.symbolic;
+        let s = &symbolic.supernodes()[index];
+        let start = Instant::now();
+        let mut front = Front::new(s.width, s.height(), panel);
+        for &child in &s.children {
+            if let Some(update) = updates.take(child) {
+                front.add(&update, &symbolic.rows_in_parent(child));
+            }
+        }
+        let sums = self.assemble(&mut front, index);
+        self.add_prior(&mut front, index);
+        let formation = start.elapsed().as_secs_f64();
+        let lost = front.factor();
+        let first = symbolic.first_unknown(index);
+        let Front { width, update, mut right, mut diagonal, .. } = front;
+        if s.parent.is_some() {
+            let (right, diagonal) = (right.split_off(width), diagonal.split_off(width));
+            updates.put(index, Update { matrix: update, right, diagonal });
+        }
+        Visited {
+            sums,
+            lost: lost.into_iter().map(|column| first + column).collect(),
+            right,
+            diagonal,
+            formation,
+            factorisation: start.elapsed().as_secs_f64() - formation,
+        }
+    }
+
+    /// Adds what the local blocks at home in a supernode leave, in their order.
+    fn assemble(&self, front: &mut Front<'_>, index: usize) -> Sums {
+        let Self { system, control, .. } = self;
+        let stacks = system.incidence.stacks_at(index);
+        let mut sums = Sums::default();
+        if stacks.locals() < MANY || rayon::current_num_threads() == 1 {
+            let mut stack = Stack::default();
+            for run in stacks.iter() {
+                if !control.stopped() {
+                    self.fill(&mut stack, run);
+                    stack.add_to(&mut front.columns(), &system.layout, system.border_row(index));
+                    sums.add(&mut stack);
+                }
+            }
+            return sums;
+        }
+        let mut filled: Vec<Stack> = (0..WAVE).map(|_| Stack::default()).collect();
+        let starts = self.shares(index);
+        for wave in stacks.parts(WAVE).into_iter().take_while(|_| !control.stopped()) {
+            let runs: Vec<&[u32]> = wave.iter().collect();
+            let filled = &mut filled[..runs.len()];
+            filled.par_iter_mut().zip(runs).for_each(|(stack, run)| self.fill(stack, run));
+            front.parts(&starts).into_par_iter().for_each(|mut columns| {
+                for stack in &*filled {
+                    stack.add_to(&mut columns, &system.layout, system.border_row(index));
+                }
+            });
+            filled.iter_mut().for_each(|stack| sums.add(stack));
+        }
+        sums
+    }
+
+    fn fill(&self, stack: &mut Stack, run: &[u32]) {
+        stack.gather(self.system, self.equations, run);
+        stack.eliminate(&self.system.layout, self.prior, self.damping);
+        self.control.count(run.len());
+    }
+
+    /// The first columns of the shares of a front that several threads add to, each a few blocks.
+    fn shares(&self, index: usize) -> Vec<usize> {
+        let symbolic = &*self.system.symbolic;
+        let Some(s) = symbolic.supernodes().get(index) else { return Vec::new() };
+        let first = symbolic.first_unknown(index);
+        let own = s.blocks.clone().map(|position| symbolic.range(position).start - first);
+        let starts: Vec<usize> = own.chain(s.row_offset[..s.rows.len()].iter().copied()).collect();
+        let few = starts.len().div_ceil(8 * rayon::current_num_threads());
+        starts.into_iter().step_by(few).collect()
+    }
+
+    /// Adds the priors and the damping of the own blocks of a supernode.
+    fn add_prior(&self, front: &mut Front<'_>, index: usize) {
+        let (layout, symbolic) = (&self.system.layout, &*self.system.symbolic);
+        let positions = symbolic.supernodes()[index].blocks.clone();
+        let unknowns = positions.flat_map(|position| symbolic.unknowns_at(layout, position));
+        for (column, unknown) in unknowns.enumerate() {
+            let weight = self.prior.weight[unknown];
+            front.diagonal[column] += weight;
+            front.right[column] += self.prior.right[unknown];
+            front.panel[column * (front.height + 1)] += weight + self.damping * front.diagonal[column];
+            front.diagonal[column] *= 1.0 + self.damping;
+        }
+    }
+}
+
+impl Sums {
+    fn add(&mut self, stack: &mut Stack) {
+        self.sum_of_squares += stack.sum_of_squares;
+        self.decrease += stack.decrease;
+        self.deficient.append(&mut stack.deficient);
+    }
+}
+
+impl Front<'_> {
+    /// Adds what a child leaves (extend-add), lower triangle only; `runs` says where its rows stand here.
+    fn add(&mut self, child: &Update, runs: &[(usize, usize, usize)]) {
+        let (width, height, below) = (self.width, self.height, self.height - self.width);
+        let order = child.right.len();
+        for (at, &(from_column, to_column, columns)) in runs.iter().enumerate() {
+            for k in 0..columns {
+                let column = to_column + k;
+                self.right[column] += child.right[from_column + k];
+                self.diagonal[column] += child.diagonal[from_column + k];
+                let source = &child.matrix[(from_column + k) * order..][..order];
+                let (target, shift) = if column < width {
+                    (&mut self.panel[column * height..][..height], 0)
+                } else {
+                    (&mut self.update[(column - width) * below..][..below], width)
+                };
+                for (later, &(from_row, to_row, rows)) in runs[at..].iter().enumerate() {
+                    let skip = if later == 0 { k } else { 0 };
+                    let source = &source[from_row + skip..from_row + rows];
+                    let target = &mut target[to_row + skip - shift..][..source.len()];
+                    target.iter_mut().zip(source).for_each(|(sum, value)| *sum += value);
+                }
+            }
+        }
+    }
+
+    /// Eliminates the own columns, from the right-hand side too; returns the columns whose pivot was lost.
+    fn factor(&mut self) -> Vec<usize> {
+        let below = self.height - self.width;
+        let panel = MatMut::from_column_major_slice_mut(self.panel, self.height, self.width);
+        let update = MatMut::from_column_major_slice_mut(&mut self.update, below, below);
+        let lost = factor_front(panel, update, &self.diagonal);
+        for (j, column) in self.panel.chunks_exact(self.height.max(1)).enumerate() {
+            let value = self.right[j] / column[j];
+            self.right[j] = value;
+            let rest = self.right[j + 1..].iter_mut().zip(&column[j + 1..]);
+            rest.for_each(|(right, factor)| *right -= factor * value);
+        }
+        lost
+    }
+}
+
+impl Factor {
+    fn add(&mut self, sums: Sums) {
+        self.sum_of_squares += sums.sum_of_squares;
+        self.decrease += sums.decrease;
+        self.deficient_locals.extend(sums.deficient);
+    }
+
+    /// The combinations of unknowns that the equations do not determine, if any.
+    pub fn deficiency(&self) -> Option<Deficiency<'_>> {
+        (!self.lost.is_empty()).then_some(Deficiency { factor: self })
+    }
+
+    /// x := L^-T x.
+    pub(super) fn solve_backward(&self, x: &mut [f64]) {
+        let symbolic = &*self.panels.symbolic;
+        let mut own = Vec::new();
+        for (index, s) in symbolic.supernodes().iter().enumerate().rev() {
+            let first = symbolic.first_unknown(index);
+            own.clear();
+            own.extend_from_slice(&x[first..first + s.width]);
+            s.rows.iter().for_each(|&row| own.extend_from_slice(&x[symbolic.range(row)]));
+            for (j, column) in self.panels.panel(index).chunks_exact(s.height()).enumerate().rev() {
+                let tied: f64 = column[j + 1..].iter().zip(&own[j + 1..]).map(|(a, b)| a * b).sum();
+                own[j] = (own[j] - tied) / column[j];
+            }
+            x[first..first + s.width].copy_from_slice(&own[..s.width]);
+        }
+    }
 }
 
 /// Unknowns that the equations do not determine.
 #[derive(Debug)]
-pub struct Deficiency {
-    factor: Factor,
-    /// Lost pivots, in the order of elimination.
-    lost: Vec<usize>,
+pub struct Deficiency<'a> {
+    factor: &'a Factor,
 }
 
-impl Deficiency {
+impl Deficiency<'_> {
     /// How many combinations of unknowns are not determined.
     pub fn defect(&self) -> usize {
-        self.lost.len()
+        self.factor.lost.len()
     }
 
     /// For each of them the kept blocks it moves (the border is the block after the last), ascending: the blocks that take
     /// at least a hundredth of the largest share in a null vector, each unknown in units of what its equations alone determine.
     pub fn blocks(&self) -> Vec<Vec<usize>> {
         let symbolic = &*self.factor.panels.symbolic;
-        let vectors = self.lost.iter().map(|&pivot| {
+        let vectors = self.factor.lost.iter().map(|&pivot| {
             let mut vector = vec![0.0; symbolic.unknowns()];
             vector[pivot] = 1.0;
             self.factor.solve_backward(&mut vector);
-            let share = |position: usize| {
-                vector[symbolic.range(position)].iter().fold(0.0, |most: f64, value| most.max(value.abs()))
-            };
-            let largest = (0..symbolic.blocks()).map(share).fold(0.0, f64::max);
-            let mut blocks: Vec<usize> = (0..symbolic.blocks())
-                .filter(|&p| share(p) >= 0.01 * largest)
-                .map(|p| symbolic.block(p))
-                .collect();
-            blocks.sort_unstable();
-            blocks
+            for (value, &diagonal) in vector.iter_mut().zip(&self.factor.diagonal) {
+                *value *= if diagonal > 0.0 && diagonal.is_finite() { diagonal.sqrt() } else { 1.0 };
+            }
+            blocks_moved(symbolic, &vector)
         });
         vectors.collect()
     }
 }
 
-impl Normals {
-    /// Scales to unit diagonal and factors.
-    ///
-    /// # Errors
-    /// The unknowns that the equations do not determine.
-    pub fn factor(self, pool: &ThreadPool) -> Result<Factor, Deficiency> {
-        let scale: Vec<f64> = self
-            .diagonal
-            .iter()
-            .map(|&n| if n > 0.0 && n.is_finite() { n.sqrt().recip() } else { 1.0 })
-            .collect();
-        let mut panels = self.panels;
-        panels.scale(&scale);
-        let symbolic = Arc::clone(&panels.symbolic);
-        let lost = pool.install(|| factor_panels(&symbolic, &mut panels.values));
-        let factor = Factor { panels, scale, right: self.right };
-        if lost.is_empty() { Ok(factor) } else { Err(Deficiency { factor, lost }) }
-    }
-}
-
-/// Factors all panels; returns the lost pivots in the order of elimination.
-fn factor_panels(symbolic: &Symbolic, values: &mut [f64]) -> Vec<usize> {
-    let floors = Floors::new(symbolic);
-    let mut updates: Vec<Option<Mat<f64>>> = vec![None; symbolic.supernode_count()];
-    let subtrees = floors.divide(symbolic, values, &mut updates);
-    let found = subtrees.into_par_iter().map(|mut subtree| {
-        let mut lost = Vec::new();
-        let first = subtree.supernodes.start;
-        for index in subtree.supernodes.clone() {
-            let (panel, updates) = subtree.parts(symbolic, index);
-            lost.extend(factor_supernode(symbolic, index, panel, updates, first));
-        }
-        lost
-    });
-    let mut lost: Vec<usize> = found.collect::<Vec<_>>().into_iter().flatten().collect();
-    for &index in &floors.top {
-        let panel = &mut values[symbolic.supernodes()[index].panel.clone()];
-        lost.extend(factor_supernode(symbolic, index, panel, &mut updates, 0));
-    }
-    lost.sort_unstable();
-    lost
-}
-
-/// Assembles and factors one front; its update for the parent is left in `updates[index - first]`.
-fn factor_supernode(
-    symbolic: &Symbolic,
-    index: usize,
-    panel: &mut [f64],
-    updates: &mut [Option<Mat<f64>>],
-    first: usize,
-) -> Vec<usize> {
-    let s = &symbolic.supernodes()[index];
-    let mut panel = MatMut::from_column_major_slice_mut(panel, s.height(), s.width);
-    let mut update = Mat::<f64>::zeros(s.below(), s.below());
-    for &child in &s.children {
-        if let Some(from) = updates[child - first].take() {
-            let runs = symbolic.rows_in_parent(child);
-            add_update(&from, &runs, panel.rb_mut(), update.as_mut());
-        }
-    }
-    let lost = factor_front(panel, update.as_mut());
-    if s.parent.is_some() {
-        updates[index - first] = Some(update);
-    }
-    lost.into_iter().map(|column| symbolic.first_unknown(index) + column).collect()
-}
-
-/// Adds the update of a child to the front of its parent (extend-add), lower triangle only.
-fn add_update(
-    from: &Mat<f64>,
-    runs: &[(usize, usize, usize)],
-    mut panel: MatMut<'_, f64>,
-    mut update: MatMut<'_, f64>,
-) {
-    let width = panel.ncols();
-    for (at, &(from_column, to_column, columns)) in runs.iter().enumerate() {
-        for k in 0..columns {
-            let source = from.col(from_column + k);
-            let (mut target, shift) = if to_column + k < width {
-                (panel.rb_mut().col_mut(to_column + k), 0)
-            } else {
-                (update.rb_mut().col_mut(to_column + k - width), width)
-            };
-            for (later, &(from_row, to_row, rows)) in runs[at..].iter().enumerate() {
-                let skip = if later == 0 { k } else { 0 };
-                for i in skip..rows {
-                    target[to_row + i - shift] += source[from_row + i];
-                }
-            }
-        }
-    }
+fn blocks_moved(symbolic: &Symbolic, vector: &[f64]) -> Vec<usize> {
+    let share = |position: usize| {
+        vector[symbolic.range(position)].iter().fold(0.0, |most: f64, value| most.max(value.abs()))
+    };
+    let largest = (0..symbolic.blocks()).map(share).fold(0.0, f64::max);
+    let moved = (0..symbolic.blocks()).filter(|&position| share(position) >= 0.01 * largest);
+    let mut blocks: Vec<usize> = moved.map(|position| symbolic.block(position)).collect();
+    blocks.sort_unstable();
+    blocks
 }

@@ -1,17 +1,21 @@
-//! The selected inverse: the blocks of the inverse inside the pattern of the factor (Takahashi et al. 1973).
+//! The selected inverse: the blocks of the inverse inside the pattern of the factor (Takahashi et al. 1973), in one walk down
+//! the elimination tree that hands on cofactors of local blocks and equations on the way.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::time::Instant;
 
-use faer::reborrow::ReborrowMut;
-use faer::{Mat, MatMut};
+use faer::{MatMut, MatRef};
 use rayon::ThreadPool;
-use rayon::prelude::*;
 
+use super::cofactors::{AtHome, Cofactors};
 use super::dense::invert_front;
+use super::equations::{Equations, Prior};
 use super::factor::Factor;
-use super::floors::Floors;
-use super::panels::Panels;
+use super::panels::{Handover, Panels, lock};
 use super::symbolic::Symbolic;
+use super::system::System;
+use super::watch::{Between, Control, watched};
 
 /// The blocks of N^-1 inside the pattern of the factor: every kept block's own, and those of every two kept blocks that
 /// share a local block.
@@ -27,123 +31,134 @@ impl SelectedInverse {
         let symbolic = &*self.panels.symbolic;
         let (p, q) = (symbolic.position(row), symbolic.position(column));
         let (first, last) = (p.min(q), p.max(q));
-        symbolic.panel_row(symbolic.supernode_of(first), last)?;
-        let mut positions = vec![first, last];
-        positions.dedup();
-        let start = [0, symbolic.dim(first), symbolic.dim(first) + symbolic.dim(last)];
-        let width = start[positions.len()];
-        let mut both = vec![0.0; width * width];
-        self.gather(&positions, &start, &mut both);
-        let (top, left) = (start[usize::from(p > q)], start[usize::from(q > p)]);
-        let rows = both.chunks_exact(width).skip(top).take(symbolic.dim(p));
-        Some(rows.flat_map(|values| &values[left..][..symbolic.dim(q)]).copied().collect())
-    }
-
-    /// Writes the inverse over blocks at ascending positions, all coupled to each other, into a full square matrix in which
-    /// they begin at `start` (one more at the end, its width).
-    #[inline(always)]
-    pub(crate) fn gather(&self, positions: &[usize], start: &[usize], target: &mut [f64]) {
-        let symbolic = &*self.panels.symbolic;
-        let width = start[positions.len()];
-        for (column, &position) in positions.iter().enumerate() {
-            let supernode = symbolic.supernode_of(position);
-            let s = &symbolic.supernodes()[supernode];
-            let panel = &self.panels.values[s.panel.clone()];
-            let first = symbolic.range(position).start - symbolic.first_unknown(supernode);
-            for row in column..positions.len() {
-                // Every pair that shares a local block is in the pattern.
-                let Some(from) = symbolic.panel_row(supernode, positions[row]) else { continue };
-                for j in 0..start[column + 1] - start[column] {
-                    let values = &panel[(first + j) * s.height() + from..][..start[row + 1] - start[row]];
-                    let skip = if row == column { j } else { 0 };
-                    for (i, &value) in values.iter().enumerate().skip(skip) {
-                        let (low, high) = (start[row] + i, start[column] + j);
-                        target[low * width + high] = value;
-                        target[high * width + low] = value;
-                    }
-                }
+        let supernode = symbolic.supernode_of(first);
+        let at = symbolic.panel_row(supernode, last)?;
+        let height = symbolic.supernodes()[supernode].height();
+        let left = symbolic.range(first).start - symbolic.first_unknown(supernode);
+        let panel = self.panels.panel(supernode);
+        // The lower triangle, that is the row later in the order of elimination, carries the values.
+        let value = |i: usize, j: usize| {
+            let (high, low) = if p > q { (at + i, left + j) } else { (at + j, left + i) };
+            if first == last {
+                panel[low.min(high) * height + low.max(high)]
+            } else {
+                panel[low * height + high]
             }
-        }
+        };
+        let columns = symbolic.dim(q);
+        Some((0..symbolic.dim(p) * columns).map(|k| value(k / columns, k % columns)).collect())
     }
 }
 
-impl Factor {
-    /// Replaces the factor by the selected inverse of the reduced normal equations.
-    pub fn into_selected_inverse(self, pool: &ThreadPool) -> SelectedInverse {
-        let mut panels = self.panels;
-        let symbolic = Arc::clone(&panels.symbolic);
-        pool.install(|| invert_panels(&symbolic, &mut panels.values));
-        panels.scale(&self.scale);
-        SelectedInverse { panels }
+/// Cofactors with the selected inverse that they come from.
+#[derive(Debug)]
+pub struct Inversion {
+    /// Of every unknown and every equation.
+    pub cofactors: Cofactors,
+    /// Of every two kept blocks that share a local block.
+    pub selected: SelectedInverse,
+    /// Share of the time of all threads that went into the selected inverse; the rest went into the other cofactors.
+    pub inversion_share: f64,
+}
+
+impl System {
+    /// Computes all cofactors.
+    ///
+    /// `equations` and `prior` must be those that the factor comes from, and its damping zero.
+    pub fn invert<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        factor: Factor,
+        equations: &E,
+        prior: &Prior,
+        between: Between<'_>,
+    ) -> ControlFlow<(), Inversion> {
+        watched(pool, between, |control| {
+            let walk = Walk { system: self, equations, prior, control };
+            walk.invert(factor.panels)
+        })
     }
 }
 
-/// The inverse over the rows of one front (own blocks, then coupled blocks), full square.
-type Front = Arc<Mat<f64>>;
+/// The inverse over the rows of one front (own blocks, then coupled blocks), full square, column by column.
+type Front = Arc<Vec<f64>>;
 
-fn invert_panels(symbolic: &Symbolic, values: &mut [f64]) {
-    let floors = Floors::new(symbolic);
-    // The front of its parent for each supernode still to be done; a front lives until the last child has taken it.
-    let mut above: Vec<Option<Front>> = vec![None; symbolic.supernode_count()];
-    for &index in floors.top.iter().rev() {
-        let panel = &mut values[symbolic.supernodes()[index].panel.clone()];
-        invert_supernode(symbolic, index, panel, &mut above, 0);
-    }
-    floors.divide(symbolic, values, &mut above).into_par_iter().for_each(|mut subtree| {
-        let first = subtree.supernodes.start;
-        for index in subtree.supernodes.clone().rev() {
-            let (panel, above) = subtree.parts(symbolic, index);
-            invert_supernode(symbolic, index, panel, above, first);
-        }
-    });
+struct Walk<'a, E> {
+    system: &'a System,
+    equations: &'a E,
+    prior: &'a Prior,
+    control: &'a Control,
 }
 
-/// Inverts one panel, given the front of its parent in `above[index - first]`, and hands its own front to its children.
-fn invert_supernode(
-    symbolic: &Symbolic,
-    index: usize,
-    panel: &mut [f64],
-    above: &mut [Option<Front>],
-    first: usize,
-) {
-    let s = &symbolic.supernodes()[index];
-    let mut front = Mat::<f64>::zeros(s.height(), s.height());
-    if let Some(parent) = above[index - first].take() {
-        take_coupled_rows(&parent, &symbolic.rows_in_parent(index), front.as_mut(), s.width);
-    }
-    let mut panel = MatMut::from_column_major_slice_mut(panel, s.height(), s.width);
-    let below = front.as_ref().submatrix(s.width, s.width, s.below(), s.below());
-    invert_front(panel.rb_mut(), below);
-    if s.children.is_empty() {
-        return;
-    }
-    for j in 0..s.width {
-        for i in j..s.height() {
-            front[(i, j)] = panel[(i, j)];
-            front[(j, i)] = panel[(i, j)];
+impl<E: Equations> Walk<'_, E> {
+    fn invert(&self, mut panels: Panels) -> Inversion {
+        let symbolic = &*self.system.symbolic;
+        let count = symbolic.supernode_count();
+        // The front of its parent for each supernode still to be done; a front lives until the last child has taken it.
+        let above = Handover::new(count);
+        let at_home = Handover::new(count);
+        let divided = panels.divide();
+        self.system.tree.downward(|index| {
+            if !self.control.stopped() {
+                at_home.put(index, self.visit(index, &mut lock(&divided[index]), &above));
+            }
+        });
+        drop(divided);
+        let (mut inversion, mut rest) = (0.0, 0.0);
+        let mut found = Vec::with_capacity(count + 1);
+        for (at_home, seconds) in at_home.into_values().flatten() {
+            found.push(at_home);
+            inversion += seconds;
+            rest += found[found.len() - 1].seconds;
         }
+        found.push(self.at_home(count, &[], 0));
+        let selected = SelectedInverse { panels };
+        let cofactors = Cofactors::collect(self.system, &selected, &found);
+        let inversion_share = if inversion > 0.0 { inversion / (inversion + rest) } else { 0.0 };
+        Inversion { cofactors, selected, inversion_share }
     }
-    let front = Arc::new(front);
-    for &child in &s.children {
-        above[child - first] = Some(Arc::clone(&front));
+
+    /// Inverts one panel, given the front of its parent, and hands its own front to its children. Returns the cofactors of the local
+    /// blocks at home there, and the seconds that the inversion took.
+    fn visit(&self, index: usize, panel: &mut [f64], above: &Handover<Front>) -> (AtHome, f64) {
+        let symbolic = &*self.system.symbolic;
+        let s = &symbolic.supernodes()[index];
+        let start = Instant::now();
+        let (height, width) = (s.height(), s.width);
+        let mut front = vec![0.0; height * height];
+        if let Some(parent) = above.take(index) {
+            take_coupled_rows(symbolic, index, &parent, &mut front);
+        }
+        let z = MatRef::from_column_major_slice(&front, height, height);
+        let below = z.submatrix(width, width, height - width, height - width);
+        invert_front(MatMut::from_column_major_slice_mut(panel, height, width), below);
+        for (j, column) in panel.chunks_exact(height.max(1)).enumerate() {
+            front[j * height + j..(j + 1) * height].copy_from_slice(&column[j..]);
+            (j..height).for_each(|i| front[i * height + j] = column[i]);
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        let front = Arc::new(front);
+        s.children.iter().for_each(|&child| above.put(child, Arc::clone(&front)));
+        (self.at_home(index, &front, height), seconds)
+    }
+
+    fn at_home(&self, index: usize, front: &[f64], height: usize) -> AtHome {
+        AtHome::new(self.system, index, self.equations, self.prior, self.control, front, height)
     }
 }
 
 /// Copies the inverse over the coupled rows of a supernode from the front of its parent.
-fn take_coupled_rows(
-    parent: &Mat<f64>,
-    runs: &[(usize, usize, usize)],
-    mut front: MatMut<'_, f64>,
-    width: usize,
-) {
-    for &(to_column, from_column, columns) in runs {
+fn take_coupled_rows(symbolic: &Symbolic, index: usize, parent: &[f64], front: &mut [f64]) {
+    let s = &symbolic.supernodes()[index];
+    let Some(above) = s.parent else { return };
+    let (height, order) = (s.height(), symbolic.supernodes()[above].height());
+    let runs = symbolic.rows_in_parent(index);
+    for &(to_column, from_column, columns) in &runs {
         for k in 0..columns {
-            let source = parent.col(from_column + k);
-            let mut target = front.rb_mut().col_mut(width + to_column + k);
-            for &(to_row, from_row, rows) in runs {
-                for i in 0..rows {
-                    target[width + to_row + i] = source[from_row + i];
-                }
+            let source = &parent[(from_column + k) * order..][..order];
+            let target = &mut front[(s.width + to_column + k) * height + s.width..][..height - s.width];
+            for &(to_row, from_row, rows) in &runs {
+                target[to_row..to_row + rows].copy_from_slice(&source[from_row..from_row + rows]);
             }
         }
     }

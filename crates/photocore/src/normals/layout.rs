@@ -14,6 +14,7 @@ pub struct Layout {
     local_dim: usize,
     locals: usize,
     kept_offset: Vec<usize>,
+    common_kept_dim: Option<usize>,
     border_dim: usize,
     group_ptr: Vec<usize>,
     group_kept: Vec<u32>,
@@ -100,6 +101,10 @@ impl Layout {
             local_dim,
             locals,
             kept_offset,
+            common_kept_dim: kept_dims
+                .first()
+                .copied()
+                .filter(|first| kept_dims.iter().all(|dim| dim == first)),
             border_dim: 0,
             group_ptr,
             group_kept,
@@ -160,6 +165,11 @@ impl Layout {
     /// Unknowns of kept block `j`.
     pub fn kept_dim(&self, j: usize) -> usize {
         self.kept_offset[j + 1] - self.kept_offset[j]
+    }
+
+    /// Unknowns of every kept block, where all have the same number.
+    pub(super) fn common_kept_dim(&self) -> Option<usize> {
+        self.common_kept_dim
     }
 
     /// Size of the border.

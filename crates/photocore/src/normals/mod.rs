@@ -6,36 +6,40 @@
 //!
 //! 1. [`Layout`]: which unknowns there are and which group touches which of them;
 //! 2. [`System`]: the order of elimination and the pattern of the factor ([`Symbolic`]), once for all iterations;
-//! 3. [`System::form`]: the local blocks reduced out while the normal equations are formed;
-//! 4. [`Normals::factor`]: block Cholesky on dense panels;
-//! 5. [`System::solve`], [`Factor::into_selected_inverse`] and [`System::cofactors`].
+//! 3. [`System::factor`]: the normal equations formed, the local blocks reduced out and the rest factored (block Cholesky on dense
+//!    panels), front by front;
+//! 4. [`System::solve`];
+//! 5. [`System::invert`]: the selected inverse, and cofactors of everything.
 
 mod cofactors;
 mod dense;
 mod dissection;
-mod elimination;
+mod equations;
 mod factor;
-mod floors;
-mod form;
+mod front;
 mod graph;
+mod incidence;
 mod invert;
 mod layout;
 mod minimum_degree;
 mod ordering;
 mod panels;
 mod solve;
+mod stack;
 mod symbolic;
 mod system;
+mod tree;
 mod triangle;
+mod vectorised;
+mod watch;
 
 pub use cofactors::Cofactors;
-pub use elimination::{Equations, GroupRows};
+pub use equations::{Equations, GroupRows, Prior};
 pub use factor::{Deficiency, Factor};
-pub use form::Normals;
 pub use graph::Graph;
-pub use invert::SelectedInverse;
+pub use invert::{Inversion, SelectedInverse};
 pub use layout::{Layout, LayoutError};
 pub use ordering::Ordering;
-pub use solve::Solution;
 pub use symbolic::{Operations, Symbolic};
-pub use system::{Between, Prior, System};
+pub use system::System;
+pub use watch::Between;

@@ -1,13 +1,13 @@
 //! Block-sparse symmetric matrices, stored as the dense panels of a [`Symbolic`] pattern.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::symbolic::Symbolic;
 
 /// The lower triangle of a symmetric matrix in the pattern of a factor: one column-major panel for each supernode.
 /// The strict upper triangle of a panel's own blocks carries no meaning.
 #[derive(Debug, Clone)]
-pub(crate) struct Panels {
+pub(super) struct Panels {
     pub symbolic: Arc<Symbolic>,
     pub values: Vec<f64>,
 }
@@ -18,21 +18,49 @@ impl Panels {
         Self { symbolic, values }
     }
 
-    /// Multiplies row and column i by `scale[i]` (in the order of elimination).
-    pub fn scale(&mut self, scale: &[f64]) {
-        let symbolic = Arc::clone(&self.symbolic);
-        for (index, supernode) in symbolic.supernodes().iter().enumerate() {
-            let first = symbolic.first_unknown(index);
-            let mut factors = scale[first..first + supernode.width].to_vec();
-            for &row in &supernode.rows {
-                factors.extend_from_slice(&scale[symbolic.range(row)]);
-            }
-            let panel = &mut self.values[supernode.panel.clone()];
-            for (column, values) in panel.chunks_exact_mut(supernode.height()).enumerate() {
-                for (value, factor) in values.iter_mut().zip(&factors) {
-                    *value *= factor * factors[column];
-                }
-            }
-        }
+    /// The panel of a supernode.
+    pub fn panel(&self, supernode: usize) -> &[f64] {
+        &self.values[self.symbolic.supernodes()[supernode].panel.clone()]
     }
+
+    /// The panels, each for the thread that visits its supernode.
+    pub fn divide(&mut self) -> Vec<Mutex<&mut [f64]>> {
+        let mut rest = &mut self.values[..];
+        let supernodes = self.symbolic.supernodes().iter();
+        supernodes.map(|supernode| Mutex::new(skip(&mut rest, supernode.panel.len()))).collect()
+    }
+}
+
+/// Takes `count` elements off the front of a slice.
+pub(super) fn skip<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let (head, tail) = std::mem::take(rest).split_at_mut(count);
+    *rest = tail;
+    head
+}
+
+/// One value for each supernode, handed from the thread that visits one to the thread that visits another.
+pub(super) struct Handover<T>(Vec<Mutex<Option<T>>>);
+
+impl<T> Handover<T> {
+    pub fn new(count: usize) -> Self {
+        Self((0..count).map(|_| Mutex::new(None)).collect())
+    }
+
+    pub fn put(&self, index: usize, value: T) {
+        *lock(&self.0[index]) = Some(value);
+    }
+
+    pub fn take(&self, index: usize) -> Option<T> {
+        lock(&self.0[index]).take()
+    }
+
+    /// What nobody has taken, in order.
+    pub fn into_values(self) -> impl Iterator<Item = Option<T>> {
+        self.0.into_iter().map(|value| value.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Locks what is never held while anything can panic on purpose: a panic elsewhere is passed on by the pool.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

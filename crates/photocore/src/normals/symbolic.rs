@@ -54,7 +54,7 @@ impl Supernode {
     }
 
     /// Multiply-adds of its part of the factorisation.
-    fn operations(&self) -> f64 {
+    pub fn operations(&self) -> f64 {
         multiply_adds(self.width, self.below())
     }
 }
@@ -197,17 +197,6 @@ impl Symbolic {
 
     fn factor_operations(&self) -> f64 {
         self.supernodes.iter().map(Supernode::operations).sum()
-    }
-
-    /// Multiply-adds of the factorisation of each supernode with all below it in the tree.
-    pub(crate) fn subtree_operations(&self) -> Vec<f64> {
-        let mut work: Vec<f64> = self.supernodes.iter().map(Supernode::operations).collect();
-        for (index, supernode) in self.supernodes.iter().enumerate() {
-            if let Some(parent) = supernode.parent {
-                work[parent] += work[index];
-            }
-        }
-        work
     }
 
     pub(crate) fn supernodes(&self) -> &[Supernode] {

@@ -2,27 +2,6 @@
 
 use std::cmp::Ordering::Greater;
 
-/// Evaluates an expression with a constant set to the size of the local blocks, so that each size is compiled for itself.
-macro_rules! for_local_dim {
-    ($dim:expr, $L:ident => $body:expr) => {
-        match $dim {
-            3 => {
-                const $L: usize = 3;
-                $body
-            }
-            2 => {
-                const $L: usize = 2;
-                $body
-            }
-            _ => {
-                const $L: usize = 1;
-                $body
-            }
-        }
-    };
-}
-pub(crate) use for_local_dim;
-
 /// A pivot smaller than this fraction of its diagonal element before elimination is rounding error: the unknown is not determined.
 /// What rounding leaves of a zero pivot is some tens of units in the last place; weights that alone make a datum (GIANT's default
 /// of 60000 m for a station) leave ten times this and more.

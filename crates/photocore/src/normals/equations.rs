@@ -1,0 +1,50 @@
+//! Where the equations of a system come from.
+
+use super::layout::Layout;
+
+/// Where the equations of a system come from.
+///
+/// The equations are `A x = l` with unit weight (each row divided by the standard deviation of its observation).
+pub trait Equations: Sync {
+    /// Writes the equations of one group of a local block, every element of `rows`.
+    fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>);
+}
+
+/// The rows of one group of equations, to be filled in. Matrices are row by row.
+#[derive(Debug)]
+pub struct GroupRows<'a> {
+    /// Right-hand sides l (rows).
+    pub constant: &'a mut [f64],
+    /// Coefficients of the local block (rows x local unknowns).
+    pub local: &'a mut [f64],
+    /// Coefficients of the kept block (rows x its unknowns).
+    pub kept: &'a mut [f64],
+    /// Coefficients of the group's range of the border (rows x its length).
+    pub border: &'a mut [f64],
+}
+
+/// Weights of the unknowns themselves: equations `x_i = constant_i` of the given weight. Both have the length of the
+/// vector of unknowns.
+#[derive(Debug, Clone)]
+pub struct Prior {
+    /// Weight w of each unknown; 0 leaves it free.
+    pub weight: Vec<f64>,
+    /// Weight times constant, w l.
+    pub right: Vec<f64>,
+}
+
+impl Prior {
+    /// The normal equations of the unknowns of one local block themselves: diagonal, with the damping still to come, and
+    /// right-hand side.
+    #[inline(always)]
+    pub(super) fn of_local<const L: usize>(
+        &self,
+        layout: &Layout,
+        local: usize,
+    ) -> ([[f64; L]; L], [f64; L]) {
+        let first = layout.local_range(local).start;
+        let mut normal = [[0.0; L]; L];
+        (0..L).for_each(|d| normal[d][d] = self.weight[first + d]);
+        (normal, std::array::from_fn(|d| self.right[first + d]))
+    }
+}

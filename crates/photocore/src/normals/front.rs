@@ -1,0 +1,136 @@
+//! One front of the multifrontal method while it is assembled.
+
+use std::ops::Range;
+
+use pulp::Simd;
+
+use super::panels::skip;
+use super::vectorised::{Rows, add_product, size};
+
+/// A front: the columns of a supernode, and what their elimination will leave for the parent. Rows and columns are those of the
+/// supernode's panel, its own blocks before the coupled ones. Lower triangles; what stands above carries no meaning.
+pub(super) struct Front<'a> {
+    /// Own columns.
+    pub width: usize,
+    /// Own and coupled rows.
+    pub height: usize,
+    /// Own columns, column by column.
+    pub panel: &'a mut [f64],
+    /// Coupled rows and columns, column by column.
+    pub update: Vec<f64>,
+    /// Right-hand side.
+    pub right: Vec<f64>,
+    /// Diagonal of the normal equations before any elimination.
+    pub diagonal: Vec<f64>,
+}
+
+impl<'a> Front<'a> {
+    pub fn new(width: usize, height: usize, panel: &'a mut [f64]) -> Self {
+        let below = height - width;
+        let (right, diagonal) = (vec![0.0; height], vec![0.0; height]);
+        Self { width, height, panel, update: vec![0.0; below * below], right, diagonal }
+    }
+
+    /// All columns.
+    pub fn columns(&mut self) -> Columns<'_> {
+        Columns {
+            width: self.width,
+            height: self.height,
+            columns: 0..self.height,
+            panel: self.panel,
+            update: &mut self.update,
+            right: &mut self.right,
+            diagonal: &mut self.diagonal,
+        }
+    }
+
+    /// The columns in parts that begin at 0 and at the given columns, ascending.
+    pub fn parts(&mut self, starts: &[usize]) -> Vec<Columns<'_>> {
+        let (width, height) = (self.width, self.height);
+        let (mut panel, mut update) = (&mut *self.panel, &mut self.update[..]);
+        let (mut right, mut diagonal) = (&mut self.right[..], &mut self.diagonal[..]);
+        let mut first = 0;
+        let ends = starts.iter().copied().filter(|&start| start > 0).chain([height]);
+        let part = |end: usize| {
+            let own = end.min(width) - first.min(width);
+            let columns = Columns {
+                width,
+                height,
+                columns: first..end,
+                panel: skip(&mut panel, own * height),
+                update: skip(&mut update, (end - first - own) * (height - width)),
+                right: skip(&mut right, end - first),
+                diagonal: skip(&mut diagonal, end - first),
+            };
+            first = end;
+            columns
+        };
+        ends.map(part).collect()
+    }
+}
+
+/// Some columns of a front.
+pub(super) struct Columns<'a> {
+    width: usize,
+    height: usize,
+    columns: Range<usize>,
+    panel: &'a mut [f64],
+    update: &'a mut [f64],
+    right: &'a mut [f64],
+    diagonal: &'a mut [f64],
+}
+
+/// A matrix whose columns belong to consecutive rows and columns of the front.
+#[derive(Clone, Copy)]
+pub(super) struct Strip<'a> {
+    /// The first of them.
+    pub at: usize,
+    /// The matrix.
+    pub rows: Rows<'a>,
+}
+
+impl Columns<'_> {
+    /// Whether a column of the front is among these.
+    #[inline(always)]
+    pub fn contain(&self, column: usize) -> bool {
+        self.columns.start <= column && column < self.columns.end
+    }
+
+    /// Adds `sign` A^T B in the rows of A and the columns of B.
+    #[inline(always)]
+    pub fn add_product<S: Simd>(&mut self, simd: S, sign: f64, a: Strip<'_>, b: Strip<'_>) {
+        let (stride, target) = if b.at < self.width {
+            (self.height, &mut self.panel[(b.at - self.columns.start) * self.height + a.at..])
+        } else {
+            let (stride, first) = (self.height - self.width, self.columns.start.max(self.width));
+            (stride, &mut self.update[(b.at - first) * stride + a.at - self.width..])
+        };
+        add_product(simd, target, stride, sign, a.rows, b.rows);
+    }
+
+    /// Adds `sign` A^T b to the right-hand side.
+    #[inline(always)]
+    pub fn add_right<const D: usize>(&mut self, sign: f64, a: Strip<'_>, b: &[f64]) {
+        let width = size::<D>(a.rows.width);
+        let target = &mut self.right[a.at - self.columns.start..][..width];
+        for row in 0..a.rows.count {
+            let (values, factor) = (&a.rows.values[row * width..][..width], sign * b[row]);
+            for k in 0..width {
+                target[k] += factor * values[k];
+            }
+        }
+    }
+
+    /// Adds the squares of the elements of A to the diagonal before elimination.
+    #[inline(always)]
+    pub fn add_diagonal<const D: usize>(&mut self, a: Strip<'_>) {
+        let width = size::<D>(a.rows.width);
+        let target = &mut self.diagonal[a.at - self.columns.start..][..width];
+        for row in 0..a.rows.count {
+            let values = &a.rows.values[row * width..][..width];
+            for k in 0..width {
+                target[k] += values[k] * values[k];
+            }
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Kernels compiled for the vector instructions of the machine that they run on, and for the common sizes of blocks.
+
+use pulp::{Arch, Simd, WithSimd};
+
+use super::layout::Layout;
+
+/// Work compiled for several sizes: rows R of a group, unknowns L of a local block and D of a kept block. R and D may be zero: then
+/// the size is known at run time only.
+///
+/// Implementations are `#[inline(always)]`, and so is all that they call, iterators with long closures excepted: what is not inlined
+/// is not compiled for the machine.
+pub(super) trait Kernel {
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S);
+}
+
+/// Runs a kernel for the sizes of a layout.
+pub(super) fn run(layout: &Layout, kernel: impl Kernel) {
+    Arch::new().dispatch(Sized { layout, kernel });
+}
+
+/// Runs a kernel that does not depend on sizes.
+pub(super) fn run_unsized(kernel: impl Kernel) {
+    Arch::new().dispatch(Unsized { kernel });
+}
+
+/// A size: the constant where there is one.
+#[inline(always)]
+pub(super) fn size<const N: usize>(at_run_time: usize) -> usize {
+    if N > 0 { N } else { at_run_time }
+}
+
+struct Sized<'a, K> {
+    layout: &'a Layout,
+    kernel: K,
+}
+
+impl<K: Kernel> WithSimd for Sized<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        match (self.layout.rows(), self.layout.local_dim(), self.layout.common_kept_dim()) {
+            (2, 3, Some(6)) => self.kernel.run::<S, 2, 3, 6>(simd),
+            (2, 3, Some(9)) => self.kernel.run::<S, 2, 3, 9>(simd),
+            (_, 3, _) => self.kernel.run::<S, 0, 3, 0>(simd),
+            (_, 2, _) => self.kernel.run::<S, 0, 2, 0>(simd),
+            _ => self.kernel.run::<S, 0, 1, 0>(simd),
+        }
+    }
+}
+
+struct Unsized<K> {
+    kernel: K,
+}
+
+impl<K: Kernel> WithSimd for Unsized<K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.kernel.run::<S, 0, 0, 0>(simd);
+    }
+}
+
+/// Columns of a product whose sums are kept in registers together.
+const TOGETHER: usize = 6;
+/// Rows of a product whose sums are kept in registers together; matrices are followed by so many readable elements.
+pub(super) const LANES: usize = 8;
+
+/// A matrix row by row, in a buffer that goes on for [`LANES`] elements at least.
+#[derive(Clone, Copy)]
+pub(super) struct Rows<'a> {
+    pub values: &'a [f64],
+    pub width: usize,
+    pub count: usize,
+}
+
+/// target[i, j] += sign times the sum over rows of a[row][i] b[row][j]; the target is column by column with the given stride.
+#[inline(always)]
+pub(super) fn add_product<S: Simd>(
+    simd: S,
+    target: &mut [f64],
+    stride: usize,
+    sign: f64,
+    a: Rows<'_>,
+    b: Rows<'_>,
+) {
+    for i in (0..a.width).step_by(LANES) {
+        let target = &mut target[i..];
+        let mut j = 0;
+        while j + TOGETHER <= b.width {
+            add_columns::<S, TOGETHER>(simd, &mut target[j * stride..], stride, sign, a, i, b, j);
+            j += TOGETHER;
+        }
+        while j + 3 <= b.width {
+            add_columns::<S, 3>(simd, &mut target[j * stride..], stride, sign, a, i, b, j);
+            j += 3;
+        }
+        while j < b.width {
+            add_columns::<S, 1>(simd, &mut target[j * stride..], stride, sign, a, i, b, j);
+            j += 1;
+        }
+    }
+}
+
+/// C columns of the product, and as many rows as there are lanes.
+#[inline(always)]
+fn add_columns<S: Simd, const C: usize>(
+    simd: S,
+    target: &mut [f64],
+    stride: usize,
+    sign: f64,
+    a: Rows<'_>,
+    i: usize,
+    b: Rows<'_>,
+    j: usize,
+) {
+    let zero = simd.splat_f64s(0.0);
+    // As many vectors as the lanes of the machine need; the others are never touched.
+    let mut sums = [[zero; LANES]; C];
+    for row in 0..a.count {
+        let vectors = S::as_simd_f64s(&a.values[row * a.width + i..][..LANES]).0;
+        let factors = &b.values[row * b.width + j..][..C];
+        for c in 0..C {
+            let factor = simd.splat_f64s(factors[c]);
+            for k in 0..LANES / S::F64_LANES {
+                sums[c][k] = simd.mul_add_f64s(vectors[k], factor, sums[c][k]);
+            }
+        }
+    }
+    let height = LANES.min(a.width - i);
+    for c in 0..C {
+        let mut values = [0.0; LANES];
+        let vectors = S::as_mut_simd_f64s(&mut values).0;
+        for k in 0..LANES / S::F64_LANES {
+            vectors[k] = sums[c][k];
+        }
+        let column = &mut target[c * stride..][..height];
+        for k in 0..height {
+            column[k] += sign * values[k];
+        }
+    }
+}
