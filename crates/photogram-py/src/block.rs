@@ -182,10 +182,8 @@ fn tell(py: Python<'_>, progress: Option<&Py<PyAny>>, event: Event) -> PyResult<
 fn phase_name(phase: Phase) -> &'static str {
     match phase {
         Phase::Form => "form",
-        Phase::Factor => "factor",
         Phase::Solve => "solve",
         Phase::Invert => "invert",
-        Phase::Cofactors => "cofactors",
     }
 }
 

@@ -69,16 +69,12 @@ pub struct Iteration {
 /// What the adjustment is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// Forming the normal equations.
+    /// Forming the normal equations and factoring them, which go together.
     Form,
-    /// Factoring them.
-    Factor,
     /// Solving them.
     Solve,
-    /// Inverting them.
+    /// Inverting them, with cofactors and redundancy numbers.
     Invert,
-    /// Computing cofactors and redundancy numbers.
-    Cofactors,
 }
 
 /// What is told while the adjustment runs.

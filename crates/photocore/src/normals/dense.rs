@@ -6,9 +6,11 @@ use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
+use pulp::Simd;
 use rayon::prelude::*;
 
 use super::triangle::PIVOT_TOLERANCE;
+use super::vectorised::{Kernel, run_unsized};
 
 /// Columns factored at a time.
 const STEP: usize = 48;
@@ -18,8 +20,8 @@ const TILE: usize = 192;
 const WORTH_SHARING: f64 = 2e6;
 
 /// Factors the leading `width` columns of a symmetric front (lower triangle, `panel` = those columns) in place and
-/// subtracts their product from the `update`, the rest of the front. `diagonal` is that of the columns before any elimination. Returns the columns whose pivot was lost in rounding:
-/// their pivot is set to one and nothing below it.
+/// subtracts their product from the `update`, the rest of the front. `diagonal` is that of the columns before any elimination.
+/// Returns the columns whose pivot was lost in rounding: their pivot is set to one and nothing below it.
 pub(super) fn factor_front(
     mut panel: MatMut<'_, f64>,
     mut update: MatMut<'_, f64>,
@@ -27,25 +29,42 @@ pub(super) fn factor_front(
 ) -> Vec<usize> {
     let (height, width) = (panel.nrows(), panel.ncols());
     let mut lost = Vec::new();
-    for start in (0..width).step_by(STEP) {
-        let step = STEP.min(width - start);
-        let (left, right) = panel.rb_mut().split_at_col_mut(start + step);
-        let (mut top, mut below) =
-            left.subcols_mut(start, step).subrows_mut(start, height - start).split_at_row_mut(step);
-        lost.extend(cholesky(top.rb_mut(), &diagonal[start..]).into_iter().map(|column| start + column));
-        let factor = top.rb();
-        for_tiles(row_tiles(below.rb_mut()), step * step * (height - start), |_, tile| {
-            solve_lower_triangular_in_place(factor, tile.transpose_mut(), Par::Seq);
-        });
-        for column in lost.iter().filter(|&&column| column >= start) {
-            below.rb_mut().col_mut(column - start).fill(0.0);
-        }
-        let rest = right.subrows_mut(start + step, height - start - step);
-        subtract_square(rest, below.rb());
-    }
-    let below = panel.rb().subrows(width, height - width);
-    subtract_square(update.rb_mut(), below);
+    eliminate(panel.rb_mut(), diagonal, 0, &mut lost);
+    subtract_square(update.rb_mut(), panel.rb().subrows(width, height - width));
     lost
+}
+
+/// Eliminates columns, half by half so that most of the work is in large products. They are the columns of the front from `first` on,
+/// and begin with the row of their diagonal.
+fn eliminate(columns: MatMut<'_, f64>, diagonal: &[f64], first: usize, lost: &mut Vec<usize>) {
+    let (height, width) = (columns.nrows(), columns.ncols());
+    if width <= STEP {
+        return eliminate_step(columns, diagonal, first, lost);
+    }
+    let half = (width / 2).next_multiple_of(STEP);
+    let (mut left, right) = columns.split_at_col_mut(half);
+    let mut right = right.subrows_mut(half, height - half);
+    eliminate(left.rb_mut(), &diagonal[..half], first, lost);
+    subtract_square(right.rb_mut(), left.rb().subrows(half, height - half));
+    eliminate(right, &diagonal[half..], first + half, lost);
+}
+
+/// Eliminates a few columns one by one.
+fn eliminate_step(columns: MatMut<'_, f64>, diagonal: &[f64], first: usize, lost: &mut Vec<usize>) {
+    let (height, width) = (columns.nrows(), columns.ncols());
+    let (mut top, mut below) = columns.split_at_row_mut(width);
+    let mut own = vec![0.0; width * width];
+    MatMut::from_column_major_slice_mut(&mut own, width, width).copy_from(top.rb());
+    let before = lost.len();
+    run_unsized(Cholesky { a: &mut own, width, diagonal, first, lost });
+    top.copy_from(MatRef::from_column_major_slice(&own, width, width));
+    let factor = top.rb();
+    for_tiles(row_tiles(below.rb_mut()), width * width * height, |_, tile| {
+        solve_lower_triangular_in_place(factor, tile.transpose_mut(), Par::Seq);
+    });
+    for &column in &lost[before..] {
+        below.rb_mut().col_mut(column - first).fill(0.0);
+    }
 }
 
 /// target -= x x_top^T on and below the diagonal, x_top being the first rows of x, as many as the target has columns.
@@ -61,29 +80,44 @@ fn subtract_square(target: MatMut<'_, f64>, x: MatRef<'_, f64>) {
     });
 }
 
-/// Cholesky factor of the lower triangle, in place; returns the columns whose pivot was lost in rounding.
-/// A pivot is compared with the diagonal before any elimination.
-fn cholesky(mut a: MatMut<'_, f64>, diagonal: &[f64]) -> Vec<usize> {
-    let mut lost = Vec::new();
-    for j in 0..a.ncols() {
-        // Written so that a NaN counts as lost.
-        let regular = a[(j, j)] > PIVOT_TOLERANCE * diagonal[j];
-        if !regular {
-            lost.push(j);
-        }
-        let pivot = if regular { a[(j, j)].sqrt() } else { 1.0 };
-        a[(j, j)] = pivot;
-        for i in j + 1..a.nrows() {
-            a[(i, j)] = if regular { a[(i, j)] / pivot } else { 0.0 };
-        }
-        for k in j + 1..a.ncols() {
-            let factor = a[(k, j)];
-            for i in k..a.nrows() {
-                a[(i, k)] -= a[(i, j)] * factor;
+/// Cholesky factor of the lower triangle of a matrix, column by column, in place. A pivot is compared with the diagonal before any
+/// elimination; the columns whose pivot was lost in rounding, counted from `first`, are added to `lost`.
+struct Cholesky<'a> {
+    a: &'a mut [f64],
+    width: usize,
+    diagonal: &'a [f64],
+    first: usize,
+    lost: &'a mut Vec<usize>,
+}
+
+impl Kernel for Cholesky<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+        let width = self.width;
+        for j in 0..width {
+            let (left, right) = self.a.split_at_mut(j * width);
+            let column = &mut right[j..width];
+            for k in 0..j {
+                let other = &left[k * width + j..][..width - j];
+                let factor = other[0];
+                for i in 0..width - j {
+                    column[i] -= factor * other[i];
+                }
+            }
+            // Written so that a NaN counts as lost.
+            let regular = column[0] > PIVOT_TOLERANCE * self.diagonal[j];
+            let pivot = if regular { column[0].sqrt() } else { 1.0 };
+            let scale = if regular { pivot.recip() } else { 0.0 };
+            column[0] = pivot;
+            for i in 1..width - j {
+                // What is lost may not be finite.
+                column[i] = if regular { column[i] * scale } else { 0.0 };
+            }
+            if !regular {
+                self.lost.push(self.first + j);
             }
         }
     }
-    lost
 }
 
 /// One step of the selected inversion (Takahashi et al. 1973). From the panel `[L_J; L_R]` of the factor and the inverse

@@ -390,9 +390,9 @@ fn column_patterns(
     columns
 }
 
-/// Widest panel, in unknowns: wide enough for the matrix product to run at full rate, narrow enough that the updates
-/// of one panel keep all processors busy.
-const WIDEST_PANEL: usize = 192;
+/// Widest panel, in unknowns: wide enough that passing updates from panel to panel costs little beside the products, narrow enough that
+/// the inverse of a panel's own triangle, which one thread computes, does too.
+const WIDEST_PANEL: usize = 768;
 
 /// Joins each column with the next one when that is its parent and few explicit zeros come in (relaxed supernodes,
 /// Ashcraft and Grimes 1989). Returns the blocks and the coupled rows of each supernode.

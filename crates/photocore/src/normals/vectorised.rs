@@ -132,9 +132,7 @@ fn add_columns<S: Simd, const C: usize>(
     for c in 0..C {
         let mut values = [0.0; LANES];
         let vectors = S::as_mut_simd_f64s(&mut values).0;
-        for k in 0..LANES / S::F64_LANES {
-            vectors[k] = sums[c][k];
-        }
+        vectors.copy_from_slice(&sums[c][..LANES / S::F64_LANES]);
         let column = &mut target[c * stride..][..height];
         for k in 0..height {
             column[k] += sign * values[k];
