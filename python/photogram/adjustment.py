@@ -51,7 +51,7 @@ class Progress:
     Attributes
     ----------
     phase
-        `form`, `factor`, `solve`, `invert`, `cofactors`, or `iteration` when one is over.
+        `form` (with the factorisation), `solve`, `invert` (with cofactors), or `iteration` when one is over.
     done, total
         Points done of all, within the phase.
     iteration
