@@ -302,10 +302,10 @@ def document(result: Result) -> dict[str, Any]:
 
 def test_members_of_the_document(result, document):
     assert set(document) == {
-        "program", "title", "units", "conventions", "status", "messages", "initial_weighted_sum_of_squares",
-        "iterations", "weighted_sum_of_squares", "degrees_of_freedom", "unit_variance",
-        "variance_of_unit_weight", "covariance_scale", "photos", "points", "observations", "check_points",
-        "dropped_points", "ordering", "predictions", "operations", "refraction", "seconds",
+        "program", "title", "units", "conventions", "status", "messages", "loss",
+        "initial_weighted_sum_of_squares", "iterations", "weighted_sum_of_squares", "degrees_of_freedom",
+        "unit_variance", "variance_of_unit_weight", "covariance_scale", "photos", "points", "observations",
+        "check_points", "dropped_points", "ordering", "predictions", "operations", "refraction", "seconds",
     }  # fmt: skip
     assert document["status"] == "converged"
     assert document["title"] == "A BLOCK OF TWO STRIPS"

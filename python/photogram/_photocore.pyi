@@ -202,6 +202,7 @@ def adjust_block(
     limit: float,
     max_iterations: int,
     covariance: bool,
+    loss: tuple[str, float] | None,
     ordering: str,
     unit_variance: str,
     threads: int,
@@ -238,6 +239,8 @@ def adjust_block(
         Iterations at the most.
     covariance
         Whether to compute cofactors and redundancy numbers; NaN otherwise.
+    loss
+        Robust loss of the image points, `huber` or `cauchy`, and its scale in standard deviations a priori.
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     unit_variance
@@ -327,6 +330,10 @@ class BlockSolution:
     @property
     def standardized(self) -> _Floats:
         """(m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight."""
+
+    @property
+    def image_weights(self) -> _Floats:
+        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
 
     @property
     def dropped(self) -> list[tuple[int, str]]:
@@ -996,3 +1003,206 @@ class StellarProblem:
 
     def directions(self) -> _Floats:
         """Right ascension and declination (m, 2) of every image at the initial values."""
+
+class CollectionError(Exception):
+    """A collection cannot be adjusted: (kind, message, photos of each combination, points)."""
+
+def read_numbers(text: bytes) -> _Floats:
+    """Read the numbers of a text, separated by white space, up to the first word that is not a finite number.
+
+    Returns
+    -------
+    (k,) numbers.
+    """
+
+def bundler_images(photo_parameters: _Floats, points: _Floats) -> _Floats:
+    """Image coordinates of points, row by row: point i on the photo of row i.
+
+    f (1 + k1 p^2 + k2 p^4) p with P = R(w) X + t and p = -(P1, P2) / P3.
+
+    Parameters
+    ----------
+    photo_parameters
+        (n, 9) angle-axis vector w (rad), t, f (pixels), k1, k2.
+    points
+        (n, 3) X.
+
+    Returns
+    -------
+    (n, 2) pixels; not finite in the plane of the projection centre. A point behind the camera has the image
+    that the formula gives.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape or length; the message names it.
+    """
+
+def adjust_collection(
+    photo_parameters: _Floats,
+    photo_sd: _Floats,
+    point_positions: _Floats,
+    point_sd: _Floats,
+    image_photos: _Indices,
+    image_points: _Indices,
+    image_xy: _Floats,
+    image_sd: _Floats,
+    *,
+    decrease: float,
+    max_iterations: int,
+    covariance: bool,
+    loss: tuple[str, float] | None,
+    ordering: str,
+    threads: int,
+    progress: Callable[[str, int, int, IterationRow | None], None] | None,
+) -> CollectionSolution:
+    """Adjust a collection of photos by Levenberg-Marquardt steps.
+
+    Parameters
+    ----------
+    photo_parameters, photo_sd
+        (P, 9) initial (and, where weighted, observed) parameters and their standard deviations, infinite
+        for free ones, zero for fixed ones; see :func:`bundler_images`.
+    point_positions, point_sd
+        (n, 3) likewise.
+    image_photos, image_points
+        (m,) indices.
+    image_xy, image_sd
+        (m, 2) pixels.
+    decrease
+        Until a step lowers the weighted sum of squares by less than this fraction of it.
+    max_iterations
+        Iterations at the most.
+    covariance
+        Whether to compute cofactors and redundancy numbers; NaN otherwise.
+    loss
+        Robust loss of the image points, `huber` or `cauchy`, and its scale in standard deviations a priori.
+    ordering
+        `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
+    threads
+        Number of threads; 0 for all processors.
+    progress
+        See :func:`adjust_block`.
+
+    Raises
+    ------
+    CollectionError
+        A collection that cannot be adjusted.
+    ValueError
+        An argument of another shape, length or choice; the message names it.
+    """
+
+@final
+class CollectionSolution:
+    """An adjusted collection, in the order of its photos (P), points (n) and images (m).
+
+    Points and images that were left out are NaN. Cofactors hold for a priori unit weight.
+    """
+
+    @property
+    def status(self) -> str:
+        """`converged`, `not converged` or `diverged`."""
+
+    @property
+    def initial_sum_of_squares(self) -> float:
+        """Weighted sum of squares, of losses with a loss, at the initial values."""
+
+    @property
+    def iterations(self) -> list[IterationRow]:
+        """Every iteration."""
+
+    @property
+    def photo_parameters(self) -> _Floats:
+        """(P, 9) angle-axis vector (rad), translation, f (pixels), k1, k2."""
+
+    @property
+    def photo_cofactors(self) -> _Floats:
+        """(P, 9, 9)."""
+
+    @property
+    def photo_redundancy(self) -> _Floats:
+        """(P, 9) redundancy numbers of the parameters as observations; 0 unless weighted."""
+
+    @property
+    def photo_images(self) -> _Indices:
+        """(P,) number of images that took part."""
+
+    @property
+    def point_positions(self) -> _Floats:
+        """(n, 3)."""
+
+    @property
+    def point_cofactors(self) -> _Floats:
+        """(n, 3, 3)."""
+
+    @property
+    def point_redundancy(self) -> _Floats:
+        """(n, 3) redundancy numbers of the coordinates as observations; 0 unless weighted."""
+
+    @property
+    def point_rays(self) -> _Indices:
+        """(n,) number of images; 0 for points left out."""
+
+    @property
+    def point_rays_behind(self) -> _Indices:
+        """(n,) number of images that have the point behind the camera."""
+
+    @property
+    def residuals(self) -> _Floats:
+        """(m, 2) observed minus computed, pixels."""
+
+    @property
+    def redundancy(self) -> _Floats:
+        """(m, 2) redundancy numbers."""
+
+    @property
+    def standardized(self) -> _Floats:
+        """(m, 2) residual / (standard deviation x root of redundancy number); NaN without redundancy."""
+
+    @property
+    def image_weights(self) -> _Floats:
+        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Weighted sum of squares, weights as the loss has changed them."""
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Observations and weighted unknowns less unknowns."""
+
+    @property
+    def variance_of_unit_weight(self) -> float | None:
+        """None without degrees of freedom."""
+
+    @property
+    def datum(self) -> list[tuple[int, int]]:
+        """Photos and parameters held to give the cofactors a datum."""
+
+    @property
+    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
+        """Why there are no cofactors although they were asked for, as in :class:`CollectionError`."""
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Observations, weighted unknowns, unknowns that are neither fixed nor held."""
+
+    @property
+    def ordering(self) -> str:
+        """The ordering in force."""
+
+    @property
+    def predictions(self) -> dict[str, float]:
+        """Predicted multiply-adds of one factorisation in each ordering that was tried."""
+
+    @property
+    def operations(self) -> dict[str, float]:
+        """Predicted multiply-adds of reduction, factor and inverse, once."""
+
+    @property
+    def formations(self) -> int:
+        """Formations of the normal equations."""
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds spent in form, factor, solve, invert and cofactors."""

@@ -83,8 +83,10 @@ class AdjustedBlock:
         `converged`, `not converged` or `diverged`.
     messages
         Remarks on the block that did not stop the adjustment.
+    loss
+        Name and scale of the robust loss of the image points; None for least squares.
     initial_weighted_sum_of_squares, iterations
-        The history.
+        The history; with a loss, sums of losses.
     sums_of_squares, degrees_of_freedom
         Weighted sums by group, and the degrees of freedom of the chosen unit variance.
     unit_variance
@@ -117,6 +119,8 @@ class AdjustedBlock:
     standardized
         (m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight (Baarda's w);
         NaN without redundancy.
+    image_weights
+        (m,) factor by which the loss has changed the weight of an image point; 1 without a loss.
     dropped
         Points left out, with the reason.
     ordering, photo_order, predictions
@@ -130,6 +134,7 @@ class AdjustedBlock:
     block: Block
     status: str
     messages: list[Message]
+    loss: tuple[str, float] | None
     initial_weighted_sum_of_squares: float
     iterations: list[Iteration]
     sums_of_squares: SumsOfSquares
@@ -149,6 +154,7 @@ class AdjustedBlock:
     residuals: Floats
     redundancy: Floats
     standardized: Floats
+    image_weights: Floats
     dropped: Mapping[str, str]
     ordering: str
     predictions: Mapping[str, float]
@@ -159,13 +165,19 @@ class AdjustedBlock:
 
     @classmethod
     def from_solution(
-        cls, block: Block, solution: _photocore.BlockSolution, unit_variance: str, messages: list[Message]
+        cls,
+        block: Block,
+        solution: _photocore.BlockSolution,
+        unit_variance: str,
+        loss: tuple[str, float] | None,
+        messages: list[Message],
     ) -> Self:
         """Take over what the core found."""
         return cls(
             block=block,
             status=solution.status,
             messages=messages,
+            loss=loss,
             initial_weighted_sum_of_squares=solution.initial_sum_of_squares,
             iterations=[Iteration(*row) for row in solution.iterations],
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
@@ -185,6 +197,7 @@ class AdjustedBlock:
             residuals=solution.residuals,
             redundancy=solution.redundancy,
             standardized=solution.standardized,
+            image_weights=solution.image_weights,
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
             ordering=solution.ordering,
             predictions=solution.predictions,

@@ -16,8 +16,9 @@ from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, listed
 from photogram.refracted import check_cameras, remarks
 from photogram.result import Result
+from photogram.robust import Loss, loss_row, remark
 
-__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
+__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "teller"]
 
 UnitVariance = Literal["free", "constrained", "unity"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
@@ -50,7 +51,7 @@ class Progress:
     Attributes
     ----------
     phase
-        `form`, `factor`, `solve`, `invert`, `cofactors`, or `iteration` when one is over.
+        `form` (with the factorisation), `solve`, `invert` (with cofactors), or `iteration` when one is over.
     done, total
         Points done of all, within the phase.
     iteration
@@ -67,10 +68,12 @@ def adjust(
     block: Block,
     *,
     unit_variance: UnitVariance = "constrained",
-    max_iterations: int = 50,
+    max_iterations: int | None = None,
     tolerance: float = 1e-5,
     as_published: AsPublished | None = None,
     covariance: bool = True,
+    loss: Loss | None = None,
+    scale: float | None = None,
     fix_photos: bool = False,
     ordering: Ordering = "auto",
     threads: int | None = None,
@@ -91,7 +94,8 @@ def adjust(
         (`constrained`), image coordinates and ground control only (`free`), or 1 (`unity`). Covariances are
         scaled by it.
     max_iterations
-        Iterations at the most.
+        Iterations at the most. When None, 50 without a loss, and 200 with one: reweighting takes more of
+        them.
     tolerance
         Iterate until no unknown changes by more than this fraction of its standard deviation (a priori unit
         weight). A step that raises the sum of squares is damped (Levenberg-Marquardt).
@@ -99,6 +103,13 @@ def adjust(
         Iterate as the 1987 program did instead.
     covariance
         Whether to compute covariances, redundancy numbers and standardized residuals.
+    loss
+        Robust loss in place of the squares of image coordinates: `huber` or `cauchy`, of both coordinates
+        of an image point together; None for least squares. Variance, covariances and redundancy numbers
+        hold for the weights as the loss has modified them (`image_weights`).
+    scale
+        Where the loss sets in, in standard deviations a priori; 1.50 for `huber` and 2.55 for `cauchy` when
+        None.
     fix_photos
         Keep positions and attitudes as they are: every point by itself.
     ordering
@@ -125,7 +136,12 @@ def adjust(
     KeyboardInterrupt
         Ctrl-C.
     """
+    if max_iterations is None:
+        max_iterations = 50 if loss is None else 200
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads)
+    row = loss_row(loss, scale)
+    if row and as_published:
+        raise InputError("the 1987 program has no robust loss: as_published or loss")
     check_cameras(block)
     if fix_photos:
         block = block.replace(photo_position_sd=np.array(0.0), photo_attitude_sd=np.array(0.0))
@@ -150,20 +166,21 @@ def adjust(
             limit=as_published.percent if as_published else tolerance,
             max_iterations=as_published.max_iterations if as_published else max_iterations,
             covariance=covariance,
+            loss=row,
             ordering=ordering,
             unit_variance=unit_variance,
             threads=threads or 0,
-            progress=None if progress is None else _teller(progress),
+            progress=None if progress is None else teller(progress),
         )
     except _photocore.BlockError as error:
         raise _named(block, *error.args) from None
-    messages = _messages(block, solution)
+    messages = _messages(block, solution) + remark(row, solution.image_weights)
     if as_published:
         messages += _rises([Iteration(*row) for row in solution.iterations])
-    return Result.from_solution(block, solution, unit_variance, messages)
+    return Result.from_solution(block, solution, unit_variance, row, messages)
 
 
-def _teller(
+def teller(
     progress: Callable[[Progress], None],
 ) -> Callable[[str, int, int, _photocore.IterationRow | None], None]:
     """Return what the core calls: it tells `progress`."""

@@ -1,4 +1,4 @@
-"""Arrays as arguments: numbers of a given shape, refused by name when they are not."""
+"""Arrays as arguments: numbers of a given shape, and indices, refused by name when they are not."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.errors import InputError
 
-__all__ = ["shaped"]
+__all__ = ["indices", "shaped"]
 
 
 def shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -27,3 +27,21 @@ def shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.fl
     if array.shape != shape:
         raise InputError(f"{name} has the shape {array.shape}, not {shape}")
     return np.ascontiguousarray(array)
+
+
+def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.int64]:
+    """Return an array of `length` whole numbers from 0 to `count` - 1.
+
+    Raises
+    ------
+    InputError
+        Another shape, what is no whole number, or an index outside; the message names the argument.
+    """
+    array = np.asarray(value)
+    if array.shape != (length,) or (length and not np.issubdtype(array.dtype, np.integer)):
+        raise InputError(f"{name} is not an array of {length} whole numbers")
+    array = np.ascontiguousarray(array, dtype=np.int64)
+    bad = np.flatnonzero((array < 0) | (array >= count))
+    if bad.size:
+        raise InputError(f"{name}[{bad[0]}] is {array[bad[0]]}, outside 0 to {count - 1}")
+    return array

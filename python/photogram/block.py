@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from photogram.arrays import shaped
+from photogram.arrays import indices, shaped
 from photogram.errors import InputError
 from photogram.refraction import Refraction, metres_per_unit
 
@@ -112,7 +112,7 @@ class Block:
         for name, shape in shapes.items():
             setattr(self, name, shaped(name, getattr(self, name), shape))
         for name, count in (("image_photos", photos), ("image_points", points)):
-            setattr(self, name, _index(name, getattr(self, name), images, count))
+            setattr(self, name, indices(name, getattr(self, name), images, count))
         self._check_values()
         if self.refraction is not None:
             metres_per_unit(self.linear_unit)
@@ -244,17 +244,6 @@ def _names(name: str, values: Sequence[str]) -> list[str]:
         repeated = next(value for value in names if value in seen or seen.add(value))  # type: ignore[func-returns-value]
         raise InputError(f"{name}: {repeated!r} stands there more than once")
     return names
-
-
-def _index(name: str, value: ArrayLike, length: int, count: int) -> Indices:
-    array = np.asarray(value)
-    if array.shape != (length,) or (length and not np.issubdtype(array.dtype, np.integer)):
-        raise InputError(f"{name} is not an array of {length} whole numbers")
-    array = np.ascontiguousarray(array, dtype=np.int64)
-    bad = np.flatnonzero((array < 0) | (array >= count))
-    if bad.size:
-        raise InputError(f"{name}[{bad[0]}] is {array[bad[0]]}, outside 0 to {count - 1}")
-    return array
 
 
 def _column(table: Mapping[str, Any], table_name: str, name: str) -> Sequence[Any]:

@@ -39,6 +39,7 @@ def _document(result: AdjustedBlock) -> dict[str, Any]:
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
         "status": result.status,
         "messages": [str(message) for message in result.messages],
+        "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
         "iterations": [
             {
@@ -144,6 +145,7 @@ def _observations(result: AdjustedBlock) -> list[dict[str, Any]]:
         result.residuals[used].tolist(),
         result.redundancy[used].tolist(),
         result.standardized[used].tolist(),
+        result.image_weights[used].tolist(),
         strict=True,
     )
     return [
@@ -153,8 +155,9 @@ def _observations(result: AdjustedBlock) -> list[dict[str, Any]]:
             "residual_mm": residual,
             "redundancy": redundancy,
             "standardized": standardized,
+            **({"weight_factor": weight} if result.loss else {}),
         }
-        for photo, point, residual, redundancy, standardized in columns
+        for photo, point, residual, redundancy, standardized, weight in columns
     ]
 
 

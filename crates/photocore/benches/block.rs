@@ -225,6 +225,7 @@ fn adjust(criterion: &mut Criterion) {
             criterion: adjustment::Criterion::Fraction(1e-5),
             max_iterations: 50,
             covariance: true,
+            loss: None,
         },
         ordering: Ordering::Auto,
         unit_variance: UnitVariance::Constrained,

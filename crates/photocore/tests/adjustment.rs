@@ -113,7 +113,7 @@ fn hold(problem: &mut Problem<Frames>, unknowns: &[usize], sd: f64) {
 }
 
 const STRICT: Options =
-    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 50, covariance: true };
+    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 50, covariance: true, loss: None };
 
 fn run(problem: &Problem<Frames>, options: &Options) -> Result<Adjustment, AdjustError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();

@@ -14,7 +14,7 @@ use rayon::ThreadPoolBuilder;
 
 const BASIS: Basis = Basis { degree: 4, centre: [125e3, 130e3], half_range: [120e3, 110e3] };
 const OPTIONS: Options =
-    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 30, covariance: true };
+    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 30, covariance: true, loss: None };
 
 fn comparator() -> Comparator {
     Comparator {

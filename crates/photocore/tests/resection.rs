@@ -14,7 +14,7 @@ use rayon::ThreadPoolBuilder;
 
 const C: f64 = -150.0;
 const STRICT: Options =
-    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 50, covariance: true };
+    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 50, covariance: true, loss: None };
 
 /// Numbers in [-1, 1) without a generator.
 fn noise(index: usize) -> f64 {

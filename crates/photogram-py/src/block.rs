@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 
 use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Criterion, Event, Options as AdjustmentOptions, Phase};
-use photocore::normals::Ordering;
 use photocore::programs::block::{Block, BlockError as Failure, Image, Options, Photo, Point, UnitVariance};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
@@ -14,6 +13,7 @@ use rayon::ThreadPool;
 
 use crate::arrays::{check_lengths, indices, numbers, rows};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
+use crate::options::{named_loss, named_ordering, unknown};
 use crate::solution::{BlockSolution, iteration_row};
 
 create_exception!(
@@ -34,7 +34,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd, principal_distances, point_positions, point_sd,
     image_photos, image_points, image_xy, image_sd, *, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
-    covariance, ordering, unit_variance, threads, progress
+    covariance, loss, ordering, unit_variance, threads, progress
 ))]
 fn adjust_block(
     py: Python<'_>,
@@ -56,6 +56,7 @@ fn adjust_block(
     limit: f64,
     max_iterations: usize,
     covariance: bool,
+    loss: Option<(&str, f64)>,
     ordering: &str,
     unit_variance: &str,
     threads: usize,
@@ -108,8 +109,8 @@ fn adjust_block(
         other => return Err(unknown("criterion", other)),
     };
     let options = Options {
-        adjustment: AdjustmentOptions { criterion, max_iterations, covariance },
-        ordering: Ordering::named(ordering).ok_or_else(|| unknown("ordering", ordering))?,
+        adjustment: AdjustmentOptions { criterion, max_iterations, covariance, loss: named_loss(loss)? },
+        ordering: named_ordering(ordering)?,
         unit_variance: match unit_variance {
             "free" => UnitVariance::Free,
             "constrained" => UnitVariance::Constrained,
@@ -196,8 +197,4 @@ fn failure(error: &Failure) -> PyErr {
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
     BlockError::new_err((kind, error.to_string(), photos, points))
-}
-
-fn unknown(option: &str, value: &str) -> PyErr {
-    PyValueError::new_err(format!("{option} cannot be {value:?}"))
 }

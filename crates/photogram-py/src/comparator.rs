@@ -76,7 +76,8 @@ fn adjust_comparator(
             .map(|i| Measurement { case: case_of[i], point: point_of[i], xy: xy[i], sd: sd[i] })
             .collect(),
     };
-    let options = Options { criterion: Criterion::Fraction(limit), max_iterations, covariance: true };
+    let options =
+        Options { criterion: Criterion::Fraction(limit), max_iterations, covariance: true, loss: None };
     // A calibration takes milliseconds: threads would cost more than they save.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let pool = pool.map_err(|error| PyValueError::new_err(error.to_string()))?;

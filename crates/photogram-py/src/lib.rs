@@ -2,8 +2,10 @@
 
 mod arrays;
 mod block;
+mod collection;
 mod comparator;
 mod geometry;
+mod options;
 mod resection;
 mod similarity;
 mod solution;
@@ -16,6 +18,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     geometry::register(module)?;
     block::register(module)?;
+    collection::register(module)?;
     comparator::register(module)?;
     resection::register(module)?;
     similarity::register(module)?;

@@ -79,7 +79,7 @@ fn resect(
         "position" => Criterion::Length { first: position_unknowns, count: 3, limit },
         other => return Err(PyValueError::new_err(format!("criterion cannot be {other:?}"))),
     };
-    run(py, &resection, &Options { criterion, max_iterations, covariance })
+    run(py, &resection, &Options { criterion, max_iterations, covariance, loss: None })
 }
 
 /// The calling thread as a pool of one thread. One photo is too little work for another thread, and handing it over would take

@@ -1,8 +1,8 @@
 //! The adjusted block as arrays; its documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use photocore::adjustment::{Iteration, Status};
-use photocore::programs::block::{AdjustedImage, Solution};
+use photocore::adjustment::{Adjustment, Iteration, Observed, Status};
+use photocore::programs::block::Solution;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -34,15 +34,6 @@ pub struct BlockSolution {
 impl BlockSolution {
     pub fn new(solution: Solution) -> Self {
         Self { solution }
-    }
-
-    fn images<'py>(
-        &self,
-        py: Python<'py>,
-        part: impl Fn(&AdjustedImage) -> [f64; 2],
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let missing = [f64::NAN; 2];
-        table(py, self.solution.images.iter().map(|image| image.as_ref().map_or(missing, &part)).collect())
     }
 }
 
@@ -121,17 +112,22 @@ impl BlockSolution {
 
     #[getter]
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.images(py, |image| image.residual)
+        image_table(py, &self.solution.images, |image| image.residual)
     }
 
     #[getter]
     fn redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.images(py, |image| image.redundancy)
+        image_table(py, &self.solution.images, |image| image.redundancy)
     }
 
     #[getter]
     fn standardized<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.images(py, |image| image.standardized)
+        image_table(py, &self.solution.images, |image| image.standardized)
+    }
+
+    #[getter]
+    fn image_weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        image_weights(py, &self.solution.images)
     }
 
     #[getter]
@@ -168,11 +164,7 @@ impl BlockSolution {
 
     #[getter]
     fn predictions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        for (ordering, operations) in &self.solution.adjustment.predictions {
-            dict.set_item(ordering.name(), operations)?;
-        }
-        Ok(dict)
+        predictions(py, &self.solution.adjustment)
     }
 
     #[getter]
@@ -185,12 +177,7 @@ impl BlockSolution {
 
     #[getter]
     fn operations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let operations = self.solution.adjustment.operations;
-        let dict = PyDict::new(py);
-        dict.set_item("reduction", operations.reduction)?;
-        dict.set_item("factor", operations.factor)?;
-        dict.set_item("inverse", operations.inverse)?;
-        Ok(dict)
+        operations(py, &self.solution.adjustment)
     }
 
     #[getter]
@@ -200,13 +187,53 @@ impl BlockSolution {
 
     #[getter]
     fn seconds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let seconds = self.solution.adjustment.seconds;
-        let dict = PyDict::new(py);
-        dict.set_item("form", seconds.form)?;
-        dict.set_item("factor", seconds.factor)?;
-        dict.set_item("solve", seconds.solve)?;
-        dict.set_item("invert", seconds.invert)?;
-        dict.set_item("cofactors", seconds.cofactors)?;
-        Ok(dict)
+        seconds(py, &self.solution.adjustment)
     }
+}
+
+/// Predicted multiply-adds of a factorisation in each ordering that was tried.
+pub fn predictions<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    for (ordering, operations) in &adjustment.predictions {
+        dict.set_item(ordering.name(), operations)?;
+    }
+    Ok(dict)
+}
+
+/// Predicted multiply-adds of each phase.
+pub fn operations<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
+    let operations = adjustment.operations;
+    let dict = PyDict::new(py);
+    dict.set_item("reduction", operations.reduction)?;
+    dict.set_item("factor", operations.factor)?;
+    dict.set_item("inverse", operations.inverse)?;
+    Ok(dict)
+}
+
+/// Seconds spent in each phase.
+pub fn seconds<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
+    let seconds = adjustment.seconds;
+    let dict = PyDict::new(py);
+    dict.set_item("form", seconds.form)?;
+    dict.set_item("factor", seconds.factor)?;
+    dict.set_item("solve", seconds.solve)?;
+    dict.set_item("invert", seconds.invert)?;
+    dict.set_item("cofactors", seconds.cofactors)?;
+    Ok(dict)
+}
+
+/// Two numbers of every image as an (m, 2) array; NaN for images that were left out.
+pub fn image_table<'py>(
+    py: Python<'py>,
+    images: &[Option<Observed<2>>],
+    part: impl Fn(&Observed<2>) -> [f64; 2],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let missing = [f64::NAN; 2];
+    table(py, images.iter().map(|image| image.as_ref().map_or(missing, &part)).collect())
+}
+
+/// By how much a loss has changed the weight of every image, (m,); NaN for images that were left out.
+pub fn image_weights<'py>(py: Python<'py>, images: &[Option<Observed<2>>]) -> Bound<'py, PyArray1<f64>> {
+    let weights = images.iter().map(|image| image.map_or(f64::NAN, |image| image.weight));
+    PyArray1::from_vec(py, weights.collect())
 }

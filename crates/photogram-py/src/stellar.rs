@@ -262,8 +262,10 @@ impl StellarProblem {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let criterion = Criterion::Fraction(fraction);
-        let options =
-            Options { adjustment: AdjustmentOptions { criterion, max_iterations, covariance }, unit };
+        let options = Options {
+            adjustment: AdjustmentOptions { criterion, max_iterations, covariance, loss: None },
+            unit,
+        };
         let work = |pool: &rayon::ThreadPool, watch: &mut dyn FnMut(_) -> _| {
             self.calibration.adjust(&options, pool, watch)
         };

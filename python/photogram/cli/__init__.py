@@ -14,6 +14,7 @@ import typer
 from photogram.cli import (
     absolute_orientation,
     check,
+    collection,
     comparator,
     giant,
     perspective_center,
@@ -58,6 +59,7 @@ stellar_app.command("exposures")(stellar_camera.exposures)
 app.add_typer(giant_app)
 app.add_typer(orientation_app)
 app.add_typer(comparator_app)
+app.command("collection")(collection.collection)
 app.command("perspective-center")(perspective_center.perspective_center)
 app.add_typer(stellar_app)
 app.command()(plan.plan)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
-from enum import StrEnum
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,13 +12,12 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, SHOWN, errors, failures, print_sections, print_written
-from photogram.cli.options import JsonFile, Quiet, default_out
+from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, default_out
+from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
-    from rich.status import Status
-
-    from photogram import Block, Progress, Result
+    from photogram import Block, Result
     from photogram.giant import Project
     from photogram.giant.common import Common
 
@@ -30,17 +27,6 @@ RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
 """What goes to the output directory."""
 EXAMPLE = "galveston"
 """The packaged example, a directory of photogram.examples."""
-
-
-class Ordering(StrEnum):
-    """How the photographs are ordered in the normal equations."""
-
-    AUTO = "auto"
-    INPUT = "input"
-    RCM = "rcm"
-    AMD = "amd"
-    DISSECTION = "dissection"
-    GRAPH_DISSECTION = "graph-dissection"
 
 
 def giant(
@@ -82,9 +68,7 @@ def giant(
             help="Stop by the percent criterion and the limit of iterations of COMMON; list as in 1987.",
         ),
     ] = False,
-    ordering: Annotated[
-        Ordering, typer.Option(help="Order of the photographs in the normal equations.")
-    ] = Ordering.AUTO,
+    ordering: Ordering = OrderingName.AUTO,
     air_refraction: Annotated[
         AirModel | None,
         typer.Option(
@@ -105,12 +89,7 @@ def giant(
         float | None,
         typer.Option(min=1, help="Refractive index of the water. Default: 1.340.", show_default=False),
     ] = None,
-    threads: Annotated[
-        int | None,
-        typer.Option(
-            min=1, help="Threads; the results do not depend on it. Default: all.", show_default=False
-        ),
-    ] = None,
+    threads: Threads = None,
     limits: Annotated[
         str | None,
         typer.Option(
@@ -217,7 +196,12 @@ def _refracted(
 
 
 def _adjust(
-    project: Project, block: Block, as_published: bool, ordering: Ordering, threads: int | None, quiet: bool
+    project: Project,
+    block: Block,
+    as_published: bool,
+    ordering: OrderingName,
+    threads: int | None,
+    quiet: bool,
 ) -> Result:
     """Adjust the block as COMMON asks, with the progress on standard error."""
     from photogram import AsPublished, adjust
@@ -232,25 +216,10 @@ def _adjust(
             if as_published
             else None,
             fix_photos=common.intersection_only,
-            progress=_progress(status) if status is not None else None,
+            progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
             threads=threads,
         )
     return replace(result, messages=[*project.messages, *result.messages])
-
-
-def _progress(status: Status) -> Callable[[Progress], None]:
-    """Return a function that keeps the status line at the phase and the last iteration."""
-    last = ""
-
-    def show(progress: Progress) -> None:
-        nonlocal last
-        if progress.iteration is not None:
-            size = progress.iteration.weighted_sum_of_squares
-            last = f"iteration {progress.iteration.number}: weighted sum of squares {size:.6g}; "
-        elif progress.total:
-            status.update(f"{last}{progress.phase} {100 * progress.done // progress.total} %")
-
-    return show
 
 
 def _result_files(

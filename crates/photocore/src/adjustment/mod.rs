@@ -4,12 +4,20 @@
 //! deviation of every observation and of every unknown, from free (infinite) to fixed (zero). [`adjust`] iterates to the
 //! least-squares solution and computes the cofactors of all unknowns and the redundancy numbers of all observations.
 
-mod iterate;
+mod loss;
+mod options;
 mod problem;
+mod published;
+mod result;
+mod run;
 mod statistics;
+mod strict;
+mod trust_region;
+mod walk;
 
-pub use iterate::{
-    AdjustError, Adjustment, Criterion, Event, Iteration, Options, Phase, Seconds, Status, adjust,
-};
+pub use loss::Loss;
+pub use options::{Criterion, Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Problem};
-pub use statistics::{Counts, leading_matrix, standardized};
+pub use result::{AdjustError, Adjustment, Seconds};
+pub use run::adjust;
+pub use statistics::{Counts, Observed, leading_matrix, standardized};

@@ -1,5 +1,8 @@
 //! Models, and problems: a model with everything that is known beforehand.
 
+use rayon::ThreadPool;
+
+use super::loss::Reweighting;
 use crate::normals::{Equations, GroupRows, Layout, Prior, System};
 
 /// How observations follow from unknowns.
@@ -18,6 +21,12 @@ pub trait Model: Sync {
     /// solution this often leads back into the region where linearized steps do.
     fn relocate(&self, _unknowns: &mut [f64]) -> bool {
         false
+    }
+
+    /// Unknowns that give a datum when they are held at their values, without forcing the observations: one for each degree of freedom
+    /// that these leave open. Empty where observations and weights give a datum.
+    fn datum(&self, _unknowns: &[f64]) -> Vec<usize> {
+        vec![]
     }
 }
 
@@ -58,11 +67,12 @@ impl<M> Problem<M> {
         }
     }
 
-    /// The equations of the unknowns themselves at the given values. A fixed unknown has an equation of its own,
+    /// The equations of the unknowns themselves at the given values. A fixed or held unknown has an equation of its own,
     /// x = 0 with unit weight, and no other (see [`Linearized`]).
-    pub(super) fn prior_equations(&self, values: &[f64]) -> Prior {
-        let weight: Vec<f64> =
+    pub(super) fn prior_equations(&self, values: &[f64], held: &[usize]) -> Prior {
+        let mut weight: Vec<f64> =
             self.sd.iter().map(|&sd| if sd == 0.0 { 1.0 } else { (sd * sd).recip() }).collect();
+        held.iter().for_each(|&unknown| weight[unknown] = 1.0);
         let right = (0..values.len())
             .map(|i| if self.is_weighted(i) { weight[i] * (self.prior[i] - values[i]) } else { 0.0 })
             .collect();
@@ -70,17 +80,53 @@ impl<M> Problem<M> {
     }
 }
 
-/// The equations of a problem at given values of the unknowns: weighted to unit weight, without fixed unknowns.
+/// The equations of a problem at given values of the unknowns: weighted to unit weight, by a loss besides, without fixed unknowns.
 pub(super) struct Linearized<'a, M: Model> {
     problem: &'a Problem<M>,
     prepared: M::Prepared,
-    any_fixed: bool,
+    /// Which unknowns are fixed or held; None where none is.
+    fixed: Option<Vec<bool>>,
+    reweighting: Option<Reweighting>,
 }
 
 impl<'a, M: Model> Linearized<'a, M> {
-    pub fn new(problem: &'a Problem<M>, values: &[f64]) -> Self {
-        let any_fixed = problem.sd.contains(&0.0);
-        Self { problem, prepared: problem.model.prepare(values), any_fixed }
+    pub fn new(
+        problem: &'a Problem<M>,
+        values: &[f64],
+        held: &[usize],
+        reweighting: Option<Reweighting>,
+    ) -> Self {
+        let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
+        held.iter().for_each(|&unknown| fixed[unknown] = true);
+        let fixed = fixed.contains(&true).then_some(fixed);
+        Self { problem, prepared: problem.model.prepare(values), fixed, reweighting }
+    }
+
+    /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).
+    pub fn decrease(&self, pool: &ThreadPool, prior: &Prior, step: &[f64]) -> f64 {
+        let layout = self.problem.layout();
+        let border = &step[layout.border_range()];
+        let observed = self.problem.for_locals(pool, |buffers, local| {
+            let own = &step[layout.local_range(local)];
+            let mut sum = 0.0;
+            for group in layout.groups_of(local) {
+                let mut rows = buffers.rows(layout, group);
+                self.write(local, group, &mut rows);
+                let kept = &step[layout.kept_range(layout.kept_of(group))];
+                let common = &border[layout.border_of(group)];
+                for row in 0..layout.rows() {
+                    let part = |values: &[f64], unknowns: &[f64]| {
+                        dot(&values[row * unknowns.len()..][..unknowns.len()], unknowns)
+                    };
+                    let change = part(rows.local, own) + part(rows.kept, kept) + part(rows.border, common);
+                    sum += change * (2.0 * rows.constant[row] - change);
+                }
+            }
+            sum
+        });
+        let priors = step.iter().zip(&prior.weight).zip(&prior.right);
+        observed.iter().sum::<f64>()
+            + priors.map(|((x, weight), right)| x * (2.0 * right - weight * x)).sum::<f64>()
     }
 }
 
@@ -99,7 +145,10 @@ impl<M: Model> Equations for Linearized<'_, M> {
                 part[row * width..][..width].iter_mut().for_each(|value| *value *= weight);
             }
         }
-        if self.any_fixed {
+        if let Some(reweighting) = self.reweighting {
+            reweighting.apply(rows);
+        }
+        if let Some(fixed) = &self.fixed {
             let start = layout.border_range().start;
             let border = layout.border_of(group);
             let columns = [
@@ -109,10 +158,14 @@ impl<M: Model> Equations for Linearized<'_, M> {
             ];
             for (part, range) in columns {
                 let width = range.len();
-                for (k, _) in range.enumerate().filter(|(_, unknown)| self.problem.sd[*unknown] == 0.0) {
+                for (k, _) in range.enumerate().filter(|(_, unknown)| fixed[*unknown]) {
                     (0..count).for_each(|row| part[row * width + k] = 0.0);
                 }
             }
         }
     }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -3,10 +3,9 @@
 use std::ops::Range;
 
 use rayon::ThreadPool;
-use rayon::prelude::*;
 
 use super::problem::{Model, Problem};
-use crate::normals::{Cofactors, GroupRows};
+use crate::normals::Cofactors;
 
 /// What an adjustment counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,7 +14,7 @@ pub struct Counts {
     pub observations: usize,
     /// Unknowns that are observed themselves (a finite standard deviation, not zero).
     pub weighted: usize,
-    /// Unknowns that are not fixed.
+    /// Unknowns that are not fixed, nor held for a datum.
     pub unknowns: usize,
 }
 
@@ -24,6 +23,19 @@ impl Counts {
     pub fn degrees_of_freedom(&self) -> i64 {
         (self.observations + self.weighted) as i64 - self.unknowns as i64
     }
+}
+
+/// A group of observations after the adjustment.
+#[derive(Debug, Clone, Copy)]
+pub struct Observed<const ROWS: usize> {
+    /// Observed minus computed, in the units of the observations.
+    pub residual: [f64; ROWS],
+    /// Redundancy numbers; NaN when not asked for.
+    pub redundancy: [f64; ROWS],
+    /// See [`standardized`]; NaN when not asked for, and where the redundancy is zero.
+    pub standardized: [f64; ROWS],
+    /// The factor by which a loss has changed their weights; 1 without a loss.
+    pub weight: f64,
 }
 
 /// Residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w); NaN without redundancy.
@@ -38,23 +50,23 @@ pub fn leading_matrix<const N: usize>(cofactors: Option<&[f64]>) -> [[f64; N]; N
 }
 
 impl<M> Problem<M> {
-    /// Counts observations and unknowns.
-    pub fn counts(&self) -> Counts {
+    /// Counts observations and unknowns; a datum of `held` unknowns takes as many degrees of freedom.
+    pub(super) fn counts(&self, held: usize) -> Counts {
         Counts {
             observations: self.observation_sd.len(),
             weighted: (0..self.sd.len()).filter(|&unknown| self.is_weighted(unknown)).count(),
-            unknowns: self.sd.iter().filter(|&&sd| sd != 0.0).count(),
+            unknowns: self.sd.iter().filter(|&&sd| sd != 0.0).count() - held,
         }
     }
 
     /// Redundancy number of each unknown as an observation of itself, 1 - w q; zero unless it is weighted. The cofactors of
-    /// fixed unknowns, which stand in the normal equations with unit weight, are set to zero on the way.
-    pub(super) fn finish_cofactors(&self, cofactors: &mut Cofactors) -> Vec<f64> {
+    /// fixed and held unknowns, which stand in the normal equations with unit weight, are set to zero on the way.
+    pub(super) fn finish_cofactors(&self, cofactors: &mut Cofactors, held: &[usize]) -> Vec<f64> {
         let mut redundancy = vec![0.0; self.sd.len()];
         self.for_diagonal(cofactors, |unknown, q| {
             if self.is_weighted(unknown) {
                 redundancy[unknown] = 1.0 - *q / (self.sd[unknown] * self.sd[unknown]);
-            } else if self.sd[unknown] == 0.0 {
+            } else if self.sd[unknown] == 0.0 || held.contains(&unknown) {
                 *q = 0.0;
             }
         });
@@ -85,30 +97,31 @@ impl<M: Model> Problem<M> {
     /// Observed minus computed of every observation at the given values of the unknowns.
     pub(super) fn residuals(&self, pool: &ThreadPool, values: &[f64]) -> Vec<f64> {
         let layout = self.layout();
-        let rows = layout.rows();
         let prepared = pool.install(|| self.model.prepare(values));
-        let residuals_of = |local: usize| {
-            let groups = layout.groups_of(local);
-            let mut residuals = vec![0.0; groups.len() * rows];
-            let mut local_part = vec![0.0; rows * layout.local_dim()];
-            let (mut kept, mut border) = (Vec::new(), Vec::new());
-            for (group, constant) in groups.zip(residuals.chunks_exact_mut(rows)) {
-                kept.resize(rows * layout.kept_dim(layout.kept_of(group)), 0.0);
-                border.resize(rows * layout.border_of(group).len(), 0.0);
-                let mut part =
-                    GroupRows { constant, local: &mut local_part, kept: &mut kept, border: &mut border };
-                self.model.observe(&prepared, local, group, &mut part);
+        let by_local = self.for_locals(pool, |buffers, local| {
+            let mut residuals = Vec::with_capacity(layout.groups_of(local).len() * layout.rows());
+            for group in layout.groups_of(local) {
+                let mut rows = buffers.rows(layout, group);
+                self.model.observe(&prepared, local, group, &mut rows);
+                residuals.extend_from_slice(rows.constant);
             }
             residuals
-        };
-        let by_local: Vec<Vec<f64>> = pool
-            .install(|| (0..layout.locals()).into_par_iter().with_min_len(64).map(residuals_of).collect());
+        });
         by_local.concat()
     }
+}
 
+impl<M> Problem<M> {
     /// Weighted sum of squares of the given residuals.
     pub fn sum_of_squares(&self, residuals: &[f64]) -> f64 {
         residuals.iter().zip(&self.observation_sd).map(|(residual, sd)| (residual / sd).powi(2)).sum()
+    }
+
+    /// Weighted sum of squares of each group of the given residuals.
+    pub(super) fn group_squares(&self, residuals: &[f64]) -> impl Iterator<Item = f64> {
+        let rows = self.layout().rows();
+        let groups = residuals.chunks_exact(rows).zip(self.observation_sd.chunks_exact(rows));
+        groups.map(|(residuals, sd)| residuals.iter().zip(sd).map(|(v, sd)| (v / sd).powi(2)).sum())
     }
 
     /// Weighted sum of squares of observed minus computed unknowns.

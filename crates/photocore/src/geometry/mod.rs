@@ -2,6 +2,8 @@
 //!
 //! * [`vector`]: products of 3-vectors and 3x3 matrices;
 //! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix;
+//! * [`angle_axis`]: rotations as one vector;
+//! * [`bundler`]: the camera of "Bundle Adjustment in the Large", nine unknowns a photo;
 //! * [`ellipsoid`]: longitude, latitude, height, geocentric coordinates, and the local vertical frame;
 //! * [`collinearity`]: the projection of a point into a photo and its linearization;
 //! * [`lens`]: radial and decentering distortion, forward and inverse;
@@ -11,7 +13,9 @@
 //!
 //! Angles are radians, image coordinates millimetres, lengths the linear unit of the object space.
 
+pub mod angle_axis;
 pub mod atmosphere;
+pub mod bundler;
 pub mod collinearity;
 pub mod ellipsoid;
 pub mod lens;
@@ -21,6 +25,8 @@ pub mod rotation;
 pub mod sky;
 pub mod vector;
 
+pub use angle_axis::{angle_axis_rotation, angle_axis_with_jacobian};
+pub use bundler::{BundlerImage, BundlerParameters, BundlerPhoto};
 pub use collinearity::{Lift, ObjectSpace, Photo, Point, Projection, Ray, RotationSense};
 pub use ellipsoid::{Ellipsoid, local_vertical, local_vertical_with_partials};
 pub use lens::{Displacement, Distortion, Undistorted};

@@ -1,6 +1,7 @@
 //! The photogrammetric models.
 
 pub mod block;
+pub mod collection;
 pub mod comparator;
 pub mod resection;
 pub mod similarity;

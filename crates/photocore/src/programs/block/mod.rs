@@ -20,7 +20,7 @@ use crate::normals::{Layout, LayoutError, Ordering, System};
 
 use model::CentralPerspective;
 pub use screening::{Dropped, Reason};
-pub use solution::{AdjustedImage, AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
 
 /// A photograph as it is known beforehand.
 #[derive(Debug, Clone, Copy)]

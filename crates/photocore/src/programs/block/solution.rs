@@ -2,7 +2,7 @@
 
 use super::model::CentralPerspective;
 use super::{Block, Dropped, Options, UnitVariance};
-use crate::adjustment::{Adjustment, Problem, leading_matrix, standardized};
+use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
 use crate::geometry::Vector3;
 
 /// An adjusted photograph.
@@ -33,18 +33,6 @@ pub struct AdjustedPoint {
     pub rays: usize,
 }
 
-/// An image point after the adjustment.
-#[derive(Debug, Clone, Copy)]
-pub struct AdjustedImage {
-    /// Observed minus computed, in millimetres.
-    pub residual: [f64; 2],
-    /// Redundancy numbers; NaN when not asked for.
-    pub redundancy: [f64; 2],
-    /// Residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w); NaN when not asked
-    /// for, and where the redundancy is zero.
-    pub standardized: [f64; 2],
-}
-
 /// Weighted sums of squares.
 #[derive(Debug, Clone, Copy)]
 pub struct SumsOfSquares {
@@ -73,7 +61,7 @@ pub struct Solution {
     /// The points; None for those that were left out.
     pub points: Vec<Option<AdjustedPoint>>,
     /// The images; None for those of points that were left out.
-    pub images: Vec<Option<AdjustedImage>>,
+    pub images: Vec<Option<Observed<2>>>,
     /// The points that were left out.
     pub dropped: Vec<Dropped>,
     /// Weighted sums of squares.
@@ -110,13 +98,11 @@ impl Solution {
             UnitVariance::Constrained => Some(sums_of_squares.total() / degrees_of_freedom as f64),
         };
         let cofactors = adjustment.cofactors.take();
-        let prior_redundancy = adjustment.prior_redundancy.take();
-        let redundancy_of = |unknown: usize| prior_redundancy.as_ref().map_or(f64::NAN, |all| all[unknown]);
         let photos = photo_part.as_chunks::<6>().0.iter().enumerate().map(|(photo, values)| AdjustedPhoto {
             position: absolute(block.photos[photo].position, block.photos[photo].position_sd, values, origin),
             attitude: std::array::from_fn(|k| values[3 + k]),
             cofactors: leading_matrix(cofactors.as_ref().map(|all| &all.kept[36 * photo..])),
-            redundancy: std::array::from_fn(|k| redundancy_of(3 * points.len() + 6 * photo + k)),
+            redundancy: adjustment.prior_redundancy(3 * points.len() + 6 * photo),
         });
         let mut adjusted_points = vec![None; block.points.len()];
         let layout = problem.layout();
@@ -129,16 +115,19 @@ impl Solution {
                     origin,
                 ),
                 cofactors: leading_matrix(cofactors.as_ref().map(|all| &all.local[9 * local..])),
-                redundancy: std::array::from_fn(|k| redundancy_of(3 * local + k)),
+                redundancy: adjustment.prior_redundancy(3 * local),
                 last_correction: std::array::from_fn(|k| adjustment.last_local_corrections[3 * local + k]),
                 rays: layout.groups_of(local).len(),
             });
         }
+        let photos = photos.collect();
+        let images = images(block, problem, &adjustment);
+        adjustment.release_observations();
         Self {
-            photos: photos.collect(),
+            photos,
             photo_corrections: adjustment.corrections().map(|all| all.as_chunks().0.to_vec()).collect(),
             points: adjusted_points,
-            images: images(block, problem, &mut adjustment),
+            images,
             dropped,
             sums_of_squares,
             degrees_of_freedom,
@@ -166,7 +155,7 @@ fn statistics(
     let sums = SumsOfSquares {
         camera: squares(layout.all_kept()),
         ground: squares(layout.all_locals()),
-        plates: problem.sum_of_squares(&adjustment.residuals),
+        plates: adjustment.reweighted_sum_of_squares(&problem.observation_sd),
     };
     let counts = adjustment.counts;
     let weighted_cameras = layout.all_kept().filter(|&unknown| problem.is_weighted(unknown)).count();
@@ -181,18 +170,11 @@ fn statistics(
 fn images(
     block: &Block,
     problem: &Problem<CentralPerspective>,
-    adjustment: &mut Adjustment,
-) -> Vec<Option<AdjustedImage>> {
-    let residuals = std::mem::take(&mut adjustment.residuals);
-    let redundancy = adjustment.redundancy.take();
+    adjustment: &Adjustment,
+) -> Vec<Option<Observed<2>>> {
     let mut images = vec![None; block.images.len()];
     for (group, &image) in problem.model.order.iter().enumerate() {
-        let residual = [residuals[2 * group], residuals[2 * group + 1]];
-        let redundancy: [f64; 2] =
-            std::array::from_fn(|row| redundancy.as_ref().map_or(f64::NAN, |all| all[2 * group + row]));
-        let sd = block.images[image].sd;
-        let standardized = std::array::from_fn(|row| standardized(residual[row], sd[row], redundancy[row]));
-        images[image] = Some(AdjustedImage { residual, redundancy, standardized });
+        images[image] = Some(adjustment.observed(group, block.images[image].sd));
     }
     images
 }

@@ -188,6 +188,7 @@ fn adjust(
         criterion: Criterion::Fraction(options.tolerance),
         max_iterations: if cycles.is_some() { 0 } else { options.max_iterations },
         covariance: true,
+        loss: None,
     };
     let mut adjusted = adjustment::adjust(&problem, &engine, pool, watch).map_err(|error| match error {
         AdjustError::Interrupted => SimilarityError::Interrupted,

@@ -1,0 +1,87 @@
+//! Reduced normal equations that are full, as those of collections in which everything sees everything: their factor beside a plain
+//! dense Cholesky factorisation of the same size by `faer`.
+
+// A benchmark that cannot run has nobody to report to.
+#![allow(clippy::expect_used, missing_docs)]
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
+use faer::{Mat, Par};
+use photocore::normals::{Equations, GroupRows, Layout, Ordering, Prior, System};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Unknowns of a photograph.
+const DIM: usize = 9;
+/// Points, each on every photograph: few, so that the formation takes little time.
+const POINTS: usize = 5;
+
+/// Equations of no meaning.
+struct Anything;
+
+impl Equations for Anything {
+    fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let value = |k: usize| (1.3 * k as f64 + 0.7 * local as f64 + 0.11 * (group % 1009) as f64).sin();
+        rows.constant.iter_mut().enumerate().for_each(|(k, v)| *v = value(k));
+        rows.local.iter_mut().enumerate().for_each(|(k, v)| *v = value(3 * k + 1));
+        rows.kept.iter_mut().enumerate().for_each(|(k, v)| *v = value(7 * k + 2));
+    }
+}
+
+fn system(photos: usize) -> (System, Prior) {
+    let kept = (0..POINTS * photos).map(|group| (group % photos) as u32).collect();
+    let pointers = (0..=POINTS).map(|point| point * photos).collect();
+    let layout = Layout::new(2, 3, &vec![DIM; photos], pointers, kept).expect("a layout");
+    let unknowns = layout.unknowns();
+    (System::new(layout, Ordering::Auto), Prior { weight: vec![100.0; unknowns], right: vec![0.0; unknowns] })
+}
+
+/// Time of the factorisation alone.
+fn factor(pool: &ThreadPool, system: &System, prior: &Prior) -> Duration {
+    let start = Instant::now();
+    let done = system.factor(pool, &Anything, prior, 0.0, &mut |_| ControlFlow::Continue(()));
+    let elapsed = start.elapsed();
+    match done {
+        ControlFlow::Continue(factor) => elapsed.mul_f64(1.0 - factor.formation_share),
+        ControlFlow::Break(()) => unreachable!("nothing interrupts"),
+    }
+}
+
+fn dense(pool: &ThreadPool, mut matrix: Mat<f64>) -> Mat<f64> {
+    pool.install(|| {
+        let (par, dim) = (Par::rayon(0), matrix.nrows());
+        let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(dim, par, Default::default()));
+        let stack = MemStack::new(&mut memory);
+        let regularization = Default::default();
+        cholesky_in_place(matrix.as_mut(), regularization, par, stack, Default::default()).expect("definite");
+    });
+    matrix
+}
+
+fn full(criterion: &mut Criterion) {
+    let pool = ThreadPoolBuilder::new().build().expect("a pool");
+    for photos in [160, 500] {
+        let dim = DIM * photos;
+        let mut group = criterion.benchmark_group(format!("full/{dim}"));
+        let (system, prior) = system(photos);
+        group.bench_function("factor", |bencher| {
+            bencher.iter_custom(|times| (0..times).map(|_| factor(&pool, &system, &prior)).sum());
+        });
+        let matrix =
+            Mat::from_fn(dim, dim, |i, j| if i == j { 10.0 * dim as f64 } else { ((i + j) as f64).sin() });
+        group.bench_function("faer", |bencher| {
+            bencher.iter_batched(|| matrix.clone(), |matrix| dense(&pool, matrix), BatchSize::PerIteration);
+        });
+        group.finish();
+    }
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10);
+    targets = full
+}
+criterion_main!(benches);

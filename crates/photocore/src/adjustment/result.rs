@@ -1,0 +1,131 @@
+//! What an adjustment ends with.
+
+use thiserror::Error;
+
+use super::options::{Iteration, Status};
+use super::statistics::{Counts, Observed, standardized};
+use crate::normals::{Cofactors, Operations, Ordering};
+
+/// Time spent in each phase, in seconds, over all iterations.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Seconds {
+    /// Forming, with the reduction of local blocks.
+    pub form: f64,
+    /// Factoring.
+    pub factor: f64,
+    /// Solving.
+    pub solve: f64,
+    /// Inverting.
+    pub invert: f64,
+    /// Cofactors and redundancy numbers.
+    pub cofactors: f64,
+}
+
+/// The adjusted unknowns and how good they are.
+#[derive(Debug)]
+pub struct Adjustment {
+    /// How it ended.
+    pub status: Status,
+    /// Weighted sum of squares (of losses, where the options ask for a loss) at the initial values.
+    pub initial_sum_of_squares: f64,
+    /// Every iteration.
+    pub iterations: Vec<Iteration>,
+    /// All unknowns that are not local, in the order of the layout: at first and after each iteration.
+    pub history: Vec<Vec<f64>>,
+    /// The corrections of the local unknowns in the last iteration; zero where there was none.
+    pub last_local_corrections: Vec<f64>,
+    /// Adjusted unknowns, in the order of the layout.
+    pub unknowns: Vec<f64>,
+    /// Observed minus computed, in the order of groups and rows, in the units of the observations.
+    pub residuals: Vec<f64>,
+    /// The factor by which a loss has changed the weight of each group of observations; None without a loss.
+    pub weights: Option<Vec<f64>>,
+    /// Cofactors (a priori unit weight, weights as the loss has changed them), when asked for; none where the last values leave
+    /// unknowns undetermined.
+    pub cofactors: Option<Cofactors>,
+    /// Why the last values give no cofactors although they were asked for.
+    pub undetermined: Option<AdjustError>,
+    /// The unknowns held to give the cofactors a datum (see [`super::Model::datum`]), none where the problem has one.
+    pub datum: Vec<usize>,
+    /// Redundancy number of each observation, when asked for.
+    pub redundancy: Option<Vec<f64>>,
+    /// Redundancy number of each unknown as an observation of itself (zero unless weighted), when asked for.
+    pub prior_redundancy: Option<Vec<f64>>,
+    /// Counts for the degrees of freedom.
+    pub counts: Counts,
+    /// Predicted multiply-adds of each phase, once.
+    pub operations: Operations,
+    /// Formations and factorisations carried out.
+    pub formations: usize,
+    /// Time by phase.
+    pub seconds: Seconds,
+    /// The ordering in force.
+    pub ordering: Ordering,
+    /// The orderings that were tried, each with the predicted multiply-adds of a factorisation.
+    pub predictions: Vec<(Ordering, f64)>,
+    /// Kept blocks (the border is the block after the last) in the order of their elimination.
+    pub order: Vec<usize>,
+}
+
+impl Adjustment {
+    /// For every iteration, the corrections of all unknowns that are not local, in the order of the layout.
+    pub fn corrections(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
+        self.history.windows(2).map(|pair| pair[0].iter().zip(&pair[1]).map(|(from, to)| to - from).collect())
+    }
+
+    /// Residuals and test values of a group of observations with the given standard deviations a priori.
+    pub fn observed<const ROWS: usize>(&self, group: usize, sd: [f64; ROWS]) -> Observed<ROWS> {
+        let residual = std::array::from_fn(|row| self.residuals[ROWS * group + row]);
+        let redundancy: [f64; ROWS] = std::array::from_fn(|row| {
+            self.redundancy.as_ref().map_or(f64::NAN, |all| all[ROWS * group + row])
+        });
+        Observed {
+            residual,
+            redundancy,
+            standardized: std::array::from_fn(|row| standardized(residual[row], sd[row], redundancy[row])),
+            weight: self.weights.as_ref().map_or(1.0, |all| all[group]),
+        }
+    }
+
+    /// Forgets what [`Adjustment::observed`] has handed out: in large problems it is large.
+    pub(crate) fn release_observations(&mut self) {
+        self.residuals = vec![];
+        self.redundancy = None;
+        self.weights = None;
+    }
+
+    /// Weighted sum of squares of the residuals, weights as the loss has changed them.
+    pub fn reweighted_sum_of_squares(&self, sd: &[f64]) -> f64 {
+        let squares = self.residuals.iter().zip(sd).map(|(residual, sd)| (residual / sd).powi(2));
+        match &self.weights {
+            None => squares.sum(),
+            Some(weights) => {
+                let rows = self.residuals.len() / weights.len().max(1);
+                squares.enumerate().map(|(i, square)| weights[i / rows] * square).sum()
+            }
+        }
+    }
+
+    /// Redundancy numbers of unknowns, from the given one on, as observations of themselves; NaN where there are no cofactors.
+    pub fn prior_redundancy<const N: usize>(&self, first: usize) -> [f64; N] {
+        std::array::from_fn(|k| self.prior_redundancy.as_ref().map_or(f64::NAN, |all| all[first + k]))
+    }
+}
+
+/// Why there is no adjustment.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum AdjustError {
+    /// Local blocks that their observations do not determine.
+    #[error("{} local blocks are not determined by their observations", .0.len())]
+    UndeterminedLocals(Vec<usize>),
+    /// Combinations of kept unknowns that the observations do not determine: for each the kept blocks it moves (the
+    /// border is the block after the last).
+    #[error("{} combinations of unknowns are not determined by the observations", .0.len())]
+    Undetermined(Vec<Vec<usize>>),
+    /// The initial values give observations that are not finite.
+    #[error("the initial values give computed observations that are not finite")]
+    NotFinite,
+    /// The caller asked to stop.
+    #[error("interrupted")]
+    Interrupted,
+}

@@ -1,0 +1,303 @@
+//! What all iterations share: forming, factoring, solving, and the end with its cofactors.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use rayon::ThreadPool;
+
+use super::loss::Reweighting;
+use super::options::{Criterion, Event, Iteration, Options, Phase, Status};
+use super::problem::{Linearized, Model, Problem};
+use super::result::{AdjustError, Adjustment, Seconds};
+use super::trust_region::FIRST_DAMPING;
+use crate::normals::{Cofactors, Factor, Inversion, Prior};
+
+/// Adjusts a problem by least squares.
+///
+/// `watch` is called on the calling thread with what is going on; when it breaks, the adjustment stops.
+///
+/// # Errors
+/// Unknowns that are not determined, observations that cannot be computed, or an interruption.
+pub fn adjust<M: Model>(
+    problem: &Problem<M>,
+    options: &Options,
+    pool: &ThreadPool,
+    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+) -> Result<Adjustment, AdjustError> {
+    let mut run = Run {
+        problem,
+        options,
+        pool,
+        watch,
+        seconds: Seconds::default(),
+        formations: 0,
+        iterations: vec![],
+        history: vec![problem.initial[problem.layout().all_locals().end..].to_vec()],
+        last_local_corrections: vec![0.0; problem.layout().all_locals().len()],
+        datum: vec![],
+        curved: false,
+    };
+    let damping = if matches!(options.criterion, Criterion::Decrease(_)) { FIRST_DAMPING } else { 0.0 };
+    let start = run.form(problem.initial.clone(), damping)?;
+    if !start.sum_of_squares.is_finite() {
+        return Err(AdjustError::NotFinite);
+    }
+    let initial_sum_of_squares = start.sum_of_squares;
+    let end = match options.criterion {
+        Criterion::Fraction(fraction) => run.strictly(start, fraction)?,
+        Criterion::Percent(percent) => run.as_published(start, percent)?,
+        Criterion::Length { first, count, limit } => run.until_short(start, first..first + count, limit)?,
+        Criterion::Decrease(fraction) => run.by_trust_region(start, fraction)?,
+    };
+    run.finish(end, initial_sum_of_squares)
+}
+
+/// A step that changes the unknowns by less than this multiple of their standard deviations leads to where the second-order term of
+/// a loss does no harm.
+const SHORT: f64 = 1.0;
+
+/// The problem linearized at some values, and its normal equations factored.
+pub(super) struct State<'a, M: Model> {
+    pub unknowns: Vec<f64>,
+    pub equations: Linearized<'a, M>,
+    pub prior: Prior,
+    pub factor: Factor,
+    pub damping: f64,
+    /// Whether the second-order term of the loss is taken in.
+    pub curved: bool,
+    pub sum_of_squares: f64,
+}
+
+/// What cofactors are computed from: the factor of the normal equations, and what they were formed from.
+pub(super) struct Basis<'a, M: Model> {
+    pub equations: Linearized<'a, M>,
+    pub prior: Prior,
+    pub factor: Factor,
+}
+
+/// Normal equations solved.
+pub(super) struct Solved<'a, M: Model> {
+    pub basis: Basis<'a, M>,
+    pub step: Vec<f64>,
+    pub change: f64,
+}
+
+/// Where the iterations ended. There are no cofactors where the last values leave unknowns undetermined.
+pub(super) struct End<'a, M: Model> {
+    pub status: Status,
+    pub unknowns: Vec<f64>,
+    pub basis: Option<Basis<'a, M>>,
+    /// Why there is no basis.
+    pub undetermined: Option<AdjustError>,
+    /// The last iteration and its step, still to be applied: the cofactors hold before it.
+    pub last: Option<(Iteration, Vec<f64>)>,
+}
+
+impl<'a, M: Model> End<'a, M> {
+    /// Diverged to values that leave unknowns undetermined.
+    pub fn lost(unknowns: Vec<f64>, undetermined: Option<AdjustError>) -> Self {
+        Self { status: Status::Diverged, unknowns, basis: None, undetermined, last: None }
+    }
+}
+
+pub(super) struct Run<'a, 'w, M: Model> {
+    pub problem: &'a Problem<M>,
+    pub options: &'a Options,
+    pub pool: &'a ThreadPool,
+    watch: &'w mut dyn FnMut(Event) -> ControlFlow<()>,
+    seconds: Seconds,
+    formations: usize,
+    pub iterations: Vec<Iteration>,
+    history: Vec<Vec<f64>>,
+    last_local_corrections: Vec<f64>,
+    /// Unknowns held for a datum; empty until the iterations are over.
+    pub datum: Vec<usize>,
+    /// Whether to take in the second-order term of the loss from now on: once the steps are short.
+    pub curved: bool,
+}
+
+impl<'a, M: Model> Run<'a, '_, M> {
+    /// Ends at the values reached, without a further step. Cofactors are those of the reweighted equations, whose weights can be
+    /// told, without second-order term.
+    pub(super) fn stay(&mut self, state: State<'a, M>, status: Status) -> Result<End<'a, M>, AdjustError> {
+        let unknowns = state.unknowns.clone();
+        let plain = state.damping == 0.0 && !state.curved;
+        self.curved = false;
+        let state = if plain { state } else { self.form(state.unknowns, 0.0)? };
+        match self.determined(&state.factor) {
+            Ok(()) => {
+                let State { equations, prior, factor, .. } = state;
+                let basis = Some(Basis { equations, prior, factor });
+                Ok(End { status, unknowns, basis, undetermined: None, last: None })
+            }
+            Err(error) => Ok(End::lost(unknowns, Some(error))),
+        }
+    }
+
+    /// Solves; None where an earlier step has led to values that leave unknowns undetermined. That the initial values do is an
+    /// error: then the observations do.
+    pub(super) fn solve_unless_lost(
+        &mut self,
+        state: State<'a, M>,
+    ) -> Result<Option<Solved<'a, M>>, AdjustError> {
+        match self.solve(state) {
+            Err(AdjustError::UndeterminedLocals(_) | AdjustError::Undetermined(_))
+                if !self.iterations.is_empty() =>
+            {
+                Ok(None)
+            }
+            solved => solved.map(Some),
+        }
+    }
+
+    /// The weighted sum of squares, of losses where the options ask for a loss, at the given values.
+    pub(super) fn objective(&self, unknowns: &[f64]) -> f64 {
+        let residuals = self.problem.residuals(self.pool, unknowns);
+        self.observed_sum(&residuals) + self.problem.prior_sum_of_squares(unknowns)
+    }
+
+    /// The observations' part of it.
+    fn observed_sum(&self, residuals: &[f64]) -> f64 {
+        match self.options.loss {
+            None => self.problem.sum_of_squares(residuals),
+            Some(loss) => self.problem.group_squares(residuals).map(|square| loss.value(square)).sum(),
+        }
+    }
+
+    pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
+        let start = Instant::now();
+        let reweighting = self.options.loss.map(|loss| Reweighting { loss, curved: self.curved });
+        let linearize = || Linearized::new(self.problem, &unknowns, &self.datum, reweighting);
+        let equations = self.pool.install(linearize);
+        let prior = self.problem.prior_equations(&unknowns, &self.datum);
+        let total = self.problem.layout().locals();
+        let factored = {
+            let mut between = between(&mut *self.watch, Phase::Form, total);
+            self.problem.system.factor(self.pool, &equations, &prior, damping, &mut between)
+        };
+        let ControlFlow::Continue(factor) = factored else { return Err(AdjustError::Interrupted) };
+        let seconds = start.elapsed().as_secs_f64();
+        self.seconds.form += seconds * factor.formation_share;
+        self.seconds.factor += seconds * (1.0 - factor.formation_share);
+        let sum_of_squares = match self.options.loss {
+            None => factor.sum_of_squares + self.problem.prior_sum_of_squares(&unknowns),
+            Some(_) => self.objective(&unknowns),
+        };
+        self.formations += 1;
+        Ok(State { unknowns, equations, prior, factor, damping, curved: self.curved, sum_of_squares })
+    }
+
+    /// Whether everything is determined.
+    fn determined(&self, factor: &Factor) -> Result<(), AdjustError> {
+        if !factor.deficient_locals.is_empty() {
+            return Err(AdjustError::UndeterminedLocals(factor.deficient_locals.clone()));
+        }
+        factor.deficiency().map_or(Ok(()), |found| Err(AdjustError::Undetermined(found.blocks())))
+    }
+
+    fn solve(&mut self, state: State<'a, M>) -> Result<Solved<'a, M>, AdjustError> {
+        self.determined(&state.factor)?;
+        let State { equations, prior, factor, damping, .. } = state;
+        let start = Instant::now();
+        let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
+        let system = &self.problem.system;
+        let solved = system.solve(self.pool, &factor, &equations, &prior, damping, &mut between);
+        let ControlFlow::Continue(step) = solved else { return Err(AdjustError::Interrupted) };
+        self.seconds.solve += start.elapsed().as_secs_f64();
+        let change = factor.decrease.sqrt();
+        Ok(Solved { basis: Basis { equations, prior, factor }, step, change })
+    }
+
+    fn finish(mut self, end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
+        let problem = self.problem;
+        let mut unknowns = end.unknowns.clone();
+        if let Some((_, step)) = &end.last {
+            unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+        }
+        let residuals = problem.residuals(self.pool, &unknowns);
+        if let Some((last, _)) = end.last {
+            let sum_of_squares = self.observed_sum(&residuals) + problem.prior_sum_of_squares(&unknowns);
+            self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, &unknowns)?;
+        }
+        let cofactors = match end.basis {
+            Some(basis) if self.options.covariance => Some(self.cofactors(basis)?),
+            _ => None,
+        };
+        let (cofactors, prior_redundancy) = cofactors.unzip();
+        let redundancy =
+            |cofactors: &Cofactors| cofactors.equations.iter().map(|share| 1.0 - share).collect();
+        Ok(Adjustment {
+            status: end.status,
+            initial_sum_of_squares,
+            iterations: self.iterations,
+            history: self.history,
+            last_local_corrections: self.last_local_corrections,
+            weights: self
+                .options
+                .loss
+                .map(|loss| problem.group_squares(&residuals).map(|square| loss.weight(square)).collect()),
+            unknowns,
+            residuals,
+            redundancy: cofactors.as_ref().map(redundancy),
+            prior_redundancy,
+            cofactors,
+            undetermined: end.undetermined,
+            counts: problem.counts(self.datum.len()),
+            datum: self.datum,
+            operations: problem.system.symbolic().operations(problem.layout()),
+            formations: self.formations,
+            seconds: self.seconds,
+            ordering: problem.system.symbolic().ordering(),
+            predictions: problem.system.symbolic().predictions().to_vec(),
+            order: problem.system.symbolic().order().to_vec(),
+        })
+    }
+
+    /// Cofactors, and the redundancy number of each unknown as an observation of itself.
+    fn cofactors(&mut self, basis: Basis<'a, M>) -> Result<(Cofactors, Vec<f64>), AdjustError> {
+        let Basis { equations, prior, factor } = basis;
+        let start = Instant::now();
+        let mut between = between(&mut *self.watch, Phase::Invert, self.problem.layout().locals());
+        let found = self.problem.system.invert(self.pool, factor, &equations, &prior, &mut between);
+        let ControlFlow::Continue(Inversion { mut cofactors, inversion_share, .. }) = found else {
+            return Err(AdjustError::Interrupted);
+        };
+        let prior_redundancy = self.problem.finish_cofactors(&mut cofactors, &self.datum);
+        let seconds = start.elapsed().as_secs_f64();
+        self.seconds.invert = seconds * inversion_share;
+        self.seconds.cofactors = seconds * (1.0 - inversion_share);
+        Ok((cofactors, prior_redundancy))
+    }
+
+    /// Keeps an iteration that stands, with its corrections, and tells of it.
+    pub(super) fn accept(
+        &mut self,
+        iteration: Iteration,
+        before: &[f64],
+        after: &[f64],
+    ) -> Result<(), AdjustError> {
+        let locals = self.problem.layout().all_locals();
+        let corrections =
+            before[locals.clone()].iter().zip(&after[locals.clone()]).map(|(from, to)| to - from);
+        self.last_local_corrections = corrections.collect();
+        self.curved = self.options.loss.is_some() && iteration.largest_change <= SHORT;
+        self.history.push(after[locals.end..].to_vec());
+        self.iterations.push(iteration);
+        stopped((self.watch)(Event::Iteration(iteration)))
+    }
+}
+
+fn stopped(flow: ControlFlow<()>) -> Result<(), AdjustError> {
+    match flow {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(AdjustError::Interrupted),
+    }
+}
+
+fn between(
+    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    phase: Phase,
+    total: usize,
+) -> impl FnMut(usize) -> ControlFlow<()> {
+    move |done| watch(Event::Progress { phase, done, total })
+}

@@ -1,0 +1,100 @@
+//! Gauss-Newton with step control, until the corrections are a small fraction of the standard deviations.
+
+use super::options::{Iteration, Status};
+use super::problem::Model;
+use super::result::AdjustError;
+use super::run::{End, Run, State};
+
+/// A step is accepted when the sum of squares does not rise by more than its own rounding error.
+const ROUNDING: f64 = 1e-12;
+/// A Gauss-Newton step that changes no unknown by more than this multiple of its standard deviation is accepted as it is:
+/// it lowers the sum of squares by less than the square of this, which may drown in the rounding errors of the computed
+/// observations (geocentric coordinates are good to a nanometre only).
+const NEGLIGIBLE: f64 = 1e-3;
+/// A step that changes the unknowns by more than this multiple of their standard deviations, in the mean, is so long that local
+/// unknowns are better computed afresh than linearized.
+const FAR: f64 = 30.0;
+/// First damping after a step that failed; it falls by ten after a success, and below [`LEAST_DAMPING`] to zero.
+const FIRST_DAMPING: f64 = 1e-3;
+const LEAST_DAMPING: f64 = 1e-5;
+/// With this damping a step follows the gradient; if that does not lower the sum of squares, nothing will.
+const MOST_DAMPING: f64 = 1e9;
+
+impl<'a, M: Model> Run<'a, '_, M> {
+    /// Gauss-Newton with step control until the corrections are a small fraction of the standard deviations.
+    ///
+    /// With dx the step and N the normal matrix, dx_i^2 <= q_ii dx^T N dx (Cauchy-Schwarz), and dx^T N dx is the predicted
+    /// decrease of the sum of squares: its root bounds every correction in standard deviations, without an inverse.
+    pub(super) fn strictly(&mut self, start: State<'a, M>, fraction: f64) -> Result<End<'a, M>, AdjustError> {
+        let mut state = start;
+        let mut best = state.sum_of_squares;
+        while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
+            let (unknowns, damping, curved) = (state.unknowns.clone(), state.damping, state.curved);
+            let harder = (10.0 * damping).max(FIRST_DAMPING);
+            let Some(solved) = self.solve_unless_lost(state)? else {
+                state = self.form(unknowns, harder)?;
+                continue;
+            };
+            let number = self.iterations.len() + 1;
+            let iteration =
+                Iteration { number, sum_of_squares: best, largest_change: solved.change, damping };
+            let last = solved.change <= fraction || self.leaves_less_than(fraction, solved.change);
+            if damping == 0.0 && last {
+                if curved {
+                    return self.stay_after(iteration, &unknowns, &solved.step);
+                }
+                let last = Some((iteration, solved.step));
+                let basis = Some(solved.basis);
+                return Ok(End { status: Status::Converged, unknowns, basis, undetermined: None, last });
+            }
+            solved.basis.factor.recycle(&self.problem.system);
+            let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
+            let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
+            let far = solved.change > FAR * (unknowns.len() as f64).sqrt();
+            let next = self.form(if far { self.relocated(trial) } else { trial }, relaxed)?;
+            let negligible = damping == 0.0 && solved.change <= NEGLIGIBLE;
+            let highest = if negligible { f64::MAX } else { best * (1.0 + ROUNDING) };
+            // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
+            if next.sum_of_squares <= highest && next.factor.deficient_locals.is_empty() {
+                best = next.sum_of_squares;
+                self.accept(Iteration { sum_of_squares: best, ..iteration }, &unknowns, &next.unknowns)?;
+                state = next;
+            } else {
+                state = self.form(unknowns, harder)?;
+            }
+        }
+        let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
+        self.stay(state, status)
+    }
+
+    /// Whether a step is negligible itself and, the steps falling at the rate of the last two, all further ones together would be
+    /// well below a limit (Hairer and Wanner 1996, section IV.8).
+    fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
+        let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
+        let rate = before.map_or(1.0, |iteration| change / iteration.largest_change);
+        change <= NEGLIGIBLE && rate < 1.0 && rate / (1.0 - rate) * change <= limit / 10.0
+    }
+
+    /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.
+    fn relocated(&self, unknowns: Vec<f64>) -> Vec<f64> {
+        let mut other = unknowns.clone();
+        let relocated = self.pool.install(|| self.problem.model.relocate(&mut other));
+        let lower = relocated && self.objective(&other) < self.objective(&unknowns);
+        if lower { other } else { unknowns }
+    }
+
+    /// Takes the last step and ends there.
+    fn stay_after(
+        &mut self,
+        last: Iteration,
+        unknowns: &[f64],
+        step: &[f64],
+    ) -> Result<End<'a, M>, AdjustError> {
+        let values: Vec<f64> = unknowns.iter().zip(step).map(|(x, dx)| x + dx).collect();
+        let sum_of_squares = self.objective(&values);
+        self.accept(Iteration { sum_of_squares, ..last }, unknowns, &values)?;
+        self.curved = false;
+        let state = self.form(values, 0.0)?;
+        self.stay(state, Status::Converged)
+    }
+}

@@ -1,0 +1,48 @@
+//! The walk over the observations of all local blocks, on several threads.
+
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::problem::Problem;
+use crate::normals::{GroupRows, Layout};
+
+/// Room for the rows of one group.
+#[derive(Default)]
+pub(super) struct Buffers {
+    constant: Vec<f64>,
+    local: Vec<f64>,
+    kept: Vec<f64>,
+    border: Vec<f64>,
+}
+
+impl Buffers {
+    /// The rows of a group, to be written.
+    pub fn rows(&mut self, layout: &Layout, group: usize) -> GroupRows<'_> {
+        let rows = layout.rows();
+        self.constant.resize(rows, 0.0);
+        self.local.resize(rows * layout.local_dim(), 0.0);
+        self.kept.resize(rows * layout.kept_dim(layout.kept_of(group)), 0.0);
+        self.border.resize(rows * layout.border_of(group).len(), 0.0);
+        GroupRows {
+            constant: &mut self.constant,
+            local: &mut self.local,
+            kept: &mut self.kept,
+            border: &mut self.border,
+        }
+    }
+}
+
+/// Local blocks that a thread takes at least.
+const AT_LEAST: usize = 64;
+
+impl<M: Sync> Problem<M> {
+    /// What `each` makes of every local block, in their order.
+    pub(super) fn for_locals<T: Send>(
+        &self,
+        pool: &ThreadPool,
+        each: impl Fn(&mut Buffers, usize) -> T + Send + Sync,
+    ) -> Vec<T> {
+        let locals = (0..self.layout().locals()).into_par_iter().with_min_len(AT_LEAST);
+        pool.install(|| locals.map_init(Buffers::default, each).collect())
+    }
+}

@@ -1,0 +1,215 @@
+//! Collections of photos: partials against complex steps, far starts, datum and redundancy.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::ops::ControlFlow;
+
+use num_complex::Complex64 as C;
+use photocore::adjustment::{self, Criterion, Loss, Status};
+use photocore::geometry::{BundlerPhoto, angle_axis_rotation, angle_axis_with_jacobian};
+use photocore::normals::Ordering;
+use photocore::programs::collection::{Collection, Image, Options, Photo, Point, Solution};
+use proptest::prelude::*;
+use rayon::ThreadPoolBuilder;
+
+/// The rotated vector by the exponential series of the cross product: no closed form to share a mistake with.
+fn turned(w: [C; 3], v: [C; 3]) -> [C; 3] {
+    let cross = |a: [C; 3], b: [C; 3]| -> [C; 3] {
+        std::array::from_fn(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
+    };
+    let (mut sum, mut term) = (v, v);
+    for n in 1..60 {
+        term = cross(w, term).map(|value| value / f64::from(n));
+        sum = std::array::from_fn(|k| sum[k] + term[k]);
+    }
+    sum
+}
+
+fn image(unknowns: [C; 12]) -> [C; 2] {
+    let [w1, w2, w3, t1, t2, t3, f, k1, k2, x, y, z] = unknowns;
+    let r = turned([w1, w2, w3], [x, y, z]);
+    let p = [-(r[0] + t1) / (r[2] + t3), -(r[1] + t2) / (r[2] + t3)];
+    let square = p[0] * p[0] + p[1] * p[1];
+    p.map(|value| f * (1.0 + k1 * square + k2 * square * square) * value)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    #[test]
+    fn partials_are_those_of_complex_steps(
+        axis in prop::array::uniform3(-1.0..1.0f64),
+        angle in prop_oneof![Just(0.0), 1e-9..1e-3f64, 1e-3..0.4f64, 0.3..6.0f64],
+        shift in prop::array::uniform2(-1.0..1.0f64),
+        f in 300.0..3000.0f64,
+        k in prop::array::uniform2(-0.3..0.3f64),
+        point in prop::array::uniform3(-2.0..2.0f64),
+    ) {
+        let norm = axis.iter().map(|value| value * value).sum::<f64>().sqrt().max(1e-3);
+        let w = axis.map(|value| angle * value / norm);
+        let unknowns = [
+            w[0], w[1], w[2], shift[0], shift[1], -10.0, f, k[0], k[1], point[0], point[1], point[2],
+        ];
+        let photo: [f64; 9] = std::array::from_fn(|i| unknowns[i]);
+        let computed = BundlerPhoto::new(photo).linearize(&point);
+        const STEP: f64 = 1e-100;
+        for i in 0..12 {
+            let mut stepped = unknowns.map(|value| C::new(value, 0.0));
+            stepped[i].im = STEP;
+            let expected = image(stepped);
+            for row in 0..2 {
+                let partial = if i < 9 { computed.photo[row][i] } else { computed.point[row][i - 9] };
+                let scale = if i < 3 { f } else { f / 10.0 }.max(1.0);
+                prop_assert!((partial - expected[row].im / STEP).abs() < 1e-10 * scale, "partial {i} of {row}");
+                prop_assert!((computed.xy[row] - expected[row].re).abs() < 1e-10 * f);
+            }
+        }
+        prop_assert!(computed.xy.iter().all(|value| value.is_finite()));
+    }
+}
+
+#[test]
+fn the_rotation_is_orthogonal_and_turns_by_the_angle() {
+    for angle in [0.0, 1e-12, 1e-4, 0.3, 0.32, 2.0, 3.1, 6.2] {
+        let w = [0.6 * angle, 0.0, -0.8 * angle];
+        let (r, jacobian) = angle_axis_with_jacobian(w);
+        assert_eq!(r, angle_axis_rotation(w));
+        for i in 0..3 {
+            for j in 0..3 {
+                let product: f64 = (0..3).map(|k| r[i][k] * r[j][k]).sum();
+                assert!((product - f64::from(u8::from(i == j))).abs() < 1e-14);
+                // (R - I) w = 0 and J w = w
+                assert!((r[i][j] * w[j]).is_finite() && jacobian[i][j].is_finite());
+            }
+            let along: f64 = (0..3).map(|j| jacobian[i][j] * w[j]).sum();
+            assert!((along - w[i]).abs() < 1e-14 * (1.0 + angle));
+        }
+        let trace = r[0][0] + r[1][1] + r[2][2];
+        assert!((trace - (1.0 + 2.0 * f64::cos(angle))).abs() < 1e-14);
+    }
+}
+
+/// Noise without a generator: incommensurable angles.
+fn noise(index: usize) -> f64 {
+    (1.7 * index as f64 * index as f64 + 0.3).sin()
+}
+
+/// Photos around a cloud of points; initial values are wrong by `coarseness`.
+fn collection(photos: usize, points: usize, coarseness: f64) -> Collection {
+    let parameters = |i: usize| -> [f64; 9] {
+        let around = -3.0 + 6.0 * i as f64 / photos as f64;
+        let w = [0.05 * noise(i), -around, 0.05 * noise(i + 50)];
+        [w[0], w[1], w[2], 0.3 * noise(i + 100), 0.3 * noise(i + 150), -10.0, 1000.0, 0.05, -0.02]
+    };
+    let position = |i: usize| -> [f64; 3] { std::array::from_fn(|k| 2.0 * noise(3 * i + k + 400)) };
+    let mut images = Vec::new();
+    for point in 0..points {
+        for photo in (0..photos).filter(|photo| (photo + point) % 3 > 0) {
+            let exact = BundlerPhoto::new(parameters(photo)).linearize(&position(point)).xy;
+            let n = images.len();
+            let xy = [exact[0] + 0.5 * noise(2 * n + 7), exact[1] + 0.5 * noise(2 * n + 8)];
+            images.push(Image { photo, point, xy, sd: [0.5; 2] });
+        }
+    }
+    let coarse_photo = |i: usize| {
+        let exact = parameters(i);
+        let by = [0.05, 0.05, 0.05, 0.5, 0.5, 0.5, 100.0, 0.0, 0.0];
+        let parameters = std::array::from_fn(|k| exact[k] + coarseness * by[k] * noise(9 * i + k + 900));
+        Photo { parameters, sd: [f64::INFINITY; 9] }
+    };
+    let coarse_point = |i: usize| {
+        let exact = position(i);
+        let position = std::array::from_fn(|k| exact[k] + 0.5 * coarseness * noise(3 * i + k + 2000));
+        Point { position, sd: [f64::INFINITY; 3] }
+    };
+    Collection {
+        photos: (0..photos).map(coarse_photo).collect(),
+        points: (0..points).map(coarse_point).collect(),
+        images,
+    }
+}
+
+fn adjusted(collection: &Collection, loss: Option<Loss>, threads: usize) -> Solution {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let adjustment = adjustment::Options {
+        criterion: Criterion::Decrease(1e-10),
+        max_iterations: 200,
+        covariance: true,
+        loss,
+    };
+    let options = Options { adjustment, ordering: Ordering::Auto };
+    collection.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+fn redundancy(solution: &Solution) -> Vec<f64> {
+    solution.images.iter().flatten().flat_map(|image| image.redundancy).collect()
+}
+
+#[test]
+fn far_starts_lead_to_the_solution_of_near_ones() {
+    let near = adjusted(&collection(9, 80, 0.0), None, 1);
+    let far = adjusted(&collection(9, 80, 3.0), None, 1);
+    assert_eq!((near.adjustment.status, far.adjustment.status), (Status::Converged, Status::Converged));
+    assert!(far.adjustment.initial_sum_of_squares > 1e4 * near.adjustment.initial_sum_of_squares);
+    assert!((near.sum_of_squares - far.sum_of_squares).abs() < 1e-8 * near.sum_of_squares);
+}
+
+#[test]
+fn redundancy_numbers_sum_to_the_degrees_of_freedom_of_a_network_without_datum() {
+    let collection = collection(9, 80, 0.3);
+    let solution = adjusted(&collection, None, 2);
+    assert_eq!(solution.datum.len(), 7);
+    let expected = 2 * collection.images.len() as i64 - (9 * 9 + 3 * 80 - 7);
+    assert_eq!(solution.degrees_of_freedom, expected);
+    let sum: f64 = redundancy(&solution).iter().sum();
+    assert!((sum - expected as f64).abs() < 1e-7 * expected as f64, "{sum} of {expected}");
+}
+
+#[test]
+fn redundancy_numbers_do_not_depend_on_the_datum() {
+    let free = adjusted(&collection(9, 80, 0.3), None, 1);
+    // Another datum: two points and a coordinate fixed where the free network has put them.
+    let mut held = collection(9, 80, 0.3);
+    for (photo, adjusted) in held.photos.iter_mut().zip(&free.photos) {
+        photo.parameters = adjusted.parameters;
+    }
+    for (point, adjusted) in held.points.iter_mut().zip(&free.points) {
+        point.position = adjusted.unwrap().position;
+    }
+    held.points[0].sd = [0.0; 3];
+    held.points[1].sd = [0.0; 3];
+    held.points[2].sd[0] = 0.0;
+    let held = adjusted(&held, None, 1);
+    assert!(held.datum.is_empty());
+    assert_eq!(held.degrees_of_freedom, free.degrees_of_freedom);
+    for (a, b) in redundancy(&free).into_iter().zip(redundancy(&held)) {
+        assert!((a - b).abs() < 1e-7, "{a} {b}");
+    }
+}
+
+#[test]
+fn the_bits_do_not_depend_on_the_number_of_threads() {
+    let collection = collection(9, 200, 1.0);
+    for loss in [None, Some(Loss::Huber(1.0))] {
+        let (one, three) = (adjusted(&collection, loss, 1), adjusted(&collection, loss, 3));
+        let values = |solution: &Solution| -> Vec<f64> {
+            let photos = solution.photos.iter().flat_map(|photo| photo.parameters);
+            let cofactors =
+                solution.points.iter().flatten().flat_map(|point| point.cofactors.into_iter().flatten());
+            photos.chain(cofactors).chain(redundancy(solution)).collect()
+        };
+        assert_eq!(values(&one), values(&three));
+    }
+}
+
+#[test]
+fn losses_join_their_slopes() {
+    for loss in [Loss::Huber(1.5), Loss::Cauchy(2.5)] {
+        assert_eq!((loss.value(0.0), loss.weight(0.0)), (0.0, 1.0));
+        for s in [1e-3, 1.0, 2.2, 2.3, 10.0, 1e4] {
+            let slope = (loss.value(s * (1.0 + 1e-6)) - loss.value(s * (1.0 - 1e-6))) / (2e-6 * s);
+            assert!((slope - loss.weight(s)).abs() < 1e-7, "{loss:?} at {s}");
+            assert!(loss.value(s) <= s);
+        }
+    }
+}

@@ -1,0 +1,18 @@
+"""Collections of photos of unknown cameras: bundle adjustment "in the large"."""
+
+from photogram.collection.adjust import adjust
+from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.bal import read, to_bytes
+from photogram.collection.collection import PARAMETERS, Collection
+from photogram.collection.simulation import Simulation, simulate
+
+__all__ = [
+    "PARAMETERS",
+    "AdjustedCollection",
+    "Collection",
+    "Simulation",
+    "adjust",
+    "read",
+    "simulate",
+    "to_bytes",
+]

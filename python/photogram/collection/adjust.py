@@ -1,0 +1,183 @@
+"""Adjustment of a collection."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram import _photocore
+from photogram.adjusted import Iteration
+from photogram.adjustment import Ordering, Progress, teller
+from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.collection import PARAMETERS, Collection
+from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.messages import Message, listed
+from photogram.robust import Loss, loss_row, remark
+
+__all__ = ["adjust"]
+
+
+def adjust(
+    collection: Collection,
+    *,
+    tolerance: float | None = None,
+    max_iterations: int = 200,
+    loss: Loss | None = None,
+    scale: float | None = None,
+    covariance: bool = True,
+    ordering: Ordering = "auto",
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> AdjustedCollection:
+    """Adjust a collection by Levenberg-Marquardt steps from given values, however far.
+
+    Points with a free coordinate and images on one photo only are left out; photos that have no image then
+    stay as they are. Where nothing weighted or fixed gives a datum, cofactors are those of minimum
+    constraints: position and attitude of the first photo and one component of the translation of another
+    are held. Residuals, redundancy numbers and the variance of unit weight do not depend on which.
+
+    Parameters
+    ----------
+    collection
+        The collection, with its initial values.
+    tolerance
+        Iterate until a step lowers what is minimised by less than this fraction of it. When None, 1e-8
+        without a loss, and 1e-6 with one: reweighting converges linearly.
+    max_iterations
+        Iterations (accepted steps) at the most.
+    loss
+        Robust loss in place of the squares: `huber` or `cauchy`, of both coordinates of an image point
+        together; None for least squares.
+    scale
+        Where the loss sets in, in standard deviations a priori; 1.50 for `huber` and 2.55 for `cauchy` when
+        None.
+    covariance
+        Whether to compute covariances, redundancy numbers and standardized residuals.
+    ordering
+        How photos are ordered for elimination; see :func:`photogram.adjust`.
+    threads
+        Number of threads; all processors when None. The result does not depend on it, to the last bit.
+    progress
+        Called now and then with what is going on; an exception it raises stops the adjustment.
+
+    Returns
+    -------
+    The result; its `status` says whether the adjustment converged, its `messages` why covariances are
+    missing, where the observations do not determine everything.
+
+    Raises
+    ------
+    RankError
+        Damping does not help: an unknown has no observation.
+    AdjustmentError
+        There is nothing to adjust, or the initial values give no finite image coordinates.
+    InputError
+        An option that cannot be.
+    KeyboardInterrupt
+        Ctrl-C.
+    """
+    if ordering not in get_args(Ordering):
+        raise InputError(f"ordering is one of {', '.join(get_args(Ordering))}, not {ordering!r}")
+    if max_iterations < 1:
+        raise InputError("there must be one iteration at least")
+    if tolerance is None:
+        tolerance = 1e-8 if loss is None else 1e-6
+    if not tolerance > 0:
+        raise InputError("the criterion of convergence must be positive")
+    if threads is not None and threads < 1:
+        raise InputError(f"threads must be positive, not {threads}")
+    row = loss_row(loss, scale)
+    try:
+        solution = _photocore.adjust_collection(
+            collection.photo_parameters,
+            collection.photo_sd,
+            collection.point_positions,
+            collection.point_sd,
+            collection.image_photos,
+            collection.image_points,
+            collection.image_xy,
+            collection.image_sd,
+            decrease=tolerance,
+            max_iterations=max_iterations,
+            covariance=covariance,
+            loss=row,
+            ordering=ordering,
+            threads=threads or 0,
+            progress=None if progress is None else teller(progress),
+        )
+    except _photocore.CollectionError as error:
+        raise _named(*error.args) from None
+    return AdjustedCollection(
+        collection=collection,
+        status=solution.status,
+        messages=_messages(solution) + remark(row, solution.image_weights),
+        initial_weighted_sum_of_squares=solution.initial_sum_of_squares,
+        iterations=[Iteration(*values) for values in solution.iterations],
+        loss=row,
+        weighted_sum_of_squares=solution.sum_of_squares,
+        degrees_of_freedom=solution.degrees_of_freedom,
+        variance_of_unit_weight=solution.variance_of_unit_weight,
+        photo_parameters=solution.photo_parameters,
+        photo_cofactors=solution.photo_cofactors,
+        photo_redundancy=solution.photo_redundancy,
+        photo_images=solution.photo_images,
+        point_positions=solution.point_positions,
+        point_cofactors=solution.point_cofactors,
+        point_redundancy=solution.point_redundancy,
+        point_rays=solution.point_rays,
+        point_rays_behind=solution.point_rays_behind,
+        residuals=solution.residuals,
+        redundancy=solution.redundancy,
+        standardized=solution.standardized,
+        image_weights=solution.image_weights,
+        datum=[(photo, PARAMETERS[parameter]) for photo, parameter in solution.datum],
+        ordering=solution.ordering,
+        predictions=solution.predictions,
+        operations=solution.operations,
+        formations=solution.formations,
+        seconds=solution.seconds,
+    )
+
+
+def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
+    """Collect remarks that did not stop the adjustment, the gravest first."""
+    messages = []
+    if solution.undetermined is not None:
+        error = _named(*solution.undetermined)
+        messages.append(Message(f"there are no covariances: {error}"))
+    if (solution.photo_images == 0).any():
+        messages.append(
+            Message(f"left as they are, photos without image points: {_numbers(solution.photo_images == 0)}")
+        )
+    if (solution.point_rays == 0).any():
+        messages.append(
+            Message(
+                f"left out, points with images on fewer than two photos: {_numbers(solution.point_rays == 0)}"
+            )
+        )
+    if solution.point_rays_behind.any():
+        rays, names = solution.point_rays_behind.sum(), _numbers(solution.point_rays_behind > 0)
+        messages.append(Message(f"{rays} image points have their point behind the camera: points {names}"))
+    if solution.datum:
+        held = ", ".join(f"{PARAMETERS[parameter]} of photo {photo}" for photo, parameter in solution.datum)
+        messages.append(Message(f"nothing gives a datum; covariances hold for fixed {held}"))
+    return messages
+
+
+def _numbers(which: NDArray[np.bool_]) -> str:
+    return listed([str(index) for index in np.flatnonzero(which)])
+
+
+def _named(kind: str, message: str, photos: list[list[int]], points: list[int]) -> AdjustmentError:
+    """Put a failure of the core into words; photos and points have no names but their numbers, from 0."""
+    if kind == "undetermined points":
+        names = [str(point) for point in points]
+        return RankError(f"their rays do not determine {len(names)} points: {listed(names)}", [], names)
+    if kind == "undetermined photos":
+        names = [str(photo) for photo in sorted({photo for each in photos for photo in each})]
+        text = f"the observations leave {len(photos)} combinations of unknowns undetermined, moving photos"
+        return RankError(f"{text} {listed(names)}", names, [])
+    return AdjustmentError(message)

@@ -1,0 +1,99 @@
+"""A collection of photos: arrays, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram import _photocore
+from photogram.arrays import indices, shaped
+from photogram.errors import InputError
+
+__all__ = ["PARAMETERS", "Collection"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+PARAMETERS = ("w1", "w2", "w3", "t1", "t2", "t3", "f", "k1", "k2")
+"""Of a photo: angle-axis vector w (rad), translation t, focal length f (pixels), distortion k1, k2."""
+
+
+@dataclass(frozen=True, eq=False)
+class Collection:
+    """P photos with unknown cameras, n points, m image points.
+
+    A photo maps a point X to f (1 + k1 p^2 + k2 p^4) p with P = R(w) X + t and p = -(P1, P2) / P3: it looks
+    along its -z axis (Bundler; Agarwal and others 2010). Any unknown may be weighted, from free (infinite
+    standard deviation) to fixed (zero).
+
+    Attributes
+    ----------
+    photo_parameters
+        (P, 9) w (rad), t (units of the object space), f (pixels), k1, k2.
+    point_positions
+        (n, 3).
+    image_photos, image_points
+        (m,) which photo and which point.
+    image_xy
+        (m, 2) pixels from the principal point, x to the right, y up.
+    image_sd
+        (m, 2) standard deviations, pixels; one number stands for all.
+    photo_sd, point_sd
+        (P, 9) and (n, 3) standard deviations of the given values as observations; infinite free, zero
+        fixed; one number stands for all.
+    """
+
+    photo_parameters: Floats
+    point_positions: Floats
+    image_photos: Indices
+    image_points: Indices
+    image_xy: Floats
+    image_sd: Floats = field(default_factory=lambda: np.array(1.0))
+    photo_sd: Floats = field(default_factory=lambda: np.array(np.inf))
+    point_sd: Floats = field(default_factory=lambda: np.array(np.inf))
+
+    def __post_init__(self) -> None:
+        photos, points, images = (
+            len(np.atleast_1d(rows)) for rows in (self.photo_parameters, self.point_positions, self.image_xy)
+        )
+        shapes = {
+            "photo_parameters": (photos, 9),
+            "point_positions": (points, 3),
+            "image_xy": (images, 2),
+            "image_sd": (images, 2),
+            "photo_sd": (photos, 9),
+            "point_sd": (points, 3),
+        }
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, shaped(name, getattr(self, name), shape))
+        for name in ("photo_parameters", "point_positions", "image_xy"):
+            _check(name, np.isfinite(getattr(self, name)), "finite")
+        for name in ("photo_sd", "point_sd"):
+            _check(name, getattr(self, name) >= 0, "a standard deviation, from zero to infinite")
+        _check("image_sd", (self.image_sd > 0) & np.isfinite(self.image_sd), "positive and finite")
+        for name, count in (("image_photos", photos), ("image_points", points)):
+            object.__setattr__(self, name, indices(name, getattr(self, name), images, count))
+
+    def replace(self, **changes: Any) -> Self:
+        """Return the collection with other arrays in place of the named ones."""
+        return replace(self, **changes)
+
+    def computed_xy(self) -> Floats:
+        """Return (m, 2) the image coordinates that the present parameters and positions give."""
+        return _photocore.bundler_images(
+            self.photo_parameters[self.image_photos], self.point_positions[self.image_points]
+        )
+
+    def cost(self) -> float:
+        """Return half the sum of squared weighted residuals, as "Bundle Adjustment in the Large" counts."""
+        return 0.5 * float((((self.image_xy - self.computed_xy()) / self.image_sd) ** 2).sum())
+
+
+def _check(name: str, good: NDArray[np.bool_], what: str) -> None:
+    bad = np.argwhere(~good)
+    if len(bad):
+        place = ", ".join(str(index) for index in bad[0])
+        raise InputError(f"{name}[{place}] is not {what}")

@@ -1,0 +1,141 @@
+"""The report of an adjusted collection: problems, how good it is, values with their deviations."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.collection.collection import PARAMETERS
+from photogram.sections import Section, composed, headline
+
+if TYPE_CHECKING:
+    from photogram.collection.adjusted import AdjustedCollection
+
+__all__ = ["report", "summary"]
+
+SUSPECTS = 20
+"""Image points with large standardized residuals that are listed at most."""
+NOTABLE = 3.0
+"""Standard deviations."""
+UNITS = ("rad",) * 3 + ("",) * 3 + ("px", "", "")
+
+
+def report(result: AdjustedCollection) -> str:
+    """Return the report of an adjusted collection."""
+    sections = [
+        *summary(result),
+        ("Iterations", _iterations(result)),
+        ("Photos: values and standard deviations", _photos(result)),
+        ("Points: standard deviations", _points(result)),
+        ("Work", _work(result)),
+    ]
+    return composed(headline("collection of photos"), sections)
+
+
+def summary(result: AdjustedCollection) -> list[Section]:
+    """Return what a reader wants first, as titled sections: problems, adjustment, suspects."""
+    return [
+        ("Problems", _problems(result)),
+        ("Adjustment", _adjustment(result)),
+        (f"Image points with |standardized residual| > {NOTABLE:g} sigma0, largest first", _suspects(result)),
+    ]
+
+
+def _problems(result: AdjustedCollection) -> list[str]:
+    problems = [str(message) for message in result.messages]
+    if not result.converged:
+        problems.insert(0, f"the adjustment has {result.status}: do not use these values")
+    if result.variance_of_unit_weight is None:
+        problems.append("there are no degrees of freedom: covariances are scaled by 1")
+    return problems or ["none"]
+
+
+def _adjustment(result: AdjustedCollection) -> list[str]:
+    collection, variance = result.collection, result.variance_of_unit_weight
+    residuals = result.residuals[result.used_images]
+    rows = [
+        ("status", result.status),
+        ("iterations", f"{len(result.iterations)}"),
+        ("cost at first (half the sum)", f"{0.5 * result.initial_weighted_sum_of_squares:.6e}"),
+        ("cost", f"{result.cost:.6e}"),
+        (
+            "minimised",
+            f"{result.loss[0]} loss, scale {result.loss[1]:g}" if result.loss else "sum of squares",
+        ),
+        (
+            "standard deviation of unit weight",
+            f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
+        ),
+        ("degrees of freedom", f"{result.degrees_of_freedom}"),
+        ("photos", f"{np.count_nonzero(result.photo_images)} used of {len(collection.photo_parameters)}"),
+        ("points", f"{np.count_nonzero(result.used_points)} used of {len(collection.point_positions)}"),
+        ("image points", f"{len(residuals)} used of {len(collection.image_xy)}"),
+        ("rms of residuals, px", ", ".join(f"{value:.4f}" for value in np.sqrt((residuals**2).mean(axis=0)))),
+        ("median length of residuals, px", f"{np.median(np.hypot(*residuals.T)):.4f}"),
+    ]
+    return [f"{name:<36}{value}" for name, value in rows]
+
+
+def _suspects(result: AdjustedCollection) -> list[str]:
+    """List the image points that fit worst, in units of what the others have."""
+    sigma0 = math.sqrt(result.covariance_scale)
+    with np.errstate(invalid="ignore"):
+        test = np.abs(result.standardized).max(axis=1) / sigma0 if sigma0 > 0 else np.zeros(0)
+        worst = np.flatnonzero(test > NOTABLE)
+    worst = worst[np.argsort(-test[worst], kind="stable")]
+    if not len(worst):
+        return []
+    lines = ["  photo    point     x, px     y, px   /sigma0  weight"]
+    for image in worst[:SUSPECTS]:
+        photo, point = result.collection.image_photos[image], result.collection.image_points[image]
+        x, y = result.residuals[image]
+        lines.append(
+            f"{photo:7d}{point:9d}{x:10.3f}{y:10.3f}{test[image]:10.1f}{result.image_weights[image]:8.4f}"
+        )
+    if len(worst) > SUSPECTS:
+        lines.append(f"and {len(worst) - SUSPECTS} more")
+    return lines
+
+
+def _iterations(result: AdjustedCollection) -> list[str]:
+    head = [" no.            cost   damping", f"   0{0.5 * result.initial_weighted_sum_of_squares:16.6e}"]
+    lines = [
+        f"{each.number:4d}{0.5 * each.weighted_sum_of_squares:16.6e}{each.damping:10.1e}"
+        for each in result.iterations
+    ]
+    return head + lines
+
+
+def _photos(result: AdjustedCollection) -> list[str]:
+    head = [f"{name}, {unit}" if unit else name for name, unit in zip(PARAMETERS, UNITS, strict=True)]
+    lines = ["  photo images" + "".join(f"{name:>14}" for name in head)]
+    for photo, (values, deviations) in enumerate(zip(result.photo_parameters, result.photo_sd, strict=True)):
+        lines.append(
+            f"{photo:7d}{result.photo_images[photo]:7d}" + "".join(f"{value:14.6g}" for value in values)
+        )
+        if np.isfinite(deviations).all():
+            lines.append(f"{'sd':>14}" + "".join(f"{deviation:14.2g}" for deviation in deviations))
+    return lines
+
+
+def _points(result: AdjustedCollection) -> list[str]:
+    """Say how the standard deviations are spread; the JSON document has every one."""
+    deviations = result.point_sd[np.isfinite(result.point_sd).all(axis=1)]
+    if not len(deviations):
+        return []
+    lines = [f"{'':<12}{'median':>12}{'90 percent':>12}{'largest':>12}"]
+    for axis, name in enumerate("XYZ"):
+        figures = [*np.quantile(deviations[:, axis], (0.5, 0.9)), deviations[:, axis].max()]
+        lines.append(f"{name:<12}" + "".join(f"{figure:12.4g}" for figure in figures))
+    return lines
+
+
+def _work(result: AdjustedCollection) -> list[str]:
+    tried = ", ".join(f"{name} {operations:.2g}" for name, operations in result.predictions.items())
+    return [
+        f"ordering                            {result.ordering} (multiply-adds predicted: {tried})",
+        f"formations of the normal equations  {result.formations}",
+        *(f"seconds, {phase:<27}{seconds:.3f}" for phase, seconds in result.seconds.items()),
+    ]
