@@ -20,50 +20,75 @@ const TILE: usize = 192;
 /// Multiply-adds below which a tile loop stays on one thread.
 const WORTH_SHARING: f64 = 2e6;
 
+/// Pivots that need a closer look, as columns of a front, ascending.
+#[derive(Debug, Default)]
+pub(super) struct Pivots {
+    /// Lost in rounding: set to one, and nothing below them.
+    pub lost: Vec<usize>,
+    /// So small beside the diagonal that they may be nothing but rounding.
+    pub doubtful: Vec<usize>,
+}
+
+/// A pivot smaller than this fraction of its diagonal element before any elimination is doubtful.
+const DOUBTFUL: f64 = 1e-8;
+
 /// Factors the leading `width` columns of a symmetric front (lower triangle, `panel` = those columns) in place and
 /// subtracts their product from the `update`, the rest of the front. `diagonal` is that of the columns before any elimination.
-/// Returns the columns whose pivot was lost in rounding: their pivot is set to one and nothing below it.
+/// The pivots of the columns `given_up` count as lost whatever they are.
 pub(super) fn factor_front(
     mut panel: MatMut<'_, f64>,
     mut update: MatMut<'_, f64>,
     diagonal: &[f64],
-) -> Vec<usize> {
+    given_up: &[usize],
+) -> Pivots {
     let (height, width) = (panel.nrows(), panel.ncols());
-    let mut lost = Vec::new();
-    eliminate(panel.rb_mut(), diagonal, 0, &mut lost);
+    let mut pivots = Pivots::default();
+    eliminate(panel.rb_mut(), diagonal, given_up, 0, &mut pivots);
     subtract_square(update.rb_mut(), panel.rb().subrows(width, height - width));
-    lost
+    pivots
 }
 
 /// Eliminates columns, half by half so that most of the work is in large products. They are the columns of the front from `first` on,
 /// and begin with the row of their diagonal.
-fn eliminate(columns: MatMut<'_, f64>, diagonal: &[f64], first: usize, lost: &mut Vec<usize>) {
+fn eliminate(
+    columns: MatMut<'_, f64>,
+    diagonal: &[f64],
+    given_up: &[usize],
+    first: usize,
+    pivots: &mut Pivots,
+) {
     let (height, width) = (columns.nrows(), columns.ncols());
     if width <= STEP {
-        return eliminate_step(columns, diagonal, first, lost);
+        return eliminate_step(columns, diagonal, given_up, first, pivots);
     }
     let half = (width / 2).next_multiple_of(STEP);
     let (mut left, right) = columns.split_at_col_mut(half);
     let mut right = right.subrows_mut(half, height - half);
-    eliminate(left.rb_mut(), &diagonal[..half], first, lost);
+    eliminate(left.rb_mut(), &diagonal[..half], given_up, first, pivots);
     subtract_square(right.rb_mut(), left.rb().subrows(half, height - half));
-    eliminate(right, &diagonal[half..], first + half, lost);
+    eliminate(right, &diagonal[half..], given_up, first + half, pivots);
 }
 
 /// Eliminates a few columns one by one.
-fn eliminate_step(columns: MatMut<'_, f64>, diagonal: &[f64], first: usize, lost: &mut Vec<usize>) {
+fn eliminate_step(
+    columns: MatMut<'_, f64>,
+    diagonal: &[f64],
+    given_up: &[usize],
+    first: usize,
+    pivots: &mut Pivots,
+) {
     let (height, width) = (columns.nrows(), columns.ncols());
     let (mut top, mut below) = columns.split_at_row_mut(width);
     let mut own = vec![0.0; width * width];
     MatMut::from_column_major_slice_mut(&mut own, width, width).copy_from(top.rb());
-    let before = lost.len();
-    run_unsized(Cholesky { a: &mut own, width, diagonal, first, lost });
+    let before = pivots.lost.len();
+    run_unsized(Cholesky { a: &mut own, width, diagonal, given_up, first, pivots });
     top.copy_from(MatRef::from_column_major_slice(&own, width, width));
     let factor = top.rb();
     for_tiles(row_tiles(below.rb_mut()), width * width * height, |_, tile| {
         solve_lower_triangular_in_place(factor, tile.transpose_mut(), Par::Seq);
     });
-    for &column in &lost[before..] {
+    for &column in &pivots.lost[before..] {
         below.rb_mut().col_mut(column - first).fill(0.0);
     }
 }
@@ -82,13 +107,14 @@ fn subtract_square(target: MatMut<'_, f64>, x: MatRef<'_, f64>) {
 }
 
 /// Cholesky factor of the lower triangle of a matrix, column by column, in place. A pivot is compared with the diagonal before any
-/// elimination; the columns whose pivot was lost in rounding, counted from `first`, are added to `lost`.
+/// elimination; columns are counted from `first`.
 struct Cholesky<'a> {
     a: &'a mut [f64],
     width: usize,
     diagonal: &'a [f64],
+    given_up: &'a [usize],
     first: usize,
-    lost: &'a mut Vec<usize>,
+    pivots: &'a mut Pivots,
 }
 
 impl Kernel for Cholesky<'_> {
@@ -106,7 +132,8 @@ impl Kernel for Cholesky<'_> {
                 }
             }
             // Written so that a NaN counts as lost.
-            let regular = column[0] > PIVOT_TOLERANCE * self.diagonal[j];
+            let given_up = self.given_up.contains(&(self.first + j));
+            let regular = column[0] > PIVOT_TOLERANCE * self.diagonal[j] && !given_up;
             let pivot = if regular { column[0].sqrt() } else { 1.0 };
             let scale = if regular { pivot.recip() } else { 0.0 };
             column[0] = pivot;
@@ -115,7 +142,9 @@ impl Kernel for Cholesky<'_> {
                 column[i] = if regular { column[i] * scale } else { 0.0 };
             }
             if !regular {
-                self.lost.push(self.first + j);
+                self.pivots.lost.push(self.first + j);
+            } else if pivot * pivot < DOUBTFUL * self.diagonal[j] {
+                self.pivots.doubtful.push(self.first + j);
             }
         }
     }

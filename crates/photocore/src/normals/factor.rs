@@ -9,7 +9,7 @@ use faer::MatMut;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::dense::factor_front;
+use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
 use super::front::Front;
 use super::panels::{Handover, Panels, lock};
@@ -28,6 +28,8 @@ pub struct Factor {
     diagonal: Vec<f64>,
     /// Lost pivots, in the order of elimination.
     lost: Vec<usize>,
+    /// Pivots that may be nothing but rounding.
+    doubtful: Vec<usize>,
     /// Sum of squares of the right-hand sides of all equations (priors not counted).
     pub sum_of_squares: f64,
     /// Decrease of the sum of squares that a full step predicts, priors and all unknowns counted.
@@ -57,6 +59,7 @@ struct Sums {
 struct Visited {
     sums: Sums,
     lost: Vec<usize>,
+    doubtful: Vec<usize>,
     /// Own part of L^-1 n and of the diagonal.
     right: Vec<f64>,
     diagonal: Vec<f64>,
@@ -75,6 +78,10 @@ struct Formation<'a, E> {
 
 /// Local blocks at one supernode from which on several threads work at them.
 const MANY: usize = 1024;
+/// What rounding leaves of a combination of unknowns that the equations do not determine, relative to what those of each unknown by
+/// itself would make of it, is less than a unit in the last place; weights that alone make a datum (GIANT's default of 60000 m for a
+/// station) leave a hundred.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Stacks gathered by several threads before they are added to the front.
 const WAVE: usize = 128;
 
@@ -93,13 +100,25 @@ impl System {
         between: Between<'_>,
     ) -> ControlFlow<(), Factor> {
         watched(pool, between, |control| {
-            Formation { system: self, equations, prior, damping, control }.factor()
+            let formation = Formation { system: self, equations, prior, damping, control };
+            let mut given_up = Vec::new();
+            loop {
+                let factor = formation.factor(&given_up);
+                let lost = factor.lost_after_all();
+                if lost.is_empty() || control.stopped() {
+                    return factor;
+                }
+                // What the columns after a lost pivot have made of it is worthless.
+                given_up.extend(lost);
+                factor.recycle(self);
+            }
         })
     }
 }
 
 impl<E: Equations> Formation<'_, E> {
-    fn factor(&self) -> Factor {
+    /// Forms and factors; the pivots `given_up`, in the order of elimination, count as lost whatever they are.
+    fn factor(&self, given_up: &[usize]) -> Factor {
         let symbolic = &self.system.symbolic;
         let values = self.system.workspace.zeros(symbolic.values());
         let mut panels = Panels { symbolic: Arc::clone(symbolic), values };
@@ -108,7 +127,7 @@ impl<E: Equations> Formation<'_, E> {
         let divided = panels.divide();
         self.system.tree.upward(|index| {
             if !self.control.stopped() {
-                visited.put(index, self.visit(index, &mut lock(&divided[index]), &updates));
+                visited.put(index, self.visit(index, &mut lock(&divided[index]), &updates, given_up));
             }
         });
         drop(divided);
@@ -117,6 +136,7 @@ impl<E: Equations> Formation<'_, E> {
             right: Vec::with_capacity(symbolic.unknowns()),
             diagonal: Vec::with_capacity(symbolic.unknowns()),
             lost: Vec::new(),
+            doubtful: Vec::new(),
             sum_of_squares: 0.0,
             decrease: 0.0,
             deficient_locals: Vec::new(),
@@ -129,6 +149,7 @@ impl<E: Equations> Formation<'_, E> {
             factor.add(visited.sums);
             factor.decrease += visited.right.iter().map(|v| v * v).sum::<f64>();
             factor.lost.extend(visited.lost);
+            factor.doubtful.extend(visited.doubtful);
             factor.right.extend(visited.right);
             factor.diagonal.extend(visited.diagonal);
             formation += visited.formation;
@@ -142,7 +163,13 @@ impl<E: Equations> Formation<'_, E> {
     }
 
     /// Assembles and factors one front; what it leaves to its parent goes to `updates[index]`.
-    fn visit(&self, index: usize, panel: &mut [f64], updates: &Handover<Update>) -> Visited {
+    fn visit(
+        &self,
+        index: usize,
+        panel: &mut [f64],
+        updates: &Handover<Update>,
+        given_up: &[usize],
+    ) -> Visited {
         let symbolic = &*self.system.symbolic;
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
@@ -157,8 +184,9 @@ impl<E: Equations> Formation<'_, E> {
         let sums = self.assemble(&mut front, index);
         self.add_prior(&mut front, index);
         let formation = start.elapsed().as_secs_f64();
-        let lost = front.factor();
         let first = symbolic.first_unknown(index);
+        let own = given_up.iter().filter_map(|&pivot| pivot.checked_sub(first));
+        let pivots = front.factor(&own.filter(|&column| column < s.width).collect::<Vec<_>>());
         let Front { width, update, mut right, mut diagonal, .. } = front;
         if s.parent.is_some() {
             let (right, diagonal) = (right.split_off(width), diagonal.split_off(width));
@@ -166,7 +194,8 @@ impl<E: Equations> Formation<'_, E> {
         }
         Visited {
             sums,
-            lost: lost.into_iter().map(|column| first + column).collect(),
+            lost: pivots.lost.into_iter().map(|column| first + column).collect(),
+            doubtful: pivots.doubtful.into_iter().map(|column| first + column).collect(),
             right,
             diagonal,
             formation,
@@ -272,19 +301,19 @@ impl Front<'_> {
         }
     }
 
-    /// Eliminates the own columns, from the right-hand side too; returns the columns whose pivot was lost.
-    fn factor(&mut self) -> Vec<usize> {
+    /// Eliminates the own columns, from the right-hand side too; returns the pivots that need a closer look.
+    fn factor(&mut self, given_up: &[usize]) -> Pivots {
         let below = self.height - self.width;
         let panel = MatMut::from_column_major_slice_mut(self.panel, self.height, self.width);
         let update = MatMut::from_column_major_slice_mut(&mut self.update, below, below);
-        let lost = factor_front(panel, update, &self.diagonal);
+        let pivots = factor_front(panel, update, &self.diagonal, given_up);
         for (j, column) in self.panel.chunks_exact(self.height.max(1)).enumerate() {
             let value = self.right[j] / column[j];
             self.right[j] = value;
             let rest = self.right[j + 1..].iter_mut().zip(&column[j + 1..]);
             rest.for_each(|(right, factor)| *right -= factor * value);
         }
-        lost
+        pivots
     }
 }
 
@@ -298,6 +327,28 @@ impl Factor {
     /// Gives its memory back to the system that it is of, for the next one.
     pub fn recycle(self, system: &System) {
         system.workspace.put_back(self.panels.values);
+    }
+
+    /// The doubtful pivots that are nothing but rounding.
+    ///
+    /// With x = L^-T e the combination of unknowns that a pivot stands for, x^T N x = 1, and what the equations of each unknown by
+    /// itself would make of it is the sum of n_ii x_i^2. A pivot alone does not tell: where the combination hardly moves its
+    /// unknown, rounding leaves a large fraction of that unknown's diagonal element.
+    fn lost_after_all(&self) -> Vec<usize> {
+        let is_lost = |&pivot: &usize| {
+            let x = self.combination(pivot);
+            let separately: f64 = x.iter().zip(&self.diagonal).map(|(x, n)| x * x * n).sum();
+            separately.recip() < ROUNDING
+        };
+        self.doubtful.iter().copied().filter(is_lost).collect()
+    }
+
+    /// L^-T e: the combination of unknowns that a pivot stands for.
+    fn combination(&self, pivot: usize) -> Vec<f64> {
+        let mut x = vec![0.0; self.right.len()];
+        x[pivot] = 1.0;
+        self.solve_backward(&mut x);
+        x
     }
 
     /// The combinations of unknowns that the equations do not determine, if any.
@@ -314,6 +365,9 @@ impl Factor {
             own.clear();
             own.extend_from_slice(&x[first..first + s.width]);
             s.rows.iter().for_each(|&row| own.extend_from_slice(&x[symbolic.range(row)]));
+            if own.iter().all(|&value| value == 0.0) {
+                continue;
+            }
             for (j, column) in self.panels.panel(index).chunks_exact(s.height()).enumerate().rev() {
                 let tied: f64 = column[j + 1..].iter().zip(&own[j + 1..]).map(|(a, b)| a * b).sum();
                 own[j] = (own[j] - tied) / column[j];
@@ -340,9 +394,7 @@ impl Deficiency<'_> {
     pub fn blocks(&self) -> Vec<Vec<usize>> {
         let symbolic = &*self.factor.panels.symbolic;
         let vectors = self.factor.lost.iter().map(|&pivot| {
-            let mut vector = vec![0.0; symbolic.unknowns()];
-            vector[pivot] = 1.0;
-            self.factor.solve_backward(&mut vector);
+            let mut vector = self.factor.combination(pivot);
             for (value, &diagonal) in vector.iter_mut().zip(&self.factor.diagonal) {
                 *value *= if diagonal > 0.0 && diagonal.is_finite() { diagonal.sqrt() } else { 1.0 };
             }

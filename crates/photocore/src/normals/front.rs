@@ -5,7 +5,7 @@ use std::ops::Range;
 use pulp::Simd;
 
 use super::panels::skip;
-use super::vectorised::{Rows, add_product, size};
+use super::vectorised::{Rows, add_difference, add_product, size};
 
 /// A front: the columns of a supernode, and what their elimination will leave for the parent. Rows and columns are those of the
 /// supernode's panel, its own blocks before the coupled ones. Lower triangles; what stands above carries no meaning.
@@ -98,13 +98,26 @@ impl Columns<'_> {
     /// Adds `sign` A^T B in the rows of A and the columns of B.
     #[inline(always)]
     pub fn add_product<S: Simd>(&mut self, simd: S, sign: f64, a: Strip<'_>, b: Strip<'_>) {
-        let (stride, target) = if b.at < self.width {
-            (self.height, &mut self.panel[(b.at - self.columns.start) * self.height + a.at..])
+        let (target, stride) = self.target(a.at, b.at);
+        add_product(simd, target, stride, sign, a.rows, b.rows);
+    }
+
+    /// Adds A^T A - V^T V in the rows and columns of both, in so many parts.
+    #[inline(always)]
+    pub fn add_difference<S: Simd>(&mut self, simd: S, a: Strip<'_>, v: Strip<'_>, parts: usize) {
+        let (target, stride) = self.target(a.at, a.at);
+        add_difference(simd, target, stride, a.rows, v.rows, parts);
+    }
+
+    /// What begins at a row and column of the front, and by how much its columns lie apart.
+    #[inline(always)]
+    fn target(&mut self, row: usize, column: usize) -> (&mut [f64], usize) {
+        if column < self.width {
+            (&mut self.panel[(column - self.columns.start) * self.height + row..], self.height)
         } else {
             let (stride, first) = (self.height - self.width, self.columns.start.max(self.width));
-            (stride, &mut self.update[(b.at - first) * stride + a.at - self.width..])
-        };
-        add_product(simd, target, stride, sign, a.rows, b.rows);
+            (&mut self.update[(column - first) * stride + row - self.width..], stride)
+        }
     }
 
     /// Adds `sign` A^T b to the right-hand side.

@@ -270,10 +270,9 @@ impl Stack {
             let v = self.slot_coupling::<L, D>(slot);
             let own = self.slot_rows::<D>(slot, rows);
             let constants = &self.constants[slot.constants..][..slot.groups.len() * self.locals.len() * rows];
-            columns.add_product(simd, 1.0, own, own);
+            columns.add_difference(simd, own, v, self.locals.len());
             columns.add_diagonal::<D>(own);
             columns.add_right::<D>(1.0, own, constants);
-            columns.add_product(simd, -1.0, v, v);
             columns.add_right::<D>(-1.0, v, &self.reduced);
             for other in &self.slots[index + 1..] {
                 columns.add_product(simd, -1.0, self.slot_coupling::<L, D>(other), v);

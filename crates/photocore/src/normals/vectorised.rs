@@ -1,5 +1,7 @@
 //! Kernels compiled for the vector instructions of the machine that they run on, and for the common sizes of blocks.
 
+use std::ops::Range;
+
 use pulp::{Arch, Simd, WithSimd};
 
 use super::layout::Layout;
@@ -103,6 +105,31 @@ pub(super) fn add_product<S: Simd>(
     }
 }
 
+/// target += the sum over `parts` equal parts of a and v of a^T a - v^T v. Both are summed together, part by part: where the
+/// difference is small, so are the sums on the way to it.
+#[inline(always)]
+pub(super) fn add_difference<S: Simd>(
+    simd: S,
+    target: &mut [f64],
+    stride: usize,
+    a: Rows<'_>,
+    v: Rows<'_>,
+    parts: usize,
+) {
+    for i in (0..a.width).step_by(LANES) {
+        let target = &mut target[i..];
+        let mut j = 0;
+        while j + TOGETHER <= a.width {
+            add_difference_columns::<S, TOGETHER>(simd, &mut target[j * stride..], stride, a, v, parts, i, j);
+            j += TOGETHER;
+        }
+        while j < a.width {
+            add_difference_columns::<S, 1>(simd, &mut target[j * stride..], stride, a, v, parts, i, j);
+            j += 1;
+        }
+    }
+}
+
 /// C columns of the product, and as many rows as there are lanes.
 #[inline(always)]
 fn add_columns<S: Simd, const C: usize>(
@@ -115,24 +142,68 @@ fn add_columns<S: Simd, const C: usize>(
     b: Rows<'_>,
     j: usize,
 ) {
-    let zero = simd.splat_f64s(0.0);
-    // As many vectors as the lanes of the machine need; the others are never touched.
-    let mut sums = [[zero; LANES]; C];
-    for row in 0..a.count {
+    let mut sums = [[simd.splat_f64s(0.0); LANES]; C];
+    sum::<S, C>(simd, &mut sums, 1.0, a, i, b, j, 0..a.count);
+    add_sums::<S, C>(target, stride, sign, &sums, LANES.min(a.width - i));
+}
+
+#[inline(always)]
+fn add_difference_columns<S: Simd, const C: usize>(
+    simd: S,
+    target: &mut [f64],
+    stride: usize,
+    a: Rows<'_>,
+    v: Rows<'_>,
+    parts: usize,
+    i: usize,
+    j: usize,
+) {
+    let mut sums = [[simd.splat_f64s(0.0); LANES]; C];
+    let (of_a, of_v) = (a.count / parts, v.count / parts);
+    for part in 0..parts {
+        sum::<S, C>(simd, &mut sums, 1.0, a, i, a, j, part * of_a..(part + 1) * of_a);
+        sum::<S, C>(simd, &mut sums, -1.0, v, i, v, j, part * of_v..(part + 1) * of_v);
+    }
+    add_sums::<S, C>(target, stride, 1.0, &sums, LANES.min(a.width - i));
+}
+
+/// Adds `sign` times the products of elements i and on of the rows of a with elements j and on of those of b to the sums: as many
+/// vectors as the lanes of the machine need; the others are never touched.
+#[inline(always)]
+fn sum<S: Simd, const C: usize>(
+    simd: S,
+    sums: &mut [[S::f64s; LANES]; C],
+    sign: f64,
+    a: Rows<'_>,
+    i: usize,
+    b: Rows<'_>,
+    j: usize,
+    rows: Range<usize>,
+) {
+    for row in rows {
         let vectors = S::as_simd_f64s(&a.values[row * a.width + i..][..LANES]).0;
         let factors = &b.values[row * b.width + j..][..C];
         for c in 0..C {
-            let factor = simd.splat_f64s(factors[c]);
+            let factor = simd.splat_f64s(sign * factors[c]);
             for k in 0..LANES / S::F64_LANES {
                 sums[c][k] = simd.mul_add_f64s(vectors[k], factor, sums[c][k]);
             }
         }
     }
-    let height = LANES.min(a.width - i);
+}
+
+/// Adds `sign` times the first `height` elements of the sums to columns of the target.
+#[inline(always)]
+fn add_sums<S: Simd, const C: usize>(
+    target: &mut [f64],
+    stride: usize,
+    sign: f64,
+    sums: &[[S::f64s; LANES]; C],
+    height: usize,
+) {
     for c in 0..C {
         let mut values = [0.0; LANES];
-        let vectors = S::as_mut_simd_f64s(&mut values).0;
-        vectors.copy_from_slice(&sums[c][..LANES / S::F64_LANES]);
+        S::as_mut_simd_f64s(&mut values).0.copy_from_slice(&sums[c][..LANES / S::F64_LANES]);
         let column = &mut target[c * stride..][..height];
         for k in 0..height {
             column[k] += sign * values[k];
