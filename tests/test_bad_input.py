@@ -449,7 +449,7 @@ from photogram import adjust, simulate
 signal.signal(signal.SIGINT, signal.default_int_handler)
 block = simulate(strips=30, photos_per_strip=50, points_per_photo=100, attitude_error=0.02).block
 def tell(progress):
-    if progress.phase == "{phase}":
+    if progress.phase == "form":
         print("now", flush=True)
 adjust(block, progress=tell, tolerance=1e-9)
 print("through", flush=True)
@@ -457,10 +457,9 @@ print("through", flush=True)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-@pytest.mark.parametrize("phase", ["form", "solve"])
-def test_ctrl_c_ends_a_large_adjustment_within_a_second(phase):
+def test_ctrl_c_ends_a_large_adjustment_within_a_second():
     run = subprocess.Popen(
-        [sys.executable, "-c", LARGE.format(phase=phase)],
+        [sys.executable, "-c", LARGE],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::triangle::PIVOT_TOLERANCE;
 use super::vectorised::{Kernel, run_unsized};
+use super::watch::Control;
 use super::workspace::Workspace;
 
 /// Columns factored at a time.
@@ -40,11 +41,12 @@ pub(super) fn factor_front(
     mut update: MatMut<'_, f64>,
     diagonal: &[f64],
     given_up: &[usize],
+    control: &Control,
 ) -> Pivots {
     let (height, width) = (panel.nrows(), panel.ncols());
     let mut pivots = Pivots::default();
-    eliminate(panel.rb_mut(), diagonal, given_up, 0, &mut pivots);
-    subtract_square(update.rb_mut(), panel.rb().subrows(width, height - width));
+    eliminate(panel.rb_mut(), diagonal, given_up, 0, &mut pivots, control);
+    subtract_square(update.rb_mut(), panel.rb().subrows(width, height - width), control);
     pivots
 }
 
@@ -56,17 +58,18 @@ fn eliminate(
     given_up: &[usize],
     first: usize,
     pivots: &mut Pivots,
+    control: &Control,
 ) {
     let (height, width) = (columns.nrows(), columns.ncols());
     if width <= STEP {
-        return eliminate_step(columns, diagonal, given_up, first, pivots);
+        return eliminate_step(columns, diagonal, given_up, first, pivots, control);
     }
     let half = (width / 2).next_multiple_of(STEP);
     let (mut left, right) = columns.split_at_col_mut(half);
     let mut right = right.subrows_mut(half, height - half);
-    eliminate(left.rb_mut(), &diagonal[..half], given_up, first, pivots);
-    subtract_square(right.rb_mut(), left.rb().subrows(half, height - half));
-    eliminate(right, &diagonal[half..], given_up, first + half, pivots);
+    eliminate(left.rb_mut(), &diagonal[..half], given_up, first, pivots, control);
+    subtract_square(right.rb_mut(), left.rb().subrows(half, height - half), control);
+    eliminate(right, &diagonal[half..], given_up, first + half, pivots, control);
 }
 
 /// Eliminates a few columns one by one.
@@ -76,6 +79,7 @@ fn eliminate_step(
     given_up: &[usize],
     first: usize,
     pivots: &mut Pivots,
+    control: &Control,
 ) {
     let (height, width) = (columns.nrows(), columns.ncols());
     let (mut top, mut below) = columns.split_at_row_mut(width);
@@ -85,7 +89,7 @@ fn eliminate_step(
     run_unsized(Cholesky { a: &mut own, width, diagonal, given_up, first, pivots });
     top.copy_from(MatRef::from_column_major_slice(&own, width, width));
     let factor = top.rb();
-    for_tiles(row_tiles(below.rb_mut()), width * width * height, |_, tile| {
+    for_tiles(control, row_tiles(below.rb_mut()), width * width * height, |_, tile| {
         solve_lower_triangular_in_place(factor, tile.transpose_mut(), Par::Seq);
     });
     for &column in &pivots.lost[before..] {
@@ -94,9 +98,9 @@ fn eliminate_step(
 }
 
 /// target -= x x_top^T on and below the diagonal, x_top being the first rows of x, as many as the target has columns.
-fn subtract_square(target: MatMut<'_, f64>, x: MatRef<'_, f64>) {
+fn subtract_square(target: MatMut<'_, f64>, x: MatRef<'_, f64>, control: &Control) {
     let work = target.nrows() * target.ncols() * x.ncols() / 2;
-    for_tiles(column_tiles(target), work, |first, tile| {
+    for_tiles(control, column_tiles(target), work, |first, tile| {
         let columns = tile.ncols();
         let rows = tile.nrows();
         let lower = tile.subrows_mut(first, rows - first);
@@ -154,7 +158,12 @@ impl Kernel for Cholesky<'_> {
 /// `z` of the coupled rows (full square), replaces the panel by that of the inverse:
 ///
 /// Y = L_R L_J^-1, Z_RJ = -Z_RR Y, Z_JJ = (L_J L_J^T)^-1 - Y^T Z_RJ.
-pub(super) fn invert_front(mut panel: MatMut<'_, f64>, z: MatRef<'_, f64>, workspace: &Workspace) {
+pub(super) fn invert_front(
+    mut panel: MatMut<'_, f64>,
+    z: MatRef<'_, f64>,
+    workspace: &Workspace,
+    control: &Control,
+) {
     let (height, width) = (panel.nrows(), panel.ncols());
     let below_rows = height - width;
     let (mut own, mut below) = panel.rb_mut().split_at_row_mut(width);
@@ -162,10 +171,10 @@ pub(super) fn invert_front(mut panel: MatMut<'_, f64>, z: MatRef<'_, f64>, works
     let mut y = MatMut::from_column_major_slice_mut(&mut y_values, below_rows, width);
     y.copy_from(below.rb());
     let factor = own.rb();
-    for_tiles(row_tiles(y.rb_mut()), width * width * below_rows / 2, |_, tile| {
+    for_tiles(control, row_tiles(y.rb_mut()), width * width * below_rows / 2, |_, tile| {
         solve_upper_triangular_in_place(factor.transpose(), tile.transpose_mut(), Par::Seq);
     });
-    for_tiles(row_tiles(below.rb_mut()), width * below_rows * below_rows, |first, tile| {
+    for_tiles(control, row_tiles(below.rb_mut()), width * below_rows * below_rows, |first, tile| {
         let rows = z.subrows(first, tile.nrows());
         matmul(tile, Accum::Replace, rows, y.rb(), -1.0, Par::Seq);
     });
@@ -173,7 +182,7 @@ pub(super) fn invert_front(mut panel: MatMut<'_, f64>, z: MatRef<'_, f64>, works
     let mut inverse = MatMut::from_column_major_slice_mut(&mut inverse_values, width, width);
     invert_lower_triangular(inverse.rb_mut(), factor, Par::Seq);
     let (inverse, below) = (inverse.rb(), below.rb());
-    for_tiles(column_tiles(own.rb_mut()), width * width * height, |first, mut tile| {
+    for_tiles(control, column_tiles(own.rb_mut()), width * width * height, |first, mut tile| {
         let columns = tile.ncols();
         // Rows of L_J^-1 above its diagonal are zero: the product over them is left out.
         let right = inverse.subcols(first, columns).subrows(first, width - first);
@@ -210,15 +219,21 @@ fn tiles<'a>(
     tiles
 }
 
-/// Does the work on every tile, on several threads when it is worth it.
+/// Does the work on every tile, on several threads when it is worth it; on none any more once the work is to stop.
 fn for_tiles(
+    control: &Control,
     tiles: Vec<(usize, MatMut<'_, f64>)>,
     work: usize,
     each: impl Fn(usize, MatMut<'_, f64>) + Sync,
 ) {
+    let each = |(first, tile)| {
+        if !control.stopped() {
+            each(first, tile);
+        }
+    };
     if tiles.len() > 1 && work as f64 > WORTH_SHARING {
-        tiles.into_par_iter().for_each(|(first, tile)| each(first, tile));
+        tiles.into_par_iter().for_each(each);
     } else {
-        tiles.into_iter().for_each(|(first, tile)| each(first, tile));
+        tiles.into_iter().for_each(each);
     }
 }

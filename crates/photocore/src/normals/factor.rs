@@ -186,7 +186,7 @@ impl<E: Equations> Formation<'_, E> {
         let formation = start.elapsed().as_secs_f64();
         let first = symbolic.first_unknown(index);
         let own = given_up.iter().filter_map(|&pivot| pivot.checked_sub(first));
-        let pivots = front.factor(&own.filter(|&column| column < s.width).collect::<Vec<_>>());
+        let pivots = front.factor(&own.filter(|&column| column < s.width).collect::<Vec<_>>(), self.control);
         let Front { width, update, mut right, mut diagonal, .. } = front;
         if s.parent.is_some() {
             let (right, diagonal) = (right.split_off(width), diagonal.split_off(width));
@@ -302,11 +302,11 @@ impl Front<'_> {
     }
 
     /// Eliminates the own columns, from the right-hand side too; returns the pivots that need a closer look.
-    fn factor(&mut self, given_up: &[usize]) -> Pivots {
+    fn factor(&mut self, given_up: &[usize], control: &Control) -> Pivots {
         let below = self.height - self.width;
         let panel = MatMut::from_column_major_slice_mut(self.panel, self.height, self.width);
         let update = MatMut::from_column_major_slice_mut(&mut self.update, below, below);
-        let pivots = factor_front(panel, update, &self.diagonal, given_up);
+        let pivots = factor_front(panel, update, &self.diagonal, given_up, control);
         for (j, column) in self.panel.chunks_exact(self.height.max(1)).enumerate() {
             let value = self.right[j] / column[j];
             self.right[j] = value;

@@ -133,7 +133,12 @@ impl<E: Equations> Walk<'_, E> {
         }
         let z = MatRef::from_column_major_slice(&front, height, height);
         let below = z.submatrix(width, width, height - width, height - width);
-        invert_front(MatMut::from_column_major_slice_mut(panel, height, width), below, workspace);
+        invert_front(
+            MatMut::from_column_major_slice_mut(panel, height, width),
+            below,
+            workspace,
+            self.control,
+        );
         for (j, column) in panel.chunks_exact(height.max(1)).enumerate() {
             front[j * height + j..(j + 1) * height].copy_from_slice(&column[j..]);
             (j..height).for_each(|i| front[i * height + j] = column[i]);
