@@ -206,6 +206,7 @@ def adjust_block(
     ordering: str,
     unit_variance: str,
     threads: int,
+    memory: int | None,
     progress: Callable[[str, int, int, IterationRow | None], None] | None,
 ) -> BlockSolution:
     """Adjust a block by least squares (GIANT guide, sections 4 to 9).
@@ -247,6 +248,8 @@ def adjust_block(
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
     threads
         Number of threads; 0 for all processors.
+    memory
+        Bytes that the adjustment may take; None for any number.
     progress
         Called on the calling thread as (phase, points done, points in all, None), or ("iteration", number, 0,
         row). What it raises stops the adjustment and is passed on. Signals are looked after at the same time,

@@ -13,6 +13,7 @@ from photogram import _photocore
 from photogram.adjusted import Iteration
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.memory import available_memory
 from photogram.messages import Message, listed
 from photogram.refracted import check_cameras, remarks
 from photogram.result import Result
@@ -130,7 +131,8 @@ def adjust(
     RankError
         The observations do not determine all unknowns; names the photos and points concerned.
     AdjustmentError
-        There is nothing to adjust, or the initial values give no finite image coordinates.
+        There is nothing to adjust, the initial values give no finite image coordinates, or the adjustment
+        would take more memory than there is.
     InputError
         An option that cannot be, or a photo that is not above the water of the block.
     KeyboardInterrupt
@@ -170,6 +172,7 @@ def adjust(
             ordering=ordering,
             unit_variance=unit_variance,
             threads=threads or 0,
+            memory=available_memory(),
             progress=None if progress is None else teller(progress),
         )
     except _photocore.BlockError as error:

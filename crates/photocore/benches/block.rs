@@ -229,6 +229,7 @@ fn adjust(criterion: &mut Criterion) {
         },
         ordering: Ordering::Auto,
         unit_variance: UnitVariance::Constrained,
+        memory: None,
     };
     let adjust =
         || block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).expect("a determined block");

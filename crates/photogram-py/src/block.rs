@@ -34,7 +34,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd, principal_distances, point_positions, point_sd,
     image_photos, image_points, image_xy, image_sd, *, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
-    covariance, loss, ordering, unit_variance, threads, progress
+    covariance, loss, ordering, unit_variance, threads, memory, progress
 ))]
 fn adjust_block(
     py: Python<'_>,
@@ -60,6 +60,7 @@ fn adjust_block(
     ordering: &str,
     unit_variance: &str,
     threads: usize,
+    memory: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BlockSolution> {
     let positions = rows("photo_positions", &photo_positions)?;
@@ -117,6 +118,7 @@ fn adjust_block(
             "unity" => UnitVariance::Unity,
             other => return Err(unknown("unit_variance", other)),
         },
+        memory,
     };
     run(py, &block, &options, threads, progress)
 }
@@ -194,6 +196,7 @@ fn failure(error: &Failure) -> PyErr {
         Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
+        Failure::Memory { .. } => ("memory", vec![], vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
     BlockError::new_err((kind, error.to_string(), photos, points))

@@ -21,6 +21,7 @@ mod graph;
 mod incidence;
 mod invert;
 mod layout;
+mod memory;
 mod minimum_degree;
 mod ordering;
 mod panels;

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::graph::Graph;
 use super::layout::Layout;
 use super::ordering::Ordering;
@@ -70,22 +72,27 @@ pub struct Operations {
     pub inverse: f64,
 }
 
+/// Kept blocks from which on orderings are tried side by side.
+const MANY: usize = 500;
+
 impl Symbolic {
     /// Orders the kept blocks of a layout and finds the pattern of the factor.
     pub fn new(layout: &Layout, ordering: Ordering) -> Self {
         let graph = Graph::new(layout);
-        let mut predictions = Vec::new();
-        let mut best: Option<(f64, Ordering, Vec<usize>)> = None;
-        for &candidate in ordering.candidates() {
+        let try_out = |&candidate: &Ordering| {
             let order = candidate.order(&graph, layout);
-            let operations = predicted_operations(layout, &graph, &order);
-            predictions.push((candidate, operations));
-            if best.as_ref().is_none_or(|(least, ..)| operations < *least) {
-                best = Some((operations, candidate, order));
-            }
-        }
+            (candidate, predicted_operations(layout, &graph, &order), order)
+        };
+        let candidates = ordering.candidates();
+        let tried: Vec<(Ordering, f64, Vec<usize>)> = if graph.len() < MANY {
+            candidates.iter().map(try_out).collect()
+        } else {
+            candidates.par_iter().map(try_out).collect()
+        };
+        let predictions = tried.iter().map(|&(candidate, operations, _)| (candidate, operations)).collect();
+        let best = tried.into_iter().min_by(|(_, a, _), (_, b, _)| a.total_cmp(b));
         let (ordering, order) =
-            best.map_or((Ordering::Input, Vec::new()), |(_, candidate, order)| (candidate, order));
+            best.map_or((Ordering::Input, Vec::new()), |(candidate, _, order)| (candidate, order));
         Self { predictions, ..Self::with_order(layout, &graph, ordering, &order) }
     }
 

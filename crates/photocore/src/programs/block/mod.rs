@@ -104,6 +104,12 @@ pub struct Options {
     pub ordering: Ordering,
     /// What the variance of unit weight is based on.
     pub unit_variance: UnitVariance,
+    /// Bytes that the adjustment may take (see [`System::memory`]); None for any number.
+    pub memory: Option<usize>,
+}
+
+fn gib(bytes: usize) -> f64 {
+    bytes as f64 / f64::from(1 << 30)
 }
 
 /// Why a block cannot be adjusted. Photographs and points are indices into the block.
@@ -128,6 +134,14 @@ pub enum BlockError {
     /// The initial values put a point into the plane of a projection centre, so that its image is not finite.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
+    /// The adjustment would take more memory than it may.
+    #[error("the adjustment takes {:.1} GiB of memory, and {:.1} GiB are free", gib(*.needed), gib(*.available))]
+    Memory {
+        /// Bytes that it would take.
+        needed: usize,
+        /// Bytes that it may take.
+        available: usize,
+    },
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
@@ -162,6 +176,10 @@ impl Block {
         }
         let origin = self.origin();
         let problem = pool.install(|| self.problem(options, &points, images, origin))?;
+        let needed = problem.system.memory();
+        if let Some(available) = options.memory.filter(|&available| needed > available) {
+            return Err(BlockError::Memory { needed, available });
+        }
         let adjusted =
             adjustment::adjust(&problem, &options.adjustment, pool, watch).map_err(|error| match error {
                 AdjustError::UndeterminedLocals(locals) => {
