@@ -69,7 +69,7 @@ pub(super) struct AtHome {
 }
 
 /// Local blocks at one supernode from which on several threads work at them.
-const MANY: usize = 1024;
+const MANY: usize = 256;
 
 impl AtHome {
     /// `front` is the inverse over the rows of the front of the supernode, full square, of the order `height`.

@@ -77,13 +77,13 @@ struct Formation<'a, E> {
 }
 
 /// Local blocks at one supernode from which on several threads work at them.
-const MANY: usize = 1024;
+const MANY: usize = 256;
 /// What rounding leaves of a combination of unknowns that the equations do not determine, relative to what those of each unknown by
 /// itself would make of it, is less than a unit in the last place; weights that alone make a datum (GIANT's default of 60000 m for a
 /// station) leave a hundred.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Stacks gathered by several threads before they are added to the front.
-const WAVE: usize = 128;
+const WAVE: usize = 64;
 
 impl System {
     /// Forms the normal equations, with the local blocks reduced out, and factors them. `damping` is added to the diagonal of the normal
