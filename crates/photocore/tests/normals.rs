@@ -238,6 +238,18 @@ fn strip_and_block_agree_with_dense_algebra() {
     }
 }
 
+/// Thirty cameras of ten unknowns in turn: every group touches those of one.
+#[test]
+fn a_border_of_hundreds_agrees_with_dense_algebra() {
+    let plain = block(5, 10, 0).layout;
+    let camera = |group: usize| plain.kept_of(group) as u32 % 30;
+    let ranges = (0..plain.groups()).map(|group| 10 * camera(group)..10 * camera(group) + 10).collect();
+    let layout = plain.clone().with_border(300, ranges).unwrap();
+    for ordering in [Ordering::ReverseCuthillMckee, Ordering::DissectionByPlace] {
+        compare_with_dense(&Dense::new(layout.clone(), 11), ordering);
+    }
+}
+
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
     let dense = block(8, 40, 5);
