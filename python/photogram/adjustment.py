@@ -99,7 +99,8 @@ def adjust(
         them.
     tolerance
         Iterate until no unknown changes by more than this fraction of its standard deviation (a priori unit
-        weight). A step that raises the sum of squares is damped (Levenberg-Marquardt).
+        weight), or until the rate of convergence shows that none would by more than a tenth of it. A step
+        that raises the sum of squares is damped (Levenberg-Marquardt).
     as_published
         Iterate as the 1987 program did instead.
     covariance
