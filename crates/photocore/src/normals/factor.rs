@@ -104,8 +104,12 @@ impl System {
             let mut given_up = Vec::new();
             loop {
                 let factor = formation.factor(&given_up);
+                if control.stopped() {
+                    // Supernodes were passed over: there is no factor to look at.
+                    return factor;
+                }
                 let lost = factor.lost_after_all();
-                if lost.is_empty() || control.stopped() {
+                if lost.is_empty() {
                     return factor;
                 }
                 // What the columns after a lost pivot have made of it is worthless.
