@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arrays import standard_deviations
 from photogram.block import Block
 from photogram.messages import Message
 
@@ -230,12 +231,12 @@ class AdjustedBlock:
     @property
     def photo_sd(self) -> Floats:
         """(P, 6) standard deviations of position and attitude."""
-        return _standard_deviations(self.photo_covariances)
+        return standard_deviations(self.photo_covariances)
 
     @property
     def point_sd(self) -> Floats:
         """(n, 3) standard deviations."""
-        return _standard_deviations(self.point_covariances)
+        return standard_deviations(self.point_covariances)
 
     @property
     def point_kinds(self) -> NDArray[np.str_]:
@@ -265,8 +266,3 @@ class AdjustedBlock:
         if self.block.geographic:
             differences[:, 0] -= math.tau * np.round(differences[:, 0] / math.tau)
         return differences
-
-
-def _standard_deviations(covariances: Floats) -> Floats:
-    deviations: Floats = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    return deviations

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.errors import InputError
 
-__all__ = ["indices", "shaped"]
+__all__ = ["indices", "shaped", "standard_deviations"]
 
 
 def shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -45,3 +45,9 @@ def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.
     if bad.size:
         raise InputError(f"{name}[{bad[0]}] is {array[bad[0]]}, outside 0 to {count - 1}")
     return array
+
+
+def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the standard deviations (n, k) of matrices of covariances (n, k, k)."""
+    deviations: NDArray[np.float64] = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    return deviations

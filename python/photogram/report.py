@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.angles import ARCSEC, degrees_minutes_seconds
 from photogram.reliability import TESTABLE
-from photogram.sections import Section, composed, headline
+from photogram.sections import Section, composed, headline, problems
 from photogram.structuring import structure
 
 if TYPE_CHECKING:
@@ -50,20 +50,11 @@ def report(result: AdjustedBlock) -> str:
 def summary(result: AdjustedBlock) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
     return [
-        ("Problems", _problems(result)),
+        ("Problems", problems(result.messages, result.status, result.variance_of_unit_weight)),
         ("Adjustment", _adjustment(result)),
         ("Residuals", _residuals(result)),
         (f"Image coordinates with |standardized residual| > {_BLUNDER:g}, largest first", _suspects(result)),
     ]
-
-
-def _problems(result: AdjustedBlock) -> list[str]:
-    problems = [str(message) for message in result.messages]
-    if not result.converged:
-        problems.insert(0, f"the adjustment has {result.status}: do not use these values")
-    if result.variance_of_unit_weight is None:
-        problems.append("there are no degrees of freedom: covariances are scaled by 1")
-    return problems or ["none"]
 
 
 def _adjustment(result: AdjustedBlock) -> list[str]:

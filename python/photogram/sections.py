@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from photogram import _photocore
+from photogram.messages import Message
 
-__all__ = ["Section", "composed", "headline"]
+__all__ = ["Section", "composed", "headline", "problems"]
 
 Section = tuple[str, list[str]]
 """A title and lines."""
@@ -21,3 +22,13 @@ def composed(head: str, sections: Iterable[Section]) -> str:
     """Return a report: its first line, then the sections; those without lines are left out."""
     parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
     return "\n\n".join([head, *parts]) + "\n"
+
+
+def problems(messages: Sequence[Message], status: str, variance_of_unit_weight: float | None) -> list[str]:
+    """Return what keeps a reader from using the values of an adjustment, or should make them careful."""
+    found = [str(message) for message in messages]
+    if status != "converged":
+        found.insert(0, f"the adjustment has {status}: do not use these values")
+    if variance_of_unit_weight is None:
+        found.append("there are no degrees of freedom: covariances are scaled by 1")
+    return found or ["none"]

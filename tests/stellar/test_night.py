@@ -9,6 +9,7 @@ from pathlib import Path
 import erfa
 import numpy as np
 import pytest
+from observer import places_of_j2000
 from typer.testing import CliRunner
 
 from photogram import AdjustmentError, InputError, _photocore
@@ -173,16 +174,7 @@ def test_the_pole_agrees_with_erfa(night):
     date = earth.site_of_date(site)
     standard = date.standard_coordinates(apparent_places(bright, utc), sidereal_time(date, utc, earth.dut1))
     turn = terrestrial(site).T @ pole_matrix(earth.pole) @ terrestrial(date)
-    j2000 = erfa.pmsafe(
-        *bright.places.T,
-        bright.proper_motions[:, 0] / np.cos(bright.places[:, 1]),
-        bright.proper_motions[:, 1],
-        bright.parallaxes / ARCSEC,
-        0.0,
-        *erfa.epj2jd(1991.25),
-        2451545.0,
-        0.0,
-    )
+    j2000 = places_of_j2000(bright)
     day = erfa.dtf2d("UTC", 2024, 3, 1, 21, 3, 5.25)
     azimuth, zenith, *_ = erfa.atco13(
         *j2000, *day, earth.dut1, np.radians(8.5), site.latitude, 0.0, *earth.pole, 0.0, 0.0, 0.0, 0.5
@@ -208,16 +200,7 @@ def test_attitudes_are_those_of_the_mean_pole(night):
     exposure = replace(night.exposures[0], utc=utc, xy=pixels[seen], stars=seen)
     found = calibrate_exposures([exposure], camera, night.site, bright, earth=earth)
     stars, air = bright.take(seen), night.site.air
-    j2000 = erfa.pmsafe(
-        *stars.places.T,
-        stars.proper_motions[:, 0] / np.cos(stars.places[:, 1]),
-        stars.proper_motions[:, 1],
-        stars.parallaxes / ARCSEC,
-        0.0,
-        *erfa.epj2jd(1991.25),
-        2451545.0,
-        0.0,
-    )
+    j2000 = places_of_j2000(stars)
     day, west = erfa.dtf2d("UTC", 2024, 3, 5, 20, 10, 0.0), night.site.longitude_west
     azimuth, zenith, *_ = erfa.atco13(
         *j2000,

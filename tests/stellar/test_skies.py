@@ -6,6 +6,7 @@ from dataclasses import replace
 import erfa
 import numpy as np
 import pytest
+from observer import places_of_j2000
 
 from photogram import InputError
 from photogram.angles import ARCSEC
@@ -45,16 +46,7 @@ def test_directions_agree_with_erfa_without_air(catalogue):
     utc = "2024-03-01T21:03:05.25"
     site = Site(np.radians(47.0), np.radians(-8.5), air=Air(280.0, 0.0), aberration=0.3192 * ARCSEC)
     standard = site.standard_coordinates(apparent_places(bright, utc), sidereal_time(site, utc))
-    j2000 = erfa.pmsafe(
-        *bright.places.T,
-        bright.proper_motions[:, 0] / np.cos(bright.places[:, 1]),
-        bright.proper_motions[:, 1],
-        bright.parallaxes / ARCSEC,
-        0.0,
-        *erfa.epj2jd(1991.25),
-        2451545.0,
-        0.0,
-    )
+    j2000 = places_of_j2000(bright)
     day = erfa.dtf2d("UTC", 2024, 3, 1, 21, 3, 5.25)
     azimuth, zenith, *_ = erfa.atco13(
         *j2000, *day, 0.0, np.radians(8.5), site.latitude, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5

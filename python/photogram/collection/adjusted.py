@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.adjusted import Iteration
+from photogram.arrays import standard_deviations
 from photogram.collection.collection import Collection, Floats, Indices
 from photogram.messages import Message
 
@@ -126,12 +127,12 @@ class AdjustedCollection:
     @property
     def photo_sd(self) -> Floats:
         """(P, 9) standard deviations of the parameters."""
-        return _standard_deviations(self.photo_covariances)
+        return standard_deviations(self.photo_covariances)
 
     @property
     def point_sd(self) -> Floats:
         """(n, 3) standard deviations."""
-        return _standard_deviations(self.point_covariances)
+        return standard_deviations(self.point_covariances)
 
     @property
     def used_points(self) -> NDArray[np.bool_]:
@@ -162,8 +163,3 @@ class AdjustedCollection:
         from photogram.collection.document import to_json
 
         return to_json(self)
-
-
-def _standard_deviations(covariances: Floats) -> Floats:
-    deviations: Floats = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    return deviations

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.collection.collection import PARAMETERS
-from photogram.sections import Section, composed, headline
+from photogram.sections import Section, composed, headline, problems
 
 if TYPE_CHECKING:
     from photogram.collection.adjusted import AdjustedCollection
@@ -37,19 +37,10 @@ def report(result: AdjustedCollection) -> str:
 def summary(result: AdjustedCollection) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, suspects."""
     return [
-        ("Problems", _problems(result)),
+        ("Problems", problems(result.messages, result.status, result.variance_of_unit_weight)),
         ("Adjustment", _adjustment(result)),
         (f"Image points with |standardized residual| > {NOTABLE:g} sigma0, largest first", _suspects(result)),
     ]
-
-
-def _problems(result: AdjustedCollection) -> list[str]:
-    problems = [str(message) for message in result.messages]
-    if not result.converged:
-        problems.insert(0, f"the adjustment has {result.status}: do not use these values")
-    if result.variance_of_unit_weight is None:
-        problems.append("there are no degrees of freedom: covariances are scaled by 1")
-    return problems or ["none"]
 
 
 def _adjustment(result: AdjustedCollection) -> list[str]:
