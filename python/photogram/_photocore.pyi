@@ -339,6 +339,24 @@ class BlockSolution:
         """(m,) factor by which a loss has changed the weight; 1 without a loss."""
 
     @property
+    def images_behind(self) -> _Indices:
+        """Indices of the images whose point stands behind the camera, ascending."""
+
+    @property
+    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
+        """What the adjusted values leave undetermined, as in a :class:`BlockError`: then there are no cofactors.
+
+        None where everything is determined.
+        """
+
+    @property
+    def weak(self) -> list[int]:
+        """Indices of the photos that a combination of unknowns moves which no full step could follow.
+
+        The sum of squares stood still all the same. Empty where the adjustment ended otherwise.
+        """
+
+    @property
     def dropped(self) -> list[tuple[int, str]]:
         """Points left out, each with the reason."""
 

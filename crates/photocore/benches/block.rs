@@ -190,10 +190,10 @@ fn go(_: usize) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn done<T>(flow: ControlFlow<(), T>) -> T {
+fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
     match flow {
         ControlFlow::Continue(value) => value,
-        ControlFlow::Break(()) => unreachable!("nothing interrupts"),
+        ControlFlow::Break(_) => unreachable!("nothing interrupts"),
     }
 }
 

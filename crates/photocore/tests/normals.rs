@@ -97,10 +97,10 @@ fn go(_: usize) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn done<T>(flow: ControlFlow<(), T>) -> T {
+fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
     match flow {
         ControlFlow::Continue(value) => value,
-        ControlFlow::Break(()) => panic!("interrupted"),
+        ControlFlow::Break(stopped) => panic!("{stopped:?}"),
     }
 }
 

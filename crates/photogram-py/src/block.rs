@@ -132,7 +132,7 @@ fn run(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BlockSolution> {
     let solution = watched(py, threads, progress, |pool, watch| block.adjust(options, pool, watch))?;
-    solution.map(BlockSolution::new).map_err(|error| failure(&error))
+    solution.map(BlockSolution::new).map_err(|error| BlockError::new_err(failure(&error)))
 }
 
 /// Works without the GIL. Signals and the caller's `progress` are looked after now and then, on this thread.
@@ -189,15 +189,21 @@ fn phase_name(phase: Phase) -> &'static str {
     }
 }
 
-fn failure(error: &Failure) -> PyErr {
+/// Kind, message, and the photos and points concerned.
+pub type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>);
+
+/// A failure as Python sees it.
+pub fn failure(error: &Failure) -> FailureRow {
     let (kind, photos, points) = match error {
         Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
         Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
+        Failure::Coarse { photos, points } => ("coarse", vec![photos.clone()], points.clone()),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
         Failure::Memory { .. } => ("memory", vec![], vec![]),
+        Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
-    BlockError::new_err((kind, error.to_string(), photos, points))
+    (kind, error.to_string(), photos, points)
 }

@@ -121,6 +121,7 @@ fn failure(error: &Failure) -> FailureRow {
         Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
+        Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
     (kind, error.to_string(), photos, points)

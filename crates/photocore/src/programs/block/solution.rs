@@ -1,7 +1,7 @@
 //! The adjusted block.
 
 use super::model::CentralPerspective;
-use super::{Block, Dropped, Options, UnitVariance};
+use super::{Block, BlockError, Dropped, Options, UnitVariance};
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
 use crate::geometry::Vector3;
 
@@ -62,6 +62,13 @@ pub struct Solution {
     pub points: Vec<Option<AdjustedPoint>>,
     /// The images; None for those of points that were left out.
     pub images: Vec<Option<Observed<2>>>,
+    /// The images whose point stands behind the camera, ascending.
+    pub behind: Vec<usize>,
+    /// Why there are no cofactors although they were asked for: what the adjusted values leave undetermined.
+    pub undetermined: Option<BlockError>,
+    /// The photographs that the combination moves which is determined so weakly that no step could follow it to its end; none where
+    /// the adjustment ended otherwise.
+    pub weak: Vec<usize>,
     /// The points that were left out.
     pub dropped: Vec<Dropped>,
     /// Weighted sums of squares.
@@ -122,12 +129,18 @@ impl Solution {
         }
         let photos = photos.collect();
         let images = images(block, problem, &adjustment);
+        let behind = behind(problem, &unknowns);
+        let undetermined = adjustment.undetermined.take().map(|error| BlockError::new(error, points));
+        let weak = std::mem::take(&mut adjustment.weak);
         adjustment.release_observations();
         Self {
             photos,
             photo_corrections: adjustment.corrections().map(|all| all.as_chunks().0.to_vec()).collect(),
             points: adjusted_points,
             images,
+            behind,
+            undetermined,
+            weak,
             dropped,
             sums_of_squares,
             degrees_of_freedom,
@@ -177,4 +190,20 @@ fn images(
         images[image] = Some(adjustment.observed(group, block.images[image].sd));
     }
     images
+}
+
+/// The images whose point stands behind the camera, as indices into the block.
+fn behind(problem: &Problem<CentralPerspective>, unknowns: &[f64]) -> Vec<usize> {
+    let (model, layout) = (&problem.model, problem.layout());
+    let (points, photos) = unknowns.split_at(layout.all_locals().end);
+    let photos = model.photos(photos);
+    let mut behind = Vec::new();
+    for (local, coordinates) in points.as_chunks::<3>().0.iter().enumerate() {
+        let position = model.space.cartesian(*coordinates);
+        let groups = layout.groups_of(local);
+        let hidden = groups.filter(|&group| photos[model.images[group].photo].depth(&position) < 0.0);
+        behind.extend(hidden.map(|group| model.order[group]));
+    }
+    behind.sort_unstable();
+    behind
 }
