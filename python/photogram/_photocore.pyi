@@ -247,7 +247,7 @@ def adjust_block(
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
     threads
-        Number of threads; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 for all processors.
     memory
         Bytes that the adjustment may take; None for any number.
     progress
@@ -350,8 +350,8 @@ class BlockSolution:
         """
 
     @property
-    def weak(self) -> list[int]:
-        """Indices of the photos that a combination of unknowns moves which no full step could follow.
+    def weak(self) -> list[tuple[int, int]]:
+        """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
 
         The sum of squares stood still all the same. Empty where the adjustment ended otherwise.
         """
@@ -1028,12 +1028,12 @@ class StellarProblem:
 class CollectionError(Exception):
     """A collection cannot be adjusted: (kind, message, photos of each combination, points)."""
 
-def read_numbers(text: bytes) -> _Floats:
+def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     """Read the numbers of a text, separated by white space, up to the first word that is not a finite number.
 
     Returns
     -------
-    (k,) numbers.
+    (k,) numbers, and whether they are the whole text.
     """
 
 def bundler_images(photo_parameters: _Floats, points: _Floats) -> _Floats:

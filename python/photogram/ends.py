@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.block import Block
+from photogram.block import ATTITUDE_COLUMNS, Block, position_columns
 from photogram.messages import Message, listed
 
 if TYPE_CHECKING:
@@ -24,11 +24,16 @@ def undetermined(
     if error is not None:
         messages.append(Message(f"there are no covariances: {error}"))
     if solution.weak:
-        names = listed([block.photo_ids[photo] for photo in solution.weak])
+        names = [*position_columns(block), *ATTITUDE_COLUMNS]
+        moved = [
+            f"{names[unknown].removesuffix('_deg')} of"
+            f" {listed([block.photo_ids[photo] for photo, other in solution.weak if other == unknown])}"
+            for unknown in sorted({unknown for _, unknown in solution.weak})
+        ]
         messages.append(
             Message(
                 "the sum of squares stands still, but the observations hardly determine a combination of"
-                f" unknowns that moves the photos {names}: another place along it may fit as well"
+                f" unknowns that moves {'; '.join(moved)}: other values along it fit as well"
             )
         )
     return messages

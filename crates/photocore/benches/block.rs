@@ -15,7 +15,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use photocore::adjustment;
 use photocore::geometry::{self, ObjectSpace, RotationSense};
-use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, System};
+use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, Stopped, System};
 use photocore::programs::block::{Block, Image, Options, Photo, Point, UnitVariance};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 

@@ -6,7 +6,7 @@ use std::ops::{ControlFlow, Range};
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
-use photocore::normals::{Equations, GroupRows, Layout, Ordering, Prior, SelectedInverse, System};
+use photocore::normals::{Equations, GroupRows, Layout, Ordering, Prior, SelectedInverse, Stopped, System};
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 

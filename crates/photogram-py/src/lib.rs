@@ -5,6 +5,7 @@ mod block;
 mod collection;
 mod comparator;
 mod geometry;
+mod memory;
 mod options;
 mod resection;
 mod similarity;
@@ -12,6 +13,9 @@ mod solution;
 mod stellar;
 
 use pyo3::prelude::*;
+
+#[global_allocator]
+static ALLOCATOR: memory::Reserved = memory::Reserved;
 
 #[pymodule]
 fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {

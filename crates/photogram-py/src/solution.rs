@@ -142,7 +142,7 @@ impl BlockSolution {
     }
 
     #[getter]
-    fn weak(&self) -> Vec<usize> {
+    fn weak(&self) -> Vec<(usize, usize)> {
         self.solution.weak.clone()
     }
 

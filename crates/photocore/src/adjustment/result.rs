@@ -45,8 +45,8 @@ pub struct Adjustment {
     pub cofactors: Option<Cofactors>,
     /// Why the last values give no cofactors although they were asked for.
     pub undetermined: Option<AdjustError>,
-    /// The kept blocks (the border is the block after the last) that a combination of unknowns moves which is determined so weakly
-    /// that the sum of squares stood still while no full step along it lowered it; none where the adjustment ended otherwise.
+    /// The unknowns, none of them local, that a combination moves which is determined so weakly that the sum of squares stood still
+    /// while no full step along it lowered it; none where the adjustment ended otherwise.
     pub weak: Vec<usize>,
     /// The unknowns held to give the cofactors a datum (see [`super::Model::datum`]), none where the problem has one.
     pub datum: Vec<usize>,

@@ -115,7 +115,7 @@ pub(super) struct Run<'a, 'w, M: Model> {
     pub datum: Vec<usize>,
     /// Whether to take in the second-order term of the loss from now on: once the steps are short.
     pub curved: bool,
-    /// Kept blocks that a combination moves which full steps cannot follow (see [`Adjustment::weak`]).
+    /// Unknowns that a combination moves which full steps cannot follow (see [`Adjustment::weak`]).
     pub weak: Vec<usize>,
 }
 

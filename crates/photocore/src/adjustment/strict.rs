@@ -54,7 +54,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             }
             let step = solved.step;
             let trial: Vec<f64> = unknowns.iter().zip(&step).map(|(x, dx)| x + dx).collect();
-            let moved = solved.basis.factor.moved(&self.problem.system, &step);
+            let moved = (damping == 0.0).then(|| solved.basis.factor.moved(&self.problem.system, &step));
             solved.basis.factor.recycle(&self.problem.system);
             let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
             let far = solved.change > FAR * (unknowns.len() as f64).sqrt();
@@ -68,7 +68,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 state = next;
             } else {
                 if damping == 0.0 && self.stands_still(&mut refused, best) {
-                    self.weak = moved;
+                    self.weak = moved.unwrap_or_default();
                     let state = self.form(unknowns, 0.0)?;
                     return self.stay(state, Status::Converged);
                 }

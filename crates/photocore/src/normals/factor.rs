@@ -330,17 +330,20 @@ impl Factor {
         self.deficient_locals.extend(sums.deficient);
     }
 
-    /// The kept blocks (the border is the block after the last) that a solution of the equations moves, ascending: those that take at
-    /// least a hundredth of the largest share, each unknown in units of what its equations alone determine.
+    /// The unknowns that are not local and that a solution of the equations moves, ascending: those that take at least a tenth of
+    /// the largest share, each in units of what its equations alone determine.
     pub fn moved(&self, system: &System, solution: &[f64]) -> Vec<usize> {
         let symbolic = &*self.panels.symbolic;
-        let mut vector = vec![0.0; symbolic.unknowns()];
-        for position in 0..symbolic.blocks() {
-            let own = &solution[symbolic.unknowns_at(&system.layout, position)];
-            vector[symbolic.range(position)].copy_from_slice(own);
-        }
+        let all = (0..symbolic.blocks()).flat_map(|position| symbolic.unknowns_at(&system.layout, position));
+        let unknowns: Vec<usize> = all.collect();
+        let mut vector: Vec<f64> = unknowns.iter().map(|&unknown| solution[unknown]).collect();
         self.scale(&mut vector);
-        blocks_moved(symbolic, &vector)
+        let largest = vector.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        let shares = unknowns.into_iter().zip(&vector);
+        let mut moved: Vec<usize> =
+            shares.filter(|(_, value)| value.abs() >= 0.1 * largest).map(|(unknown, _)| unknown).collect();
+        moved.sort_unstable();
+        moved
     }
 
     /// Takes each unknown in units of what its equations alone determine.

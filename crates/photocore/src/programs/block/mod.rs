@@ -222,8 +222,8 @@ impl Block {
         let middle = |k: usize| {
             let mut values: Vec<f64> = self.photos.iter().map(|photo| photo.position[k]).collect();
             let middle = values.len() / 2;
-            let median = (middle < values.len())
-                .then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1);
+            let median =
+                (middle < values.len()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1);
             median.map_or(0.0, f64::round)
         };
         match self.space {

@@ -29,7 +29,9 @@ impl Block {
             values.iter().zip(sd).any(|(&value, &sd)| is_coarse(value, sd) || too_large(value))
         };
         self.refuse(
-            |photo| coarse(&photo.position, &photo.position_sd) || coarse(&photo.attitude, &photo.attitude_sd),
+            |photo| {
+                coarse(&photo.position, &photo.position_sd) || coarse(&photo.attitude, &photo.attitude_sd)
+            },
             |point| coarse(&point.coordinates, &point.sd),
         )
     }
@@ -62,14 +64,22 @@ impl Block {
     ) -> Result<(), BlockError> {
         let photos: Vec<usize> = (0..self.photos.len()).filter(|&i| photo(&self.photos[i])).collect();
         let points: Vec<usize> = (0..self.points.len()).filter(|&i| point(&self.points[i])).collect();
-        if photos.is_empty() && points.is_empty() { Ok(()) } else { Err(BlockError::Coarse { photos, points }) }
+        if photos.is_empty() && points.is_empty() {
+            Ok(())
+        } else {
+            Err(BlockError::Coarse { photos, points })
+        }
     }
 }
 
 impl CentralPerspective {
     /// Median distance of the points from their first photographs, at the given coordinates; of the photographs from the origin where
     /// there are none.
-    pub fn middle_distance(&self, photos: &[geometry::Photo], coordinates: Option<&[Vector3]>) -> Option<f64> {
+    pub fn middle_distance(
+        &self,
+        photos: &[geometry::Photo],
+        coordinates: Option<&[Vector3]>,
+    ) -> Option<f64> {
         let mut distances: Vec<f64> = match coordinates {
             Some(coordinates) => {
                 let first = coordinates.iter().zip(&self.start);

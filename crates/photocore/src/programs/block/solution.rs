@@ -66,9 +66,9 @@ pub struct Solution {
     pub behind: Vec<usize>,
     /// Why there are no cofactors although they were asked for: what the adjusted values leave undetermined.
     pub undetermined: Option<BlockError>,
-    /// The photographs that the combination moves which is determined so weakly that no step could follow it to its end; none where
-    /// the adjustment ended otherwise.
-    pub weak: Vec<usize>,
+    /// What a combination of unknowns moves that is determined so weakly that no step could follow it to its end, photograph and
+    /// unknown (0 to 5: position, omega, phi, kappa); none where the adjustment ended otherwise.
+    pub weak: Vec<(usize, usize)>,
     /// The points that were left out.
     pub dropped: Vec<Dropped>,
     /// Weighted sums of squares.
@@ -131,7 +131,9 @@ impl Solution {
         let images = images(block, problem, &adjustment);
         let behind = behind(problem, &unknowns);
         let undetermined = adjustment.undetermined.take().map(|error| BlockError::new(error, points));
-        let weak = std::mem::take(&mut adjustment.weak);
+        let first = problem.layout().all_kept().start;
+        let of_photo = |unknown: &usize| ((unknown - first) / 6, (unknown - first) % 6);
+        let weak = adjustment.weak.iter().map(of_photo).collect();
         adjustment.release_observations();
         Self {
             photos,

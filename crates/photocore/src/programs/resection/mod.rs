@@ -204,7 +204,9 @@ impl Resection {
             match adjusted {
                 Ok(adjusted) if self.start.is_none() && !self.in_front(&adjusted.pose()) => {}
                 Ok(adjusted) => solved.push(adjusted),
-                Err(stop @ (ResectionError::Interrupted | ResectionError::OutOfMemory(_))) => return Err(stop),
+                Err(stop @ (ResectionError::Interrupted | ResectionError::OutOfMemory(_))) => {
+                    return Err(stop);
+                }
                 Err(other) => {
                     if let ResectionError::Undetermined(why) = other {
                         undetermined = Some(why);
