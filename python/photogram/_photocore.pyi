@@ -1075,6 +1075,7 @@ def adjust_collection(
     loss: tuple[str, float] | None,
     ordering: str,
     threads: int,
+    memory: int | None,
     progress: Callable[[str, int, int, IterationRow | None], None] | None,
 ) -> CollectionSolution:
     """Adjust a collection of photos by Levenberg-Marquardt steps.
@@ -1101,7 +1102,9 @@ def adjust_collection(
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     threads
-        Number of threads; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 for all processors.
+    memory
+        Bytes that the adjustment may take; None for any number.
     progress
         See :func:`adjust_block`.
 
@@ -1167,6 +1170,10 @@ class CollectionSolution:
     @property
     def point_rays_behind(self) -> _Indices:
         """(n,) number of images that have the point behind the camera."""
+
+    @property
+    def collapsed(self) -> list[int]:
+        """Indices of the points that ran into a station and were left out."""
 
     @property
     def residuals(self) -> _Floats:

@@ -244,7 +244,7 @@ def core_threads(threads: int | None) -> int:
     if threads is None:
         return 0
     if not isinstance(threads, int) or threads < 1:
-        raise InputError(f"threads must be a positive number, not {threads!r}")
+        raise InputError(f"threads must be positive, not {threads!r}")
     return min(threads, MOST_THREADS)
 
 

@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _MOST_PHOTOS = 1_000_000
-_MOST_CANDIDATES = 5e6  # pairs of photographs and points that may be seen: some ten seconds
+_MOST_IN_REACH, _MOST_IN_ALL = 2e4, 1e8  # grid points that one photograph may see, and all together
 _JITTER = 0.15  # of a grid cell, either way: small enough to keep the middle of an overlap in the overlap
 
 
@@ -191,7 +191,10 @@ def simulate(
         {
             "strips": (strips >= 1, "at least 1"),
             "photos_per_strip": (photos_per_strip >= 2, "at least 2"),
-            "strips x photos_per_strip": (strips * photos_per_strip <= _MOST_PHOTOS, f"{_MOST_PHOTOS} at most"),
+            "strips x photos_per_strip": (
+                strips * photos_per_strip <= _MOST_PHOTOS,
+                f"{_MOST_PHOTOS} at most",
+            ),
             "forward_overlap": (0.5 < forward_overlap < 1, "between 0.5 and 1"),
             "side_overlap": (0 < side_overlap < 1, "between 0 and 1"),
             "principal_distance": (math.isfinite(footprint), "finite and not 0"),
@@ -218,7 +221,7 @@ def simulate(
     half_angle = math.atan(frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab)))
     reach = 1.02 * (flying_height + relief) * math.tan(half_angle + 2 * tilt)
     plan = _plan(strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach)
-    _check_size(plan)
+    _check_size(plan, points_per_photo)
     terrain = _terrain(plan, relief, footprint, terrain_random)
     photos, rotations = _flight(plan, flying_height, crab, tilt, flight_random)
     positions, attitudes = _into_object_space(photos, rotations, origin, spheroid, photo_to_ground)
@@ -285,15 +288,16 @@ def _check(ranges: dict[str, tuple[bool, str]]) -> None:
             raise InputError(f"{name} must be {expected}")
 
 
-def _check_size(plan: _Plan) -> None:
-    """Refuse what could not be computed in reasonable time: so many grid points in the reach of so many photos."""
+def _check_size(plan: _Plan, points_per_photo: float) -> None:
+    """Refuse what could not be computed in reasonable time: too many grid points in the reach of a photograph, or of all."""
     columns, rows = (2 * plan.reach / side for side in plan.cell)
     photos = plan.strips * plan.photos_per_strip
-    if not photos * columns * rows <= _MOST_CANDIDATES:
+    most = max(_MOST_IN_REACH, 10 * points_per_photo)
+    if not columns * rows <= most or not photos * columns * rows <= _MOST_IN_ALL:
         raise InputError(
-            f"{photos} photos with {columns * rows:.3g} grid points in the reach of each are more than can be"
-            f" simulated ({_MOST_CANDIDATES:.0e} together): photographs so near each other, so many of them, or"
-            " so many points"
+            f"{photos} photographs with {columns * rows:.3g} grid points in the reach of each are too many to simulate"
+            f" ({most:.0e} for each, {_MOST_IN_ALL:.0e} for all): every photograph has one column of points at least,"
+            " so that less overlap gives fewer"
         )
 
 

@@ -219,8 +219,7 @@ pub fn failure(error: &Failure) -> FailureRow {
         Failure::Coarse { photos, points } => ("coarse", vec![photos.clone()], points.clone()),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
-        Failure::Memory { .. } => ("memory", vec![], vec![]),
-        Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
+        Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
     (kind, error.to_string(), photos, points)

@@ -114,7 +114,9 @@ class _Counts:
         return HEAD + IMAGE * self.images + PHOTO * self.photos + POINT * self.points
 
     def __str__(self) -> str:
-        return f"{self.numbers} numbers of {self.photos} photos, {self.points} points and {self.images} images"
+        return (
+            f"{self.numbers} numbers of {self.photos} photos, {self.points} points and {self.images} images"
+        )
 
 
 def _numbers(path: Path) -> tuple[_Counts, Floats]:

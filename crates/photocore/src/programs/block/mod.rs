@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use crate::adjustment::{self, AdjustError, Event, Problem};
+use crate::adjustment::{self, AdjustError, Event, Problem, gib};
 use crate::geometry::{self, ObjectSpace, Refraction, RotationSense, Vector3};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
@@ -109,10 +109,6 @@ pub struct Options {
     pub memory: Option<usize>,
 }
 
-fn gib(bytes: usize) -> f64 {
-    bytes as f64 / f64::from(1 << 30)
-}
-
 /// Why a block cannot be adjusted. Photographs and points are indices into the block.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum BlockError {
@@ -144,7 +140,7 @@ pub enum BlockError {
         points: Vec<usize>,
     },
     /// The adjustment would take more memory than it may.
-    #[error("the adjustment takes {:.1} GiB of memory, and {:.1} GiB are free", gib(*.needed), gib(*.available))]
+    #[error("the adjustment takes {} of memory, and {} are free", gib(*.needed), gib(*.available))]
     Memory {
         /// Bytes that it would take.
         needed: usize,
