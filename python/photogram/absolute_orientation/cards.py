@@ -18,7 +18,8 @@ from photogram.absolute_orientation.stations import Stations
 from photogram.errors import InputError
 from photogram.files import read_lines
 from photogram.geometry import rotation_matrix
-from photogram.messages import Message
+from photogram.messages import Message, quoted
+from photogram.numbers import finite_number, whole_number
 from photogram.places import Place
 
 __all__ = [
@@ -69,17 +70,15 @@ class _Record(Place):
     def number_of(self, word: str, what: str) -> float:
         """Read a number; D marks an exponent as E does."""
         try:
-            value = float(word.upper().replace("D", "E"))
+            return finite_number(word.upper().replace("D", "E"))
         except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise self.error(f"{what}: {word!r} is not a number")
-        return value
+            raise self.error(f"{what}: {quoted(word)} is not a number") from None
 
     def count_of(self, word: str, what: str) -> int:
-        if not word.isdigit():
-            raise self.error(f"{what}: {word!r} is not a count")
-        return int(word)
+        try:
+            return whole_number(word)
+        except ValueError:
+            raise self.error(f"{what}: {quoted(word)} is not a count") from None
 
 
 def read_cards(

@@ -15,7 +15,14 @@ from photogram.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["CONTROL_COLUMNS", "CONTROL_SD_COLUMNS", "MODEL_COLUMNS", "MODEL_SD_COLUMNS", "Stations"]
+__all__ = [
+    "CONTROL_COLUMNS",
+    "CONTROL_SD_COLUMNS",
+    "MODEL_COLUMNS",
+    "MODEL_SD_COLUMNS",
+    "Stations",
+    "numbers",
+]
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +43,8 @@ class Stations:
     ids
         (n,) identifiers, each once.
     control
-        (n, 3) control coordinates X, Y, Z in ground units; NaN where unknown. X and Y come as a pair.
+        (n, 3) control coordinates X, Y, Z in ground units; NaN, or masked, where unknown. Each counts by
+        itself.
     model
         (n, 3) model coordinates x, y, z in model units.
     control_sd
@@ -44,15 +52,16 @@ class Stations:
         0 exact (the default), infinite for a known coordinate that takes no part.
     model_sd
         (n, 3) standard deviations of the model coordinates in model units, or anything that broadcasts to
-        that; positive. None when only their equality is known: sigma0 then is their standard deviation.
+        that; 0 for exact ones, where the control is not. None when only their equality is known: sigma0 then
+        is their standard deviation.
     ground_unit, model_unit
         Names of the units, for reports.
 
     Raises
     ------
     InputError
-        Shapes that do not fit, an identifier that occurs twice, half a horizontal pair, a model coordinate
-        that is not finite, a standard deviation that cannot be.
+        Shapes that do not fit, what is no number, an identifier that occurs twice, a model coordinate that is
+        not finite, a standard deviation that cannot be, a coordinate that is exact in both systems.
     """
 
     ids: Sequence[str]
@@ -74,7 +83,7 @@ class Stations:
         ground_unit: str = "ground unit",
         model_unit: str = "model unit",
     ) -> None:
-        names = tuple(str(name) for name in ids)
+        names = _names(ids)
         put = object.__setattr__  # the dataclass is frozen
         put(self, "ids", names)
         put(self, "control", _table("control", control, len(names)))
@@ -134,15 +143,15 @@ class Stations:
             raise InputError(f"station {repeated[0]} occurs more than once")
         self._refuse(~np.isfinite(self.model), "has a model coordinate that is not a finite number")
         self._refuse(np.isinf(self.control), "has a control coordinate that is not a finite number")
-        pair = self.given[:, :2]
-        self._refuse(pair[:, :1] != pair[:, 1:], "has one horizontal coordinate; they come as a pair")
         sd = np.where(self.given, self.control_sd, 0.0)
         self._refuse(~(sd >= 0), "has a standard deviation of control that is not zero or positive")
-        held = self.held[:, :2]
-        self._refuse(held[:, :1] != held[:, 1:], "has one held horizontal coordinate; they come as a pair")
         if self.model_sd is not None:
-            positive = (self.model_sd > 0) & np.isfinite(self.model_sd)
-            self._refuse(~positive, "has a standard deviation of the model that is not positive and finite")
+            positive = (self.model_sd >= 0) & np.isfinite(self.model_sd)
+            self._refuse(
+                ~positive, "has a standard deviation of the model that is not finite, zero or positive"
+            )
+            exact = self.held & (sd == 0) & (self.model_sd == 0).all(axis=1, keepdims=True)
+            self._refuse(exact, "has a coordinate whose standard deviation is zero in both systems")
         elif (sd[self.held] > 0).any():
             raise InputError(
                 "the control has standard deviations but the model has none:"
@@ -154,8 +163,32 @@ class Stations:
             raise InputError(f"station {self.ids[int(np.flatnonzero(faulty.any(axis=1))[0])]} {text}")
 
 
+def _names(ids: Iterable[object]) -> tuple[str, ...]:
+    try:
+        names = tuple(str(name) for name in ids)
+    except TypeError:
+        raise InputError(f"ids is not a list of identifiers: {ids!r}") from None
+    if odd := [name for name in names if not name.isprintable()]:
+        raise InputError(f"the identifier {odd[0]!r} holds a character that does not print")
+    return names
+
+
+def numbers(name: str, values: ArrayLike) -> Floats:
+    """Return an array of numbers; what is masked is NaN.
+
+    Raises
+    ------
+    InputError
+        What is no number; the message names the argument.
+    """
+    try:
+        return np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} is not an array of numbers: {error}") from None
+
+
 def _table(name: str, values: ArrayLike, count: int) -> Floats:
-    array = np.array(values, dtype=np.float64)
+    array = numbers(name, values)
     if array.ndim == 2 and array.shape != (count, 3):
         raise InputError(f"{name} has the shape {array.shape}, not ({count}, 3)")
     try:
