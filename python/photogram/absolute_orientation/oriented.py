@@ -197,7 +197,7 @@ class OrientedModel:
         symbol = "w" if self.decided_by_w else "t"
         named = [
             f"{self.stations.ids[row]} {'XYZ'[axis]} ({symbol} {self.tested[row, axis]:.3g},"
-            f" residual {ground[row, axis]:.4g} {unit})"
+            f" wrong by about {ground[row, axis] / self.redundancy[row, axis]:.3g} {unit})"
             for row, axis in self.outliers
         ]
         return f"control beyond the limit {self.limit:.2f} of its test: {listed(named)}" if named else ""
