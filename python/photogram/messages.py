@@ -14,16 +14,20 @@ MOST_NAMES = 12
 def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
     """Put the place (file, record number, record text) before and after a message.
 
-    Characters that do not print, which could do anything to a terminal, stand there as U+FFFD, one for one.
+    Characters that do not print stand there as U+FFFD, one for one.
     """
     place = ", ".join(
-        part for part in (str(file) if file else "", f"record {record}" if record else "") if part
+        part for part in (printable(str(file)) if file else "", f"record {record}" if record else "") if part
     )
     head = f"{place}: {message}" if place else message
     if text is None:
         return head
-    shown = "".join(character if character.isprintable() else "\ufffd" for character in text)
-    return f"{head}\n    |{shown}|"
+    return f"{head}\n    |{printable(text)}|"
+
+
+def printable(text: str) -> str:
+    """Return a text with U+FFFD for each character that does not print: it could do anything to a terminal."""
+    return "".join(character if character.isprintable() else "\ufffd" for character in text)
 
 
 def listed(names: list[str], most: int = MOST_NAMES) -> str:

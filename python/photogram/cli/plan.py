@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["plan"]
 
 
-@takes_network
 @with_job
+@takes_network
 def plan(
     job: Job,
     network: NetworkOptions,

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["simulate"]
 
 
-@takes_network
 @with_job
+@takes_network
 def simulate(
     job: Job,
     out: Annotated[
