@@ -26,7 +26,7 @@ def locate(message: str, file: Path | None, record: int | None, text: str | None
 
 
 def printable(text: str) -> str:
-    """Return a text with U+FFFD for each character that does not print: it could do anything to a terminal."""
+    """Return a text with U+FFFD for each character that does not print: no terminal should get it."""
     return "".join(character if character.isprintable() else "\ufffd" for character in text)
 
 

@@ -82,8 +82,15 @@ class Job:
         return self._failures.__exit__(kind, error, trace)
 
     def reads(self, *files: Path) -> None:
-        """Name further files that are read: no result goes over them."""
+        """Name further files that are read: no result goes over them.
+
+        Raises
+        ------
+        InputError
+            A result was to do so.
+        """
         self._files += files
+        self._check()
 
     def writes(self, *files: Path) -> None:
         """Name further files that are going to be written: they are looked at now.

@@ -29,7 +29,7 @@ class Guard:
 
     def __init__(self, inputs: Iterable[Path], directories: Iterable[Path] = ()) -> None:
         self._read = {_identity(status) for path in inputs if (status := _status(path))}
-        self._files: set[object] = set()
+        self._files: dict[object, Path] = {}
         self._above: set[str] = set()
         for path in directories:
             place = os.path.realpath(path)
@@ -54,9 +54,10 @@ class Guard:
         keys = _keys(target)
         if any(key in self._files for key in keys):
             raise InputError("another result has this name", file=path)
-        if keys[0] in self._above or not above.isdisjoint(self._files):
-            raise InputError("a directory for other results has this name", file=path)
-        self._files.update(keys)
+        under = next((self._files[each] for each in above if each in self._files), None)
+        if under or keys[0] in self._above:
+            raise InputError("a directory for other results has this name", file=under or path)
+        self._files |= dict.fromkeys(keys, path)
         self._above |= above
         return target
 
