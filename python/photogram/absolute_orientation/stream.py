@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import orjson
@@ -18,11 +18,12 @@ from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
 from photogram.errors import InputError
-from photogram.files import reading, whole
+from photogram.files import reading
 from photogram.messages import quoted
 from photogram.numbers import finite_number
 from photogram.places import Place
 from photogram.rows import LONGEST_RECORD, cells
+from photogram.writing import OutputSet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,6 +64,7 @@ def transform_file(
     decimals: int = 6,
     point_sd: float = 0.0,
     document: Document | None = None,
+    outputs: OutputSet | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> int:
     """Transform the points of a file into another file: control coordinates and their standard deviations.
@@ -84,6 +86,8 @@ def transform_file(
         Standard deviation of each coordinate of a point in model units, where the file has none.
     document
         A JSON document to write the points into as well, with their full covariances.
+    outputs
+        The set that the files belong to, which puts them in place; without one they are a set of their own.
     progress
         Called after each chunk with the number of points done; an exception it raises stops the work.
 
@@ -94,8 +98,8 @@ def transform_file(
     Raises
     ------
     InputError
-        The file cannot be read, has other columns, no points, or a field that is no number; names file,
-        record and text.
+        An output is the input, or both are one file; the file cannot be read, has other columns, no points,
+        or a field that is no number; names file, record and text.
     OSError
         A file cannot be written.
     """
@@ -103,9 +107,9 @@ def transform_file(
         raise InputError(f"point_sd is not a standard deviation: {point_sd}")
     source, target = Path(source), Path(target)
     done = 0
-    with ExitStack() as files:
-        out = files.enter_context(whole(target))
-        json = files.enter_context(whole(document.path)) if document else None
+    with OutputSet([source]) if outputs is None else nullcontext(outputs) as files:
+        out = files.open(target)
+        json = files.open(document.path) if document else None
         out.write(OUTPUT)
         if document and json:
             json.write(document.head + document.first)
@@ -122,7 +126,8 @@ def transform_file(
                 progress(done)
         if not done:
             raise InputError("holds no points", file=source)
-        _close(json)
+        if json:
+            json.write(b"\n  ]\n}")
     return done
 
 
@@ -130,11 +135,6 @@ def _check_finite(ids: list[str], positions: Floats, source: Path) -> None:
     beyond = np.flatnonzero(~np.isfinite(positions).all(axis=1))
     if beyond.size:
         raise InputError(f"point {ids[beyond[0]]} is beyond double precision once transformed", file=source)
-
-
-def _close(json: BinaryIO | None) -> None:
-    if json:
-        json.write(b"\n  ]\n}")
 
 
 def decimals_for(deviation: float) -> int:

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, errors, failures, output, print_sections, print_written
+from photogram.cli.console import NOT_CONVERGED, errors, output, print_sections, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet
-from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity, Stations
     from photogram.messages import Message
+    from photogram.writing import OutputSet
 
 __all__ = ["absolute_orientation", "transform"]
 
@@ -59,9 +60,12 @@ class UnitVariance(StrEnum):
     UNITY = "unity"
 
 
+@with_job
 def absolute_orientation(
+    job: Job,
     file: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Argument(
             metavar="FILE",
             help="Stations: CSV (id,X,Y,Z,x,y,z; empty where unknown) or the cards of part I.",
@@ -73,6 +77,7 @@ def absolute_orientation(
     ] = False,
     points: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Option(
             metavar="FILE",
             help="Model points to transform as well: CSV (id,x,y,z) or lines x y z number.",
@@ -81,6 +86,7 @@ def absolute_orientation(
     ] = None,
     points_out: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="FILE",
             help="Where they go, as CSV. Default: POINTS-transformed.csv beside them.",
@@ -89,14 +95,18 @@ def absolute_orientation(
     ] = None,
     json: JsonFile = None,
     listing: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the listing as text.", show_default=False)
+        Path | None,
+        Writes.FILE,
+        typer.Option(metavar="FILE", help="Write the listing as text.", show_default=False),
     ] = None,
     plot: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(metavar="FILE", help="Draw the residuals of the control (PNG).", show_default=False),
     ] = None,
     trace: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="FILE",
             help="Write the bulletin's eight prints under sense switches, cycle by cycle (--method report or"
@@ -112,6 +122,7 @@ def absolute_orientation(
     ] = None,
     restart: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Option(metavar="JSON", help="Start from a former result (its --json).", show_default=False),
     ] = None,
     start: Annotated[
@@ -155,11 +166,10 @@ def absolute_orientation(
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
     if trace and method is Method.RIGOROUS:
         raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from photogram import orient
         from photogram.absolute_orientation.document import read_similarity
         from photogram.absolute_orientation.report import summary
-        from photogram.files import spare
         from photogram.messages import Message
 
         if file is None:
@@ -167,6 +177,10 @@ def absolute_orientation(
             file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
             points_out = points_out or (Path("points-transformed.csv") if points is None else None)
             points = points or directory / "points.csv"
+            job.reads(file, points)
+        target = _points_out(points, points_out)
+        if target:
+            job.writes(target)
         stations, former, messages = _read(file, format, zero_missing, ground_unit, model_unit)
         result = orient(
             stations,
@@ -183,13 +197,12 @@ def absolute_orientation(
             points = None
         made = _small_files(result, listing, plot, trace, None if points else json)
         written = list(made)
-        inputs = [each for each in (file, restart, points) if each]
-        if points:
-            target = points_out or points.with_name(f"{points.stem}-transformed.csv")
-            spare([target, *([json] if json else []), *made], inputs)
-            _stream(result, points, target, json, point_sd, decimals, quiet)
-            written = [target, *([json] if json else []), *written]
-        write_results(made, inputs)
+        with job.outputs() as outputs:
+            if points and target:
+                _stream(outputs, result, points, target, json, point_sd, decimals, quiet)
+                written = [target, *([json] if json else []), *written]
+            for path, content in made.items():
+                outputs.write(path, content)
         if not quiet:
             print_sections(summary(result), "the listing", SHOWN)
             print_written(written)
@@ -197,15 +210,20 @@ def absolute_orientation(
         raise typer.Exit(NOT_CONVERGED)
 
 
+@with_job
 def transform(
+    job: Job,
     result: Annotated[
         Path,
+        Reads.FILE,
         typer.Argument(metavar="RESULT", help="The --json of an orientation, or the two records of part II."),
     ],
     points: Annotated[
-        Path, typer.Argument(metavar="POINTS", help="Model points: CSV (id,x,y,z) or lines x y z number.")
+        Path,
+        Reads.FILE,
+        typer.Argument(metavar="POINTS", help="Model points: CSV (id,x,y,z) or lines x y z number."),
     ],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="CSV: id,X,Y,Z,sd_X,sd_Y,sd_Z.")],
+    out: Annotated[Path, Writes.FILE, typer.Argument(metavar="OUT", help="CSV: id,X,Y,Z,sd_X,sd_Y,sd_Z.")],
     point_sd: Annotated[
         float, typer.Option(min=0.0, help="Standard deviation of the points' own coordinates, model units.")
     ] = 0.0,
@@ -213,13 +231,19 @@ def transform(
     quiet: Quiet = False,
 ) -> None:
     """Transform any number of model points by a former orientation (part II)."""
-    with failures():
+    with job:
         from photogram.absolute_orientation import transform_file
 
         similarity = _former(result)
-        with _progress(points, quiet) as progress:
+        with job.outputs() as outputs, _progress(points, quiet) as progress:
             count = transform_file(
-                similarity, points, out, decimals=decimals, point_sd=point_sd, progress=progress
+                similarity,
+                points,
+                out,
+                decimals=decimals,
+                point_sd=point_sd,
+                outputs=outputs,
+                progress=progress,
             )
         if not quiet:
             output.print(f"{count} points written: {escape(str(out))}")
@@ -247,6 +271,13 @@ def _read(
     return deck.stations, deck.former, deck.messages
 
 
+def _points_out(points: Path | None, given: Path | None) -> Path | None:
+    """Return where transformed points go: beside the model points if nothing else is said."""
+    if points is None:
+        return None
+    return given or points.with_name(f"{points.stem}-transformed.csv")
+
+
 def _small_files(
     result: Orientation, listing: Path | None, plot: Path | None, trace: Path | None, json: Path | None
 ) -> dict[Path, bytes]:
@@ -266,6 +297,7 @@ def _small_files(
 
 
 def _stream(
+    outputs: OutputSet,
     result: Orientation,
     points: Path,
     target: Path,
@@ -291,6 +323,7 @@ def _stream(
             decimals=decimals,
             point_sd=point_sd,
             document=document,
+            outputs=outputs,
             progress=progress,
         )
 

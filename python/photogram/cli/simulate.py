@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import failures, output, print_remark
+from photogram.cli.console import output, print_remark
+from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.simulated import NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -18,10 +19,14 @@ if TYPE_CHECKING:
 __all__ = ["simulate"]
 
 
+@with_job
 @takes_network
 def simulate(
+    job: Job,
     out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="Directory for the project; it is made if need be.")
+        Path,
+        Writes.DIRECTORY,
+        typer.Argument(metavar="OUT", help="Directory for the project; it is made if need be."),
     ],
     network: NetworkOptions,
     check_points: Annotated[int, typer.Option(help="Points with known positions that are not held.")] = 20,
@@ -43,8 +48,7 @@ def simulate(
     (rad) of the photographs, the true positions of the points, and the gross errors. Photographs whose
     positions or attitudes are not observed get the weak default standard deviations of the files.
     """
-    with failures():
-        from photogram.files import write_whole
+    with job:
         from photogram.giant import Project
         from photogram.giant.project import project_files
         from photogram.simulation import simulate as make
@@ -59,7 +63,7 @@ def simulate(
         )
         project = Project.from_block(simulation.block)
         written = {**project_files(project, out, overwrite=overwrite), out / "truth.json": _truth(simulation)}
-        write_whole(written)
+        job.write(written)
         for message in project.messages:
             print_remark(message)
         block = simulation.block

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.console import NOT_CONVERGED, failures, print_sections, print_written
-from photogram.cli.options import JsonFile, Quiet
-from photogram.cli.outputs import write_results
+from photogram.cli.console import NOT_CONVERGED, print_sections, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.options import JsonFile, Quiet, Threads
 
 if TYPE_CHECKING:
     from photogram.stellar.night import CalibratedNight
@@ -22,6 +22,7 @@ __all__ = ["exposures", "stellar_camera"]
 
 Out = Annotated[
     Path | None,
+    Writes.DIRECTORY,
     typer.Option(
         metavar="OUT",
         help="Directory for listing, camera and plots. Default: INPUT-calibrated, here.",
@@ -31,9 +32,12 @@ Out = Annotated[
 Plots = Annotated[bool, typer.Option("--plots", help="Draw the plots (needs matplotlib).")]
 
 
+@with_job
 def stellar_camera(
+    job: Job,
     deck: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Argument(
             metavar="DECK",
             help="Card deck, or a calibration in plain form (a .toml file).",
@@ -58,7 +62,7 @@ def stellar_camera(
     """
     if example == (deck is not None):
         raise typer.BadParameter("give a deck, or --example", param_hint="DECK")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from dataclasses import replace
 
         from photogram.stellar import calibrate
@@ -67,6 +71,7 @@ def stellar_camera(
         if deck is None:
             deck = resources.enter_context(_example("stellar")) / "plate.toml"
         problems, inputs = _read(deck)
+        job.reads(*inputs)
         target = out or Path(f"{deck.stem}-calibrated")
         written: dict[Path, bytes] = {}
         converged = True
@@ -79,16 +84,19 @@ def stellar_camera(
             written |= _files(result, target, mark, json, plots)
             if not quiet:
                 print_sections(summary(result), "the listing")
-        write_results(written, inputs)
+        job.write(written)
         if not quiet:
             print_written(written)
     if not converged:
         raise typer.Exit(NOT_CONVERGED)
 
 
+@with_job
 def exposures(
+    job: Job,
     night: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Argument(
             metavar="FILE",
             help="TOML file that names station, camera, times, rough attitudes and the table of star images.",
@@ -102,29 +110,25 @@ def exposures(
     out: Out = None,
     json: JsonFile = None,
     plots: Plots = False,
-    threads: Annotated[
-        int | None,
-        typer.Option(
-            min=1, help="Threads; the results do not depend on it. Default: all.", show_default=False
-        ),
-    ] = None,
+    threads: Threads = None,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a digital camera by exposures of the sky: pinhole and Brown distortion (needs pyerfa)."""
     if example == (night is not None):
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from photogram.stellar.night import calibrate_night
         from photogram.stellar.night_file import inputs, read_night
         from photogram.stellar.night_report import summary
 
         if night is None:
             night = resources.enter_context(_example("exposures")) / "night.toml"
+        job.reads(*inputs(night))
         result = calibrate_night(read_night(night), threads)
         written = _night_files(result, out or Path(f"{night.stem}-calibrated"), json, plots)
         if not quiet:
             print_sections(summary(result), "the report")
-        write_results(written, inputs(night))
+        job.write(written)
         if not quiet:
             print_written(written)
     if not result.converged:
