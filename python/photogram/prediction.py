@@ -74,7 +74,7 @@ def predict(
         linear_unit=block.linear_unit,
     )
     result = adjust(
-        block.replace(image_xy=computed),
+        block.replace(image_xy=computed, photo_positions_observed=None, photo_attitudes_observed=None),
         unit_variance="unity",
         ordering=ordering,
         threads=threads,
@@ -102,6 +102,8 @@ def at_adjusted(result: Result) -> Block:
     return block.replace(
         photo_positions=result.photo_positions,
         photo_attitudes=result.photo_attitudes,
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
         point_positions=np.where(
             result.used_points[:, np.newaxis], result.point_positions, block.point_positions
         ),
