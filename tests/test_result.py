@@ -305,7 +305,8 @@ def test_members_of_the_document(result, document):
         "program", "title", "units", "conventions", "status", "messages", "loss",
         "initial_weighted_sum_of_squares", "iterations", "weighted_sum_of_squares", "degrees_of_freedom",
         "unit_variance", "variance_of_unit_weight", "covariance_scale", "photos", "points", "observations",
-        "control", "stations", "problems", "global_test", "check_points","dropped_points", "ordering", "predictions", "operations", "refraction", "seconds",
+        "control", "stations", "problems", "global_test",
+        "check_points", "dropped_points", "ordering", "predictions", "operations", "refraction", "seconds",
     }  # fmt: skip
     assert document["status"] == "converged"
     assert document["title"] == "A BLOCK OF TWO STRIPS"

@@ -12,7 +12,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjusted import Iteration
 from photogram.arrays import number, one_of, whole_number
-from photogram.block import Block
+from photogram.block import Block, checked
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.memory import available_memory
 from photogram.messages import Message, listed
@@ -142,8 +142,7 @@ def adjust(
     """
     if max_iterations is None:
         max_iterations = 50 if loss is None else 200
-    if not isinstance(block, Block):
-        raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    checked(block)
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads, progress)
     row = loss_row(loss, scale)
     if row and as_published:

@@ -136,7 +136,7 @@ def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.
         argument.
     """
     array = _plain(name, value, f"{length} whole numbers")
-    if array.shape != (length,) or (length and not np.issubdtype(array.dtype, np.integer)):
+    if array.shape != (length,) or (length and array.dtype.kind not in "iu"):
         raise InputError(f"{name} is not an array of {length} whole numbers")
     if _masked(value):
         raise InputError(f"{name} has masked values")
@@ -178,7 +178,7 @@ def names(name: str, values: Iterable[object]) -> list[str]:
 def _name(name: str, row: int, value: object) -> str:
     if isinstance(value, str) or (isinstance(value, Integral) and not isinstance(value, bool)):
         return str(value)
-    if value is None or value != value:
+    if value is None or (isinstance(value, Real) and value != value):
         raise InputError(f"{name}[{row}] has no name: {_shown(value)}")
     raise InputError(f"{name}[{row}] is not a name: {_shown(value)} is neither a string nor a whole number")
 

@@ -309,6 +309,19 @@ class Block:
         return own
 
 
+def checked(block: Block) -> Block:
+    """Return a block; refuse what is none.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    if not isinstance(block, Block):
+        raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    return block
+
+
 def position_columns(block: Block) -> tuple[str, str, str]:
     """Names of the three columns of positions in tables."""
     return GEOGRAPHIC_COLUMNS if block.geographic else RECTANGULAR_COLUMNS

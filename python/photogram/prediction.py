@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from photogram import geometry
 from photogram.adjustment import Ordering, Progress, adjust
-from photogram.block import Block
+from photogram.block import Block, checked
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.result import Result
@@ -61,7 +61,7 @@ def predict(
     AdjustmentError
         There is nothing to adjust, or rays are so nearly parallel that their points cannot be found.
     """
-    _check_positions(block)
+    _check_positions(checked(block))
     images = block.image_photos, block.image_points
     computed = geometry.project(
         block.point_positions[images[1]],
