@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from photogram.messages import Message
 
-__all__ = ["Tested", "outliers"]
+__all__ = ["Observations", "outliers"]
 
 
 @dataclass(frozen=True)
-class Tested:
+class Observations:
     """Observations of one kind and their test values.
 
     Attributes
@@ -36,7 +36,7 @@ class Tested:
     name: Callable[[tuple[int, ...]], str]
 
 
-def outliers(groups: list[Tested], limit: Callable[[int], float], what: str) -> list[Message]:
+def outliers(groups: list[Observations], limit: Callable[[int], float], what: str) -> list[Message]:
     """Return one remark for each kind of observations that has outliers: how many, and the worst.
 
     Parameters

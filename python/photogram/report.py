@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.angles import ARCSEC, degrees_minutes_seconds
-from photogram.outliers import Tested, outliers
+from photogram.outliers import Observations, outliers
 from photogram.reliability import TESTABLE
 from photogram.sections import Section, composed, headline, problems
 from photogram.statistics import normal_limit
@@ -73,7 +73,7 @@ def problems_of(result: AdjustedBlock) -> list[str]:
     return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
 
 
-def _tested(result: AdjustedBlock) -> list[Tested]:
+def _tested(result: AdjustedBlock) -> list[Observations]:
     """Return all observations with their standardized residuals, where these say something."""
     block = result.block
     axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
@@ -87,13 +87,13 @@ def _tested(result: AdjustedBlock) -> list[Tested]:
         return np.where(redundancy > TESTABLE, standardized, np.nan)
 
     return [
-        Tested("image coordinates", testable(result.standardized, result.redundancy), image),
-        Tested(
+        Observations("image coordinates", testable(result.standardized, result.redundancy), image),
+        Observations(
             "components of control",
             testable(result.point_standardized, result.point_redundancy),
             lambda index: f"{axes[index[1]]} of control point {block.point_ids[index[0]]}",
         ),
-        Tested(
+        Observations(
             "components of stations",
             testable(result.photo_standardized, result.photo_redundancy),
             lambda index: f"{unknowns[index[1]]} of photo {block.photo_ids[index[0]]}",

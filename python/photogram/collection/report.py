@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.collection.collection import PARAMETERS
-from photogram.outliers import Tested, outliers
+from photogram.outliers import Observations, outliers
 from photogram.reliability import TESTABLE
 from photogram.sections import Section, composed, headline, problems
 from photogram.statistics import externally_studentized, global_test, studentized_limit
@@ -62,7 +62,7 @@ def _problems(result: AdjustedCollection) -> list[str]:
         return f"{'xy'[index[1]]} of point {point} on photo {photo}"
 
     testable = np.where(result.redundancy > TESTABLE, result.standardized, np.nan)
-    tested = Tested("image coordinates", externally_studentized(testable, omega, freedom), image)
+    tested = Observations("image coordinates", externally_studentized(testable, omega, freedom), image)
     found = outliers(
         [tested], lambda tests: studentized_limit(freedom, tests), "externally studentized residuals"
     )
