@@ -251,6 +251,8 @@ class BlockError(Exception):
 def adjust_block(
     photo_positions: _Floats,
     photo_attitudes: _Floats,
+    photo_positions_observed: _Floats,
+    photo_attitudes_observed: _Floats,
     photo_position_sd: _Floats,
     photo_attitude_sd: _Floats,
     principal_distances: _Floats,
@@ -282,9 +284,12 @@ def adjust_block(
 
     Parameters
     ----------
-    photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd
-        (P, 3) initial (and, where weighted, observed) values and their standard deviations; omega, phi, kappa
-        in radians.
+    photo_positions, photo_attitudes
+        (P, 3) initial values, at which fixed components stay; omega, phi, kappa in radians.
+    photo_positions_observed, photo_attitudes_observed
+        (P, 3) observed values where weighted; angles may differ from initial ones by whole turns.
+    photo_position_sd, photo_attitude_sd
+        (P, 3) standard deviations of the observed values.
     principal_distances
         (P,) millimetres, signed.
     point_positions, point_sd

@@ -173,6 +173,7 @@ def test_decimals_follow_the_deviation():
     assert [stream.decimals_for(value) for value in (30, 0.05, 1e-4, 0.0, 1e-30)] == [2, 5, 7, 6, 15]
 
 
+@pytest.mark.speed
 def test_a_hundred_thousand_points_are_quick(oriented, tmp_path):
     """A million takes seconds; a tenth of it here, with a limit that only another order breaks."""
     source = write_csv(tmp_path / "points.csv", points(100_000))
