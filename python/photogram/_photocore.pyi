@@ -720,7 +720,7 @@ ParametersRow = tuple[float, _Matrix, _Vector]
 """Scale s, rotation A (3 x 3), translation B of the similarity x = s A X + B."""
 
 TraceRow = tuple[_Matrix, tuple[list[tuple[int, int]], _Floats], _Floats, _Floats, list[float], list[float]]
-"""One cycle of the bulletin: rotation A as it began; (station, component) and (m, 8) P-values of the equations;
+"""One cycle of the bulletin: rotation A as it began; (station, component) and (m, 8) P-values of equations;
 normal equations C (7, 8); auxiliary table D (7, 8); seven results; corrected omega, phi, kappa, s, b1, b2,
 b3."""
 

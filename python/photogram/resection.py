@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.arrays import shaped
+from photogram.arrays import length, number, shaped, whole_number
+from photogram.arrays import names as names_of
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
@@ -224,7 +225,8 @@ def resect(
     known = np.concatenate(
         [_known("position", position, position_sd), _known("attitude", attitude, attitude_sd)]
     )
-    if max_iterations < 1 or not tolerance > 0:
+    limit = number("tolerance", tolerance)
+    if whole_number("max_iterations", max_iterations) < 1 or not 0 < limit < math.inf:
         raise InputError("there must be one iteration at least, and a positive criterion of convergence")
     solution = solve(
         given,
@@ -234,7 +236,7 @@ def resect(
         ),
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
-        limit=tolerance,
+        limit=limit,
         max_iterations=max_iterations,
     )
     return Resection(
@@ -287,8 +289,8 @@ class Observed:
         InputError
             Another shape, a value that is not finite, or a standard deviation that is none.
         """
-        count = len(np.atleast_1d(np.asarray(xy, dtype=object)))
-        ids = [str(name) for name in names] if names is not None else [str(i + 1) for i in range(count)]
+        count = length("image_xy", xy)
+        ids = [str(i + 1) for i in range(count)] if names is None else names_of("point_ids", names)
         if len(ids) != count:
             raise InputError(f"point_ids has {len(ids)} names, but image_xy has {count} rows")
         made = cls(
@@ -296,7 +298,7 @@ class Observed:
             point_sd=_deviations("object_sd", point_sd, (count, 3)),
             xy=shaped("image_xy", xy, (count, 2)),
             xy_sd=_deviations("image_sd", xy_sd, (count, 2)),
-            principal_distance=float(principal_distance),
+            principal_distance=number("principal_distance", principal_distance),
             names=ids,
         )
         checks = [

@@ -194,11 +194,11 @@ def full(count=6):
         ({"control_sd": 0.1}, "the control has standard deviations but the model has none"),
         ({"model_sd": -1.0}, "standard deviation of the model that is not finite, zero or positive"),
         ({"model": "text"}, "model is not an array of numbers"),
-        ({"control": None}, "control coordinate"),
-        ({"ids": 6}, "ids is not a list of identifiers"),
-        ({"ids": ["\ud800", *"bcdef"]}, "a character that does not print"),
-        ({"model": np.ma.masked_less(np.arange(18.0).reshape(6, 3), 2)}, "station 0 has a model coordinate"),
-        ({"model": 10**400}, "model is not an array of numbers"),
+        ({"control": None}, "control is not an array"),
+        ({"ids": 6}, "ids is not a list of names"),
+        ({"ids": ["\ud800", *"bcdef"]}, "characters that do not print"),
+        ({"model": np.ma.masked_less(np.arange(18.0).reshape(6, 3), 2)}, "model has masked values"),
+        ({"model": 10**400}, "model"),
         ({"control": np.inf}, "control coordinate that is not a finite number"),
         ({"model": np.nan}, "model coordinate that is not a finite number"),
     ],
@@ -217,13 +217,13 @@ def test_arrays_that_cannot_be(change, message):
         ({"method": "fast"}, "method is one of"),
         ({"start": "best"}, "start is one of"),
         ({"reject": ["nobody"]}, "station nobody cannot be rejected"),
-        ({"max_iterations": 0}, "max_iterations is a whole number"),
-        ({"max_iterations": 2**64}, "max_iterations is a whole number"),
-        ({"max_iterations": None}, "max_iterations is a whole number"),
-        ({"reject": 5}, "reject is not a list"),
+        ({"max_iterations": 0}, "one iteration"),
+        ({"max_iterations": 2**64}, "max_iterations is not a whole number"),
+        ({"max_iterations": None}, "max_iterations is not a whole number"),
+        ({"reject": 5}, "reject is not a list of names"),
         ({"former": "first.json"}, "a former result is"),
         ({"tolerance": np.nan}, "criterion"),
-        ({"tolerance": "1"}, "criterion"),
+        ({"tolerance": "1"}, "tolerance is not a number"),
         ({"trace": True}, "cycles to trace"),
         ({"tolerance": 0.0}, "criterion"),
         ({"unit_variance": "unity"}, "needs standard deviations"),
@@ -246,7 +246,9 @@ def test_the_methods_of_the_report_take_no_weights():
 
 def test_too_few_components_after_a_rejection():
     given = full(3)
-    with pytest.raises(RankError, match=r"insufficient control: 3 known coordinates \(7 needed\), 2 of them h"):
+    with pytest.raises(
+        RankError, match=r"insufficient control: 3 known coordinates \(7 needed\), 2 of them h"
+    ):
         orient(given, reject=["0", "1"])
 
 

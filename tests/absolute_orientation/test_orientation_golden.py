@@ -8,6 +8,7 @@ from photogram import _photocore, orient
 from photogram.absolute_orientation import Similarity
 from photogram.errors import RankError
 
+
 def check_parameters(similarity, expected):
     translation = array(expected["B"])
     if "A" in expected:

@@ -22,7 +22,16 @@ SET = {
     "sigma0_model", "covariance", "converged", "iterations", "points",
     "test",
 }  # fmt: skip
-POINT = {"id", "readings", "mean", "residual", "radial_distortion", "redundancy", "standardized", "studentized"}
+POINT = {
+    "id",
+    "readings",
+    "mean",
+    "residual",
+    "radial_distortion",
+    "redundancy",
+    "standardized",
+    "studentized",
+}
 
 
 @pytest.fixture

@@ -17,6 +17,8 @@ from photogram.absolute_orientation.oriented import Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.adjusted import Iteration
+from photogram.arrays import names as names_of
+from photogram.arrays import number, one_of, whole_number
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 from photogram.statistics import externally_studentized, global_test
@@ -29,7 +31,6 @@ UnitVariance = Literal["estimated", "unity"]
 
 Floats = NDArray[np.float64]
 
-MOST_ITERATIONS = 1_000_000
 WEAK = 1e3
 """Condition number from which control is called weak."""
 WEAKNESS = {
@@ -114,8 +115,9 @@ def orient(
     KeyboardInterrupt
         Ctrl-C.
     """
-    start = start or ("auto" if method == "rigorous" else "report")
-    rejected = _rejected(reject)
+    one_of("method", method, get_args(Method))
+    start = ("auto" if method == "rigorous" else "report") if start is None else start
+    rejected = tuple(names_of("reject", reject))
     _check_options(stations, method, start, rejected, unit_variance, max_iterations, tolerance, trace)
     used = stations.held & ~np.isin(np.array(stations.ids, dtype=object), rejected)[:, np.newaxis]
     rows = np.flatnonzero(used.any(axis=1))
@@ -211,13 +213,6 @@ def _in_a_plane(model: Floats, rms: float, size: float) -> bool:
     return len(model) <= 3 or off_plane <= IN_A_PLANE * rms + ROUNDING * size
 
 
-def _rejected(reject: Iterable[object]) -> tuple[str, ...]:
-    try:
-        return tuple(str(name) for name in reject)
-    except TypeError:
-        raise InputError(f"reject is not a list of identifiers: {reject!r}") from None
-
-
 def _parameters(former: Similarity | Orientation | None) -> _photocore.ParametersRow | None:
     if former is None:
         return None
@@ -239,18 +234,11 @@ def _check_options(
 ) -> None:
     if not isinstance(stations, Stations):
         raise InputError(f"stations are given as Stations, not as {type(stations).__name__}")
-    for name, value, choices in (
-        ("method", method, get_args(Method)),
-        ("start", start, get_args(Start)),
-        ("unit_variance", unit_variance, get_args(UnitVariance)),
-    ):
-        if value not in choices:
-            raise InputError(f"{name} is one of {', '.join(choices)}, not {value!r}")
-    if not isinstance(max_iterations, int) or not 1 <= max_iterations <= MOST_ITERATIONS:
-        raise InputError(
-            f"max_iterations is a whole number from 1 to {MOST_ITERATIONS}, not {max_iterations!r}"
-        )
-    if not isinstance(tolerance, int | float) or not 0 < tolerance < math.inf:
+    one_of("start", start, get_args(Start))
+    one_of("unit_variance", unit_variance, get_args(UnitVariance))
+    if whole_number("max_iterations", max_iterations) < 1:
+        raise InputError("there must be one iteration at least")
+    if not 0 < number("tolerance", tolerance) < math.inf:
         raise InputError(f"the criterion of convergence must be positive, not {tolerance!r}")
     if trace and method == "rigorous":
         raise InputError("only the report's methods, 'report' and 'fill-in', have cycles to trace")

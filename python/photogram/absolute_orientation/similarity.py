@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.absolute_orientation.stations import numbers
-from photogram.arrays import shaped
+from photogram.arrays import number, shaped
 from photogram.errors import InputError
 from photogram.geometry import rotation_angles
 
@@ -107,10 +108,10 @@ class Similarity:
             number or not finite.
         """
         a, b = shaped("rotation", rotation, (3, 3)), shaped("translation", translation, (3,))
-        scale, deviation_factor = _number("scale", scale), _number("deviation_factor", deviation_factor)
+        scale, deviation_factor = number("scale", scale), number("deviation_factor", deviation_factor)
         if not (np.abs(a @ a.T - np.eye(3)).max() < ORTHOGONAL and np.linalg.det(a) > 0):
             raise InputError("the nine direction cosines do not make a rotation")
-        if not (scale > 0 and deviation_factor > 0):
+        if not (0 < scale < math.inf and 0 < deviation_factor < math.inf):
             raise InputError("a similarity needs a positive scale and a positive factor of deviations")
         centre, model = (
             shaped(name, value, (3,))
@@ -221,20 +222,8 @@ def _is_covariance(matrix: Floats) -> bool:
 
 
 def _rows(name: str, values: ArrayLike) -> Floats:
-    """Return an array (n, 3); what is masked is NaN."""
+    """Return an array (n, 3)."""
     array = numbers(name, values)
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f"{name} has the shape {array.shape}, not (n, 3)")
     return array
-
-
-def _number(name: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise InputError(f"{name} is not a number: {value!r}")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = np.inf
-    if not np.isfinite(number):
-        raise InputError(f"{name} is not a finite number: {value!r}")
-    return number

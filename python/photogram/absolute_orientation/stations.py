@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from photogram.arrays import names, shaped, text
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,8 +44,7 @@ class Stations:
     ids
         (n,) identifiers, each once.
     control
-        (n, 3) control coordinates X, Y, Z in ground units; NaN, or masked, where unknown. Each counts by
-        itself.
+        (n, 3) control coordinates X, Y, Z in ground units; NaN where unknown. Each counts by itself.
     model
         (n, 3) model coordinates x, y, z in model units.
     control_sd
@@ -83,15 +83,15 @@ class Stations:
         ground_unit: str = "ground unit",
         model_unit: str = "model unit",
     ) -> None:
-        names = _names(ids)
+        found = names("ids", ids)
         put = object.__setattr__  # the dataclass is frozen
-        put(self, "ids", names)
-        put(self, "control", _table("control", control, len(names)))
-        put(self, "model", _table("model", model, len(names)))
-        put(self, "control_sd", _table("control_sd", control_sd, len(names)))
-        put(self, "model_sd", None if model_sd is None else _table("model_sd", model_sd, len(names)))
-        put(self, "ground_unit", ground_unit)
-        put(self, "model_unit", model_unit)
+        put(self, "ids", tuple(found))
+        put(self, "control", _table("control", control, len(found)))
+        put(self, "model", _table("model", model, len(found)))
+        put(self, "control_sd", _table("control_sd", control_sd, len(found)))
+        put(self, "model_sd", None if model_sd is None else _table("model_sd", model_sd, len(found)))
+        put(self, "ground_unit", text("ground_unit", ground_unit))
+        put(self, "model_unit", text("model_unit", model_unit))
         self._check()
 
     @classmethod
@@ -163,28 +163,19 @@ class Stations:
             raise InputError(f"station {self.ids[int(np.flatnonzero(faulty.any(axis=1))[0])]} {text}")
 
 
-def _names(ids: Iterable[object]) -> tuple[str, ...]:
-    try:
-        names = tuple(str(name) for name in ids)
-    except TypeError:
-        raise InputError(f"ids is not a list of identifiers: {ids!r}") from None
-    if odd := [name for name in names if not name.isprintable()]:
-        raise InputError(f"the identifier {odd[0]!r} holds a character that does not print")
-    return names
-
-
 def numbers(name: str, values: ArrayLike) -> Floats:
-    """Return an array of numbers; what is masked is NaN.
+    """Return an array of numbers of any shape.
 
     Raises
     ------
     InputError
-        What is no number; the message names the argument.
+        What is no number, or masked; the message names the argument.
     """
     try:
-        return np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} is not an array of numbers: {error}") from None
+        shape = np.shape(values)
+    except ValueError:
+        raise InputError(f"{name} is not an array of numbers: its rows are of different lengths") from None
+    return shaped(name, values, shape)
 
 
 def _table(name: str, values: ArrayLike, count: int) -> Floats:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
-from photogram.arrays import shaped
+from photogram.arrays import one_of, shaped
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.geometry import rotation_matrix
 from photogram.messages import Message, listed
@@ -196,8 +196,7 @@ def determine(
 
 def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats:
     """Return weights of the points, 1 in the mean."""
-    if weights not in get_args(Weights):
-        raise InputError(f"weights is one of {', '.join(get_args(Weights))}, not {weights!r}")
+    one_of("weights", weights, get_args(Weights))
     if model_sd is not None:
         variance = shaped("model_sd", model_sd, (len(grid.ids),)) ** 2
     elif weights == "deviations":
