@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from photogram import arrays
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class Stations:
         ground_unit: str = "ground unit",
         model_unit: str = "model unit",
     ) -> None:
-        names = tuple(str(name) for name in ids)
+        names = tuple(arrays.names("ids", ids))
         put = object.__setattr__  # the dataclass is frozen
         put(self, "ids", names)
         put(self, "control", _table("control", control, len(names)))
@@ -155,7 +156,7 @@ class Stations:
 
 
 def _table(name: str, values: ArrayLike, count: int) -> Floats:
-    array = np.array(values, dtype=np.float64)
+    array = arrays.numbers(name, values, missing=name == "control")
     if array.ndim == 2 and array.shape != (count, 3):
         raise InputError(f"{name} has the shape {array.shape}, not ({count}, 3)")
     try:
