@@ -54,7 +54,10 @@ impl Block {
         let length = |value: f64| angle * distance.unwrap_or(f64::INFINITY) < rounding(value).max(SMALLEST);
         let position = |coordinates: Vector3| self.space.cartesian(coordinates).into_iter().any(length);
         self.refuse(
-            |photo| position(photo.position) || photo.attitude.iter().any(|&value| angle < rounding(value).max(SMALLEST)),
+            |photo| {
+                position(photo.position)
+                    || photo.attitude.iter().any(|&value| angle < rounding(value).max(SMALLEST))
+            },
             |point| point.held() == [true; 3] && position(point.coordinates),
         )
     }
