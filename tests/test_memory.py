@@ -126,7 +126,7 @@ def test_a_collection_that_does_not_fit_is_refused(monkeypatch):
     collection = simulate_collection(photos=4, points=20).collection
     # The function has the name of its module.
     monkeypatch.setattr(sys.modules["photogram.collection.adjust"], "available_memory", lambda: 1 << 20)
-    with pytest.raises(OutOfMemoryError, match="of memory, and 1.0 MiB are free"):
+    with pytest.raises(OutOfMemoryError, match=r"of memory, and 1\.0 MiB are free"):
         adjust_collection(collection)
 
 

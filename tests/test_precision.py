@@ -13,7 +13,15 @@ BLOCK = simulate(strips=2, photos_per_strip=5, position_sd=30.0, attitude_sd=0.0
 def with_position(value, **changes):
     positions = BLOCK.photo_positions.copy()
     positions[3, 0] = value
-    return BLOCK.replace(photo_positions=positions, **changes)
+    return BLOCK.replace(photo_positions=positions, photo_positions_observed=positions, **changes)
+
+
+def shifted(offset):
+    return BLOCK.replace(
+        photo_positions=BLOCK.photo_positions + offset,
+        photo_positions_observed=BLOCK.photo_positions_observed + offset,
+        point_positions=BLOCK.point_positions + offset,
+    )
 
 
 @pytest.mark.parametrize("value", [1e308, 1e101, 1e18, -1e18])
@@ -26,7 +34,7 @@ def test_a_position_too_large_for_double_precision_is_named(value, sd):
 
 
 def test_a_wrong_position_does_not_swamp_the_others():
-    """What a photo far off contradicts shows in the sum of squares; the rounding of the others does not take it."""
+    """What a photo far off contradicts shows in the sum of squares; rounding does not take it."""
     sds = BLOCK.photo_position_sd.copy()
     sds[3] = 0.0
     result = adjust(with_position(1e9, photo_position_sd=sds))
@@ -36,9 +44,7 @@ def test_a_wrong_position_does_not_swamp_the_others():
 
 @pytest.mark.parametrize("offset", [1e7, 1e10])
 def test_large_coordinates_give_the_same_digits(offset):
-    moved = BLOCK.replace(
-        photo_positions=BLOCK.photo_positions + offset, point_positions=BLOCK.point_positions + offset
-    )
+    moved = shifted(offset)
     expected, result = adjust(BLOCK), adjust(moved)
     rounding = np.spacing(offset)
     np.testing.assert_allclose(
@@ -48,11 +54,8 @@ def test_large_coordinates_give_the_same_digits(offset):
 
 
 def test_all_coordinates_too_large_are_named():
-    moved = BLOCK.replace(
-        photo_positions=BLOCK.photo_positions + 1e17, point_positions=BLOCK.point_positions + 1e17
-    )
     with pytest.raises(AdjustmentError, match="count from an origin nearby"):
-        adjust(moved)
+        adjust(shifted(1e17))
 
 
 def test_a_standard_deviation_below_rounding_is_refused_and_zero_is_not():
@@ -79,7 +82,9 @@ def test_points_behind_cameras_are_named(sign):
     attitudes[2, 0] += np.pi
     upward = block.replace(
         photo_positions=seen.photo_positions,
+        photo_positions_observed=seen.photo_positions,
         photo_attitudes=attitudes,
+        photo_attitudes_observed=attitudes,
         photo_position_sd=np.array(0.0),
         photo_attitude_sd=np.array(0.0),
         point_positions=seen.point_positions,
@@ -98,7 +103,7 @@ def test_stations_on_a_line_end_with_the_unknowns_named(bend):
     if bend is not None:
         positions = block.photo_positions.copy()
         positions[:, 1:] = [[0, 4500], [bend, 4500], [0, 4500]]
-        block = block.replace(photo_positions=positions)
+        block = block.replace(photo_positions=positions, photo_positions_observed=positions)
     result = adjust(block, max_iterations=5000)
     assert result.converged
     assert len(result.iterations) < 30

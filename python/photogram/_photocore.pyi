@@ -244,7 +244,7 @@ class BlockError(Exception):
     """A block that cannot be adjusted.
 
     `args` is (kind, message, photos, points): kind is `undetermined points`, `undetermined photos`, `no
-    intersection`, `not finite`, `empty` or `input`; photos is a list of photo indices for each undetermined
+    intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or `input`; photos is a list of photo indices for each undetermined
     combination of unknowns, points a list of point indices.
     """
 
@@ -415,7 +415,7 @@ class BlockSolution:
 
     @property
     def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
-        """What the adjusted values leave undetermined, as in a :class:`BlockError`: then there are no cofactors.
+        """What the adjusted values leave undetermined, as in a :class:`BlockError`: there are no cofactors.
 
         None where everything is determined.
         """

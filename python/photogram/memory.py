@@ -28,7 +28,7 @@ limit of a group and with what it uses, and what of that the kernel gives back w
 
 
 def available_memory(root: Path = Path("/")) -> int | None:
-    """Return the bytes that this process can still take without swapping; None where the system does not tell.
+    """Return the bytes that this process can still take without swapping; None where nothing tells.
 
     The least of what Linux says is available, of what the control group of the process (a container) and
     the groups around it may still take, and of what the limits of the process (`ulimit -v`, `ulimit -d`)
@@ -97,7 +97,7 @@ def _groups(root: Path) -> Iterator[int]:
         for controller, tree, limit, usage, spare in GROUPS:
             if controller not in controllers.split(","):
                 continue
-            # In a container the tree may begin at the group itself, whose path is that of the host or leads up.
+            # In a container the tree may begin at the group itself, and its path be that of the host.
             group = root / tree / ("" if ".." in path else path.strip("/"))
             for place in (group, *group.parents):
                 yield from _group(place, limit, usage, spare)

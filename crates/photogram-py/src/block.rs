@@ -175,7 +175,11 @@ pub fn watched<T: Send, E: Send>(
     match raised {
         Some(error) => Err(error),
         None if done.is_err() && memory::failed() => Err(memory::failure()),
-        None => Ok(done),
+        None => {
+            // What is made of the result needs a reserve again.
+            memory::arm()?;
+            Ok(done)
+        }
     }
 }
 
