@@ -17,13 +17,13 @@ WRONG = 60
 
 
 def with_point():
-    """Add a point on two photos that the second sees exactly in the direction of the first: it is to stand there."""
+    """Add a point on two photos one of which sees it at the station of the other: it is to go there."""
     collection = SOUND
     photos = adjust(collection, tolerance=1e-14).photo_parameters
     station = -rotation(photos[0, :3]).T @ photos[0, 3:6]
     seen = _photocore.bundler_images(photos[[4]], station[np.newaxis])
     return collection.replace(
-        point_positions=np.vstack([collection.point_positions, station + [0.0, 0.5, 0.0]]),
+        point_positions=np.vstack([collection.point_positions, station + np.array([0.0, 0.5, 0.0])]),
         point_sd=np.vstack([collection.point_sd, np.full((1, 3), np.inf)]),
         image_photos=np.append(collection.image_photos, [0, 4]),
         image_points=np.append(collection.image_points, [WRONG, WRONG]),
