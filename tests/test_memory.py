@@ -159,3 +159,22 @@ def test_absurd_numbers_of_threads(small_block):
     for threads in (2.5, 2**70):
         with pytest.raises(InputError, match="threads is not a whole number"):
             adjust(small_block, threads=threads)
+
+
+def test_a_limit_of_addresses_is_divided_among_fewer_threads(machine, monkeypatch, tmp_path):
+    """Products of matrices take twice the cache for each thread, and cannot be refused."""
+    cache = {"sys/devices/system/cpu/cpu0/cache/index3/size": "32768K\n"}
+    own = (64 << 20) + memory.STACK
+    limit = 8 * own
+    monkeypatch.setattr(
+        resource,
+        "getrlimit",
+        lambda kind: (limit if kind == resource.RLIMIT_AS else resource.RLIM_INFINITY, 0),
+    )
+    machine({**cache, "proc/self/statm": "0 0 0 0 0 0 0"})
+    assert memory.addresses_of_a_thread(tmp_path) == own
+    assert memory.threads_that_fit(100, tmp_path) == 3
+    assert memory.threads_that_fit(2, tmp_path) == 2
+    limit = own // 2
+    assert memory.threads_that_fit(4, tmp_path) == 1
+    assert memory.available_memory(tmp_path) == 0

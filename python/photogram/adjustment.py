@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,7 +16,7 @@ from photogram.arrays import number, one_of, whole_number
 from photogram.block import Block, checked
 from photogram.ends import behind, undetermined
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
-from photogram.memory import available_memory, turned
+from photogram.memory import available_memory, threads_that_fit, turned
 from photogram.messages import Message, listed
 from photogram.refracted import check_cameras, remarks
 from photogram.result import Result
@@ -27,8 +28,6 @@ UnitVariance = Literal["free", "constrained", "unity"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 
 
-MOST_THREADS = 2**16
-"""More are as many: the core takes four for each processor at the most."""
 NOTABLE_RISE = 1e-3
 """Percent; less is rounding."""
 
@@ -253,10 +252,10 @@ def core_threads(threads: int | None) -> int:
         It is no number, or not positive.
     """
     if threads is None:
-        return 0
+        return threads_that_fit(os.cpu_count() or 1)
     if whole_number("threads", threads) < 1:
         raise InputError(f"threads must be positive, not {threads}")
-    return min(threads, MOST_THREADS)
+    return threads_that_fit(min(threads, 4 * (os.cpu_count() or 1)))
 
 
 def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
