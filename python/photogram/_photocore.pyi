@@ -22,6 +22,72 @@ RefractionRow = tuple[str | None, str | None, float, float, float]
 
 __version__: str
 
+def chi_square(x: float, dof: float, *, upper: bool = True) -> float:
+    """Probability that a chi-square variable exceeds `x`, or is less than it.
+
+    Parameters
+    ----------
+    x
+        Not negative.
+    dof
+        Degrees of freedom, positive, not necessarily whole.
+    upper
+        Whether the probability of larger values is meant, or that of smaller ones.
+
+    Returns
+    -------
+    NaN for arguments outside these ranges.
+    """
+
+def chi_square_quantile(probability: float, dof: float, *, upper: bool = True) -> float:
+    """Return the value that a chi-square variable exceeds (`upper`), or falls short of, with a probability.
+
+    Parameters
+    ----------
+    probability
+        Between 0 and 1; small ones keep their digits on either side.
+    dof
+        Degrees of freedom, positive, not necessarily whole.
+    upper
+        The side on which the probability lies.
+
+    Returns
+    -------
+    NaN for arguments outside these ranges.
+    """
+
+def student(t: float, dof: float) -> float:
+    """Probability that the absolute value of Student's variable exceeds that of `t`.
+
+    Returns
+    -------
+    NaN for arguments that cannot be.
+    """
+
+def student_limit(probability: float, dof: float) -> float:
+    """Return the value that the absolute value of Student's variable exceeds with a probability.
+
+    Returns
+    -------
+    NaN for arguments that cannot be.
+    """
+
+def fisher(x: float, first: float, second: float) -> float:
+    """Probability that Fisher's variable of `first` and `second` degrees of freedom exceeds `x`.
+
+    Returns
+    -------
+    NaN for arguments that cannot be.
+    """
+
+def fisher_limit(probability: float, first: float, second: float) -> float:
+    """Return the value that Fisher's variable of two degrees of freedom exceeds with a probability.
+
+    Returns
+    -------
+    NaN for arguments that cannot be.
+    """
+
 def rotation_matrix(angles: _Floats) -> _Floats:
     """Rotation matrices M = M_kappa M_phi M_omega.
 
@@ -185,6 +251,8 @@ class BlockError(Exception):
 def adjust_block(
     photo_positions: _Floats,
     photo_attitudes: _Floats,
+    photo_positions_observed: _Floats,
+    photo_attitudes_observed: _Floats,
     photo_position_sd: _Floats,
     photo_attitude_sd: _Floats,
     principal_distances: _Floats,
@@ -216,9 +284,12 @@ def adjust_block(
 
     Parameters
     ----------
-    photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd
-        (P, 3) initial (and, where weighted, observed) values and their standard deviations; omega, phi, kappa
-        in radians.
+    photo_positions, photo_attitudes
+        (P, 3) initial values, at which fixed components stay; omega, phi, kappa in radians.
+    photo_positions_observed, photo_attitudes_observed
+        (P, 3) observed values where weighted; angles may differ from initial ones by whole turns.
+    photo_position_sd, photo_attitude_sd
+        (P, 3) standard deviations of the observed values.
     principal_distances
         (P,) millimetres, signed.
     point_positions, point_sd
@@ -648,6 +719,11 @@ x - c_x = s A (X - c_X) + t."""
 ParametersRow = tuple[float, _Matrix, _Vector]
 """Scale s, rotation A (3 x 3), translation B of the similarity x = s A X + B."""
 
+TraceRow = tuple[_Matrix, tuple[list[tuple[int, int]], _Floats], _Floats, _Floats, list[float], list[float]]
+"""One cycle of the bulletin: rotation A as it began; (station, component) and (m, 8) P-values of equations;
+normal equations C (7, 8); auxiliary table D (7, 8); seven results; corrected omega, phi, kappa, s, b1, b2,
+b3."""
+
 class SimilarityError(Exception):
     """A model that cannot be oriented.
 
@@ -667,6 +743,7 @@ def orient_model(
     max_iterations: int,
     tolerance: float,
     threads: int,
+    trace: bool,
 ) -> SimilaritySolution:
     """Find the similarity x = s A X + B between control X and model x (C&GS Technical Bulletin 19).
 
@@ -676,7 +753,8 @@ def orient_model(
         (n, 3) ground units: coordinates, NaN where unknown, and standard deviations, zero for an exact one,
         infinite for one that takes no part.
     model, model_sd
-        (n, 3) model units: coordinates and their standard deviations, positive.
+        (n, 3) model units: coordinates and their standard deviations; zero where those of the control are
+        positive.
     method
         `rigorous`, `report` or `fill-in`.
     start
@@ -689,6 +767,8 @@ def orient_model(
         Fraction of its standard deviation by which no unknown changes any more (rigorous method).
     threads
         Number of threads; 0 for all processors.
+    trace
+        Whether the report's methods keep what each cycle computed on its way.
 
     Raises
     ------
@@ -729,6 +809,10 @@ class SimilaritySolution:
     @property
     def cycles(self) -> list[float] | None:
         """Largest correction of an angle (rad) in each cycle of the report's methods, else None."""
+
+    @property
+    def traces(self) -> list[TraceRow]:
+        """What each of these cycles computed on its way, where it was asked for."""
 
     @property
     def tangent_cofactors(self) -> _Floats:
