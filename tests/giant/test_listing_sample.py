@@ -386,6 +386,9 @@ def test_section_10_corrections_of_control():
     counts = re.findall(r"NUMBER OF COMPONENTS = (\d+) RMS", text)
     expected = SUMMARY["control_correction_counts"]
     assert counts[:3] == [str(expected[name]) for name in ("lon", "lat", "elev")]
+    assert counts[3:] == []
+    ours = correction_pages(GEOGRAPHIC, names, corrections, held, as_published=False)
+    counts = re.findall(r"NUMBER OF COMPONENTS = (\d+) RMS", "\n".join(squeezed(ours)))
     assert counts[3:] == ["10", "10", "12"]
 
 
