@@ -619,7 +619,7 @@ WORDS_OF_THE_SAMPLE = {*(DATA / "words_of_the_sample.txt").read_text().split()}
 
 
 @pytest.mark.parametrize("propagation", [False, True])
-def test_section_10_as_published_no_line_is_ours(example, adjusted, propagation):
+def test_as_published_no_line_of_the_listing_is_ours(example, adjusted, propagation):
     block, result = adjusted
     project = changed(example, error_propagation=propagation)
 
