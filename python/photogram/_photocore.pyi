@@ -22,6 +22,72 @@ RefractionRow = tuple[str | None, str | None, float, float, float]
 
 __version__: str
 
+def chi_square(x: float, dof: float, *, upper: bool = True) -> float:
+    """Probability that a chi-square variable exceeds `x`, or is less than it.
+
+    Parameters
+    ----------
+    x
+        Not negative.
+    dof
+        Degrees of freedom, positive, not necessarily whole.
+    upper
+        Whether the probability of larger values is meant, or that of smaller ones.
+
+    Returns
+    -------
+    NaN for arguments outside these ranges.
+    """
+
+def chi_square_quantile(probability: float, dof: float, *, upper: bool = True) -> float:
+    """Return the value that a chi-square variable exceeds (`upper`), or falls short of, with a probability.
+
+    Parameters
+    ----------
+    probability
+        Between 0 and 1; small ones keep their digits on either side.
+    dof
+        Degrees of freedom, positive, not necessarily whole.
+    upper
+        The side on which the probability lies.
+
+    Returns
+    -------
+    NaN for arguments outside these ranges.
+    """
+
+def student(t: float, dof: float) -> float:
+    """Probability that the absolute value of Student's variable exceeds that of `t`.
+
+    Returns
+    -------
+    NaN for arguments that cannot be.
+    """
+
+def student_limit(probability: float, dof: float) -> float:
+    """Return the value that the absolute value of Student's variable exceeds with a probability.
+
+    Returns
+    -------
+    NaN for arguments that cannot be.
+    """
+
+def fisher(x: float, first: float, second: float) -> float:
+    """Probability that Fisher's variable of `first` and `second` degrees of freedom exceeds `x`.
+
+    Returns
+    -------
+    NaN for arguments that cannot be.
+    """
+
+def fisher_limit(probability: float, first: float, second: float) -> float:
+    """Return the value that Fisher's variable of two degrees of freedom exceeds with a probability.
+
+    Returns
+    -------
+    NaN for arguments that cannot be.
+    """
+
 def rotation_matrix(angles: _Floats) -> _Floats:
     """Rotation matrices M = M_kappa M_phi M_omega.
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from photogram import _photocore
 from photogram.messages import Message
+from photogram.statistics import GlobalTest
 
 __all__ = ["Section", "composed", "headline", "problems"]
 
@@ -24,9 +25,19 @@ def composed(head: str, sections: Iterable[Section]) -> str:
     return "\n\n".join([head, *parts]) + "\n"
 
 
-def problems(messages: Sequence[Message], status: str, variance_of_unit_weight: float | None) -> list[str]:
-    """Return what keeps a reader from using the values of an adjustment, or should make them careful."""
+def problems(
+    messages: Sequence[Message],
+    status: str,
+    variance_of_unit_weight: float | None,
+    test: GlobalTest | None = None,
+) -> list[str]:
+    """Return what keeps a reader from using the values of an adjustment, or should make them careful.
+
+    The gravest first: no convergence, then a failed global test.
+    """
     found = [str(message) for message in messages]
+    if test is not None and (failed := test.problem()):
+        found.insert(0, failed)
     if status != "converged":
         found.insert(0, f"the adjustment has {status}: do not use these values")
     if variance_of_unit_weight is None:

@@ -4,6 +4,7 @@ mod arrays;
 mod block;
 mod collection;
 mod comparator;
+mod distributions;
 mod geometry;
 mod options;
 mod resection;
@@ -16,6 +17,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    distributions::register(module)?;
     geometry::register(module)?;
     block::register(module)?;
     collection::register(module)?;

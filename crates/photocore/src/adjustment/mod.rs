@@ -4,6 +4,7 @@
 //! deviation of every observation and of every unknown, from free (infinite) to fixed (zero). [`adjust`] iterates to the
 //! least-squares solution and computes the cofactors of all unknowns and the redundancy numbers of all observations.
 
+mod distributions;
 mod loss;
 mod options;
 mod problem;
@@ -15,6 +16,9 @@ mod strict;
 mod trust_region;
 mod walk;
 
+pub use distributions::{
+    Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
+};
 pub use loss::Loss;
 pub use options::{Criterion, Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Problem};

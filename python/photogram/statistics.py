@@ -1,0 +1,183 @@
+"""Tests of an adjustment as a whole, and of its observations: the same limits for every program.
+
+Observations l with standard deviations sd leave residuals v; Omega is the sum of (v / sd)^2, f the degrees of
+freedom, r the redundancy number of an observation, and w = v / (sd sqrt(r)) its standardized residual.
+
+* Global test: where the standard deviations are right, Omega is chi-square with f degrees of freedom.
+* A single residual, unit weight known: w is standard normal (Baarda 1968).
+* A single residual, unit weight estimated from the same residuals: the internally studentized tau = w / s,
+  s^2 = Omega / f, never exceeds the root of f, so no fixed limit serves. The externally studentized
+  t = w / s(i), with the unit weight s(i)^2 = (Omega - w^2) / (f - 1) of the other observations, has Student's
+  distribution with f - 1 degrees of freedom; testing it is Pope's test of tau (NOAA Technical Report NOS 65
+  NGS 1, 1976).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram import _photocore
+
+__all__ = ["GlobalTest", "externally_studentized", "global_test", "normal_limit", "studentized_limit"]
+
+NOTABLE_FACTOR = 1.25
+"""With many degrees of freedom the test finds disagreements that harm nobody: residuals larger than the
+standard deviations allow by less than this are no problem."""
+
+
+@dataclass(frozen=True)
+class GlobalTest:
+    """The test of all residuals together against their standard deviations (chi-square, both sides).
+
+    Attributes
+    ----------
+    weighted_sum_of_squares, degrees_of_freedom
+        Omega and f.
+    level
+        Probability that right standard deviations are rejected, half of it on each side.
+    limits
+        Lower and upper limit of the variance of unit weight, Omega / f.
+    probability_below, probability_above
+        Of a sum as small as this, and of one as large, where the standard deviations are right.
+    """
+
+    weighted_sum_of_squares: float
+    degrees_of_freedom: float
+    level: float
+    limits: tuple[float, float]
+    probability_below: float
+    probability_above: float
+
+    @property
+    def variance(self) -> float:
+        """Variance of unit weight, Omega / f."""
+        return self.weighted_sum_of_squares / self.degrees_of_freedom
+
+    @property
+    def factor(self) -> float:
+        """By how much residuals are larger than expected: the root of the variance."""
+        return math.sqrt(self.variance)
+
+    @property
+    def rejected_high(self) -> bool:
+        """Whether residuals are larger than the standard deviations allow, or no numbers."""
+        return not self.probability_above >= self.level / 2
+
+    @property
+    def rejected_low(self) -> bool:
+        """Whether residuals are smaller than the standard deviations allow."""
+        return self.probability_below < self.level / 2
+
+    @property
+    def probability(self) -> float:
+        """Of a sum as far out as this, on either side, where the standard deviations are right."""
+        return min(1.0, 2 * min(self.probability_below, self.probability_above))
+
+    def problem(self) -> str | None:
+        """Return a sentence for the report when residuals are too large by a factor that matters."""
+        if not self.rejected_high or self.factor <= NOTABLE_FACTOR:
+            return None
+        return (
+            f"the global test fails: residuals are {self.factor:.3g} times larger than their standard"
+            f" deviations allow (variance of unit weight {self.variance:.4g},"
+            f" expected {self.limits[0]:.3g} to {self.limits[1]:.3g}; level {100 * self.level:g} percent)"
+        )
+
+
+def global_test(
+    weighted_sum_of_squares: float, degrees_of_freedom: float, level: float = 0.05
+) -> GlobalTest | None:
+    """Test all residuals together against their standard deviations.
+
+    Parameters
+    ----------
+    weighted_sum_of_squares
+        Omega, with the standard deviations a priori.
+    degrees_of_freedom
+        f; need not be whole.
+    level
+        Probability that right standard deviations are rejected, half of it on each side.
+
+    Returns
+    -------
+    The test, or None without degrees of freedom.
+    """
+    if not degrees_of_freedom > 0:
+        return None
+    omega, f = float(weighted_sum_of_squares), float(degrees_of_freedom)
+    return GlobalTest(
+        weighted_sum_of_squares=omega,
+        degrees_of_freedom=f,
+        level=level,
+        limits=(
+            _photocore.chi_square_quantile(level / 2, f, upper=False) / f,
+            _photocore.chi_square_quantile(level / 2, f, upper=True) / f,
+        ),
+        probability_below=_photocore.chi_square(omega, f, upper=False),
+        probability_above=_photocore.chi_square(omega, f, upper=True),
+    )
+
+
+def externally_studentized(
+    standardized: ArrayLike, weighted_sum_of_squares: float, degrees_of_freedom: float
+) -> NDArray[np.float64]:
+    """Return residuals over their standard deviations, the unit weight taken from the other observations.
+
+    Parameters
+    ----------
+    standardized
+        w = v / (sd sqrt(r)), a priori unit weight, any shape.
+    weighted_sum_of_squares, degrees_of_freedom
+        Omega and f of the adjustment that left these residuals.
+
+    Returns
+    -------
+    t of the same shape: Student with f - 1 degrees of freedom. Unbounded: where an observation makes up all
+    of Omega, it is very large. NaN where w is, and everywhere with less than two degrees of freedom.
+    """
+    w = np.asarray(standardized, dtype=np.float64)
+    omega, f = float(weighted_sum_of_squares), float(degrees_of_freedom)
+    if not (f >= 2 and omega > 0):
+        return np.full(w.shape, math.nan)
+    # The difference is zero but for rounding where an observation makes up all of Omega.
+    others = np.maximum(omega - w**2, 1e-12 * omega)
+    return np.asarray(w / np.sqrt(others / (f - 1)))
+
+
+def studentized_limit(degrees_of_freedom: float, tests: int, level: float = 0.05) -> float:
+    """Return the limit that externally studentized residuals of good observations rarely exceed.
+
+    Parameters
+    ----------
+    degrees_of_freedom
+        f of the adjustment; the distribution is Student's with f - 1.
+    tests
+        Number of residuals that are tested.
+    level
+        Probability that any of them exceeds it (Bonferroni: `level / tests` for each, both sides).
+
+    Returns
+    -------
+    Infinite with less than two degrees of freedom: nothing can be tested then.
+    """
+    if degrees_of_freedom < 2:
+        return math.inf
+    return _photocore.student_limit(level / max(tests, 1), degrees_of_freedom - 1)
+
+
+def normal_limit(tests: int, level: float = 0.05) -> float:
+    """Return the limit that standardized residuals of good observations rarely exceed, unit weight known.
+
+    Parameters
+    ----------
+    tests
+        Number of residuals that are tested.
+    level
+        Probability that any of them exceeds it (Bonferroni: `level / tests` for each, both sides).
+    """
+    return -NormalDist().inv_cdf(level / max(tests, 1) / 2)
