@@ -248,8 +248,15 @@ def _plate(calibration: Calibration, result: PlateResult) -> dict[str, Any]:
             "grid": result.listed.mean_grid_um,
         },
         "random_um": list(result.listed.random_um),
-        "locations": None if averages.locations is None else averages.locations.tolist(),
-        "location_residuals_um": None if averages.location_um is None else averages.location_um.tolist(),
+        "by_location": [
+            {
+                "cases": list(place.cases),
+                "locations": place.locations.tolist(),
+                "xy_um": place.xy_um.tolist(),
+                "residuals_um": place.residuals_um.tolist(),
+            }
+            for place in averages.by_location
+        ],
     }
 
 
