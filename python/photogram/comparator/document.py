@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from photogram.comparator.calibration import Calibration, CaseResult, PlateResult
     from photogram.comparator.closeout import Closeout
     from photogram.comparator.joint import JointFit
-    from photogram.comparator.pointing import PointReadings, Precision
+    from photogram.comparator.pointing import Ellipse, PointReadings, Precision
     from photogram.comparator.residuals import Residuals
     from photogram.comparator.rigid import RigidFit
 
@@ -194,7 +194,15 @@ def _precision(precision: Precision) -> dict[str, Any]:
         "correlation_percent": precision.listed_correlation_percent,
         "sd_mean_um": list(precision.mean_sd_um),
         "sd_mean_point_um": precision.mean_sd_point_um,
-        "ellipse": None if math.isnan(precision.sd_point_um) else asdict(precision.ellipse),
+        "ellipse": None if math.isnan(precision.sd_point_um) else _ellipse(precision.ellipse),
+    }
+
+
+def _ellipse(ellipse: Ellipse) -> dict[str, float]:
+    return {
+        "major_um": ellipse.major_um,
+        "minor_um": ellipse.minor_um,
+        "angle_rad": ellipse.angle_rad,
     }
 
 

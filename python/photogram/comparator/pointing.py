@@ -195,21 +195,20 @@ def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> P
     readings = list(points)
     total = sum(point.count for point in readings)
     dof = total - len(readings) if listed_dof is None else listed_dof
-    squares = np.array([point.squares_um2 for point in readings]).reshape(-1, 2)
-    counts = np.array([point.count for point in readings])[:, np.newaxis]
 
-    def mean(values: Floats) -> tuple[float, float]:
-        x, y = values.sum(axis=0) / dof if dof > 0 else (math.nan, math.nan)
-        return float(x), float(y)
+    def mean(values: Iterable[float]) -> float:
+        return math.fsum(values) / dof if dof > 0 else math.nan
 
-    products = sum(point.products_um2 for point in readings)
     return Precision(
         readings=total,
         points=len({point.point for point in readings}),
         degrees_of_freedom=dof,
-        variance_um2=mean(squares),
-        covariance_um2=products / dof if dof > 0 else math.nan,
-        mean_variance_um2=mean(squares / counts),
+        variance_um2=(mean(p.squares_um2[0] for p in readings), mean(p.squares_um2[1] for p in readings)),
+        covariance_um2=mean(p.products_um2 for p in readings),
+        mean_variance_um2=(
+            mean(p.squares_um2[0] / p.count for p in readings),
+            mean(p.squares_um2[1] / p.count for p in readings),
+        ),
     )
 
 
