@@ -35,7 +35,10 @@ CONVENTIONS = {
     "variance_components_um": "standard deviations",
     "correlation_percent": "as the listing: 100 where one coordinate does not vary (correlation: null)",
     "correction": "linear parameters and polynomials; covariance of scale_x, scale_y, nonorthogonality_rad,"
-    " nine coefficients of x, nine of y (micrometres, arguments (x - centre) / half range)",
+    " nine coefficients of x, nine of y (micrometres, arguments (x - centre) / half range); null where"
+    " outliers make it unusable",
+    "screening": "measured points that do not agree with the adjustment of the others; off_um: measured less"
+    " expected; change_um: what they change corrected coordinates by",
 }
 
 
@@ -59,6 +62,9 @@ def to_document(calibration: Calibration) -> dict[str, Any]:
         "options": asdict(calibration.options),
         "conventions": CONVENTIONS,
         "messages": [str(message) for message in calibration.messages],
+        "usable": calibration.usable,
+        "screening": asdict(calibration.screening),
+        "far_pointings": [asdict(pointing) for pointing in calibration.far_pointings],
         "linear": {
             "scale_x": linear.correction.scale_x,
             "scale_y": linear.correction.scale_y,
@@ -79,9 +85,9 @@ def to_document(calibration: Calibration) -> dict[str, Any]:
         "variance_components_um": calibration.variance.components_um,
         "variance_analysis_um": _variance(calibration),
         "case_variances": asdict(calibration.case_test) if calibration.case_test else None,
-        "joint": _joint(calibration.joint) if calibration.joint else None,
+        "joint": _joint(calibration.joint, usable=calibration.usable) if calibration.joint else None,
         "joint_check_sd": calibration.joint_check,
-        "correction": calibration.correction.document(),
+        "correction": calibration.correction.document() if calibration.usable else None,
     }
 
 
@@ -284,7 +290,7 @@ def _variance(calibration: Calibration) -> dict[str, Any]:
     return {**document, "negative": list(variance.negative)}
 
 
-def _joint(joint: JointFit) -> dict[str, Any]:
+def _joint(joint: JointFit, *, usable: bool) -> dict[str, Any]:
     correction = joint.correction
     return {
         "scale_x": correction.scale_x,
@@ -313,8 +319,9 @@ def _joint(joint: JointFit) -> dict[str, Any]:
                 "sigma_um": plate.sigma_um,
                 "sigma_estimated": plate.estimated,
                 "variance_ratio": plate.variance_ratio,
+                "test": asdict(plate.test) if plate.test else None,
             }
             for number, plate in joint.plates.items()
         ],
-        "correction": correction.document(),
+        "correction": correction.document() if usable else None,
     }

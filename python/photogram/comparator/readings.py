@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Integers = NDArray[np.int64]
 
-__all__ = ["Case", "Reading", "Session", "collect_cases"]
+__all__ = ["LARGEST_UM", "Case", "Reading", "Session", "collect_cases"]
 
 FURTHEST_UM = 1000.0
 """A reading this far from the others on its point was taken on another point, or is in another unit."""
@@ -29,6 +29,12 @@ FURTHEST_UM = 1000.0
 
 LARGEST_UM = 1e8
 """A hundred metres: larger coordinates are no measurements, and their powers would overflow."""
+
+
+CENTRE_UM = 125_000.0
+"""Middle of the range of most comparators (TRANS)."""
+CENTRES_UM = {10: 1_000_000.0, 11: 1_500_000.0, 12: 300_000.0, 13: 300_000.0, 14: 1_000_000.0}
+"""And of those of the program with other ranges: STK1, PSK, other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,8 +161,13 @@ class Session:
     left_handed
         Whether the comparator is left-handed against the plate; None where nothing is said. The measurements
         decide; what they contradict is an error.
-    sorted_input, least_count_one_micrometre, plot_each_case
+    sorted_input, least_count_one_micrometre
         Options of the header that the title page repeats.
+    plot_each_case
+        Whether tables and pictures of the corrections of every case are wanted, too.
+    range_centre_um
+        Middle of the range of the comparator in x and in y (TRANS of the listing); None for that of the
+        program for this comparator.
     source
         File of the first record.
     messages
@@ -172,8 +183,18 @@ class Session:
     sorted_input: bool = False
     least_count_one_micrometre: bool = True
     plot_each_case: bool = False
+    range_centre_um: float | None = None
     source: Path | None = None
     messages: list[Message] = field(default_factory=list)
+
+    @property
+    def centre_um(self) -> float:
+        """Middle of the range of the comparator, in x and in y: of the table of corrections."""
+        if self.range_centre_um is not None:
+            return self.range_centre_um
+        if self.secondary or (self.comparator == 11 and self.least_count_one_micrometre):
+            return CENTRES_UM[10]
+        return CENTRES_UM.get(self.comparator, CENTRE_UM)
 
     def grid_of(self, case: Case) -> Grid:
         """Return the plate that a case was measured on.

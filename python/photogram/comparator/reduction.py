@@ -142,6 +142,13 @@ class Reduction:
         ).sum(axis=1)
         return np.asarray(values - np.einsum("nij,njk->nik", self.rigid, np.repeat(parts, lengths, axis=0)))
 
+    def variances(self) -> Floats:
+        """Return the diagonal of R R^T, (m, 2): what errors of variance one leave in each coordinate."""
+        inner = _product(self.right, self.right)
+        rigid = (self.rigid**2).sum(axis=2)
+        mixed = 2 * (self.left * self.right).sum(axis=2)
+        return np.asarray(1 - rigid - mixed + ((self.left @ inner) * self.left).sum(axis=2))
+
     def squares_of_units(self) -> float:
         """Sum of squares of R: what errors of readings of variance one leave."""
         left, right = _product(self.left, self.left), _product(self.right, self.right)
