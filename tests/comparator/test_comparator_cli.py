@@ -143,7 +143,7 @@ def test_strict_turns_remarks_into_errors(run, tables):
     tables[0].write_text("\n".join(line for line in lines if not line.startswith("1,1,1,0,25,")) + "\n")
     lenient = run(*tables, "--no-pictures")
     assert lenient.exit_code == 0
-    assert "remark: case 1: 1 of 25 points of plate 1 are missing" in lenient.output
+    assert "  case 1: 1 of 25 points of plate 1 are missing" in lenient.output
     strict = run(*tables, "--no-pictures", "--strict", "--out", "strict")
     assert strict.exit_code == 1
     assert not Path("strict").exists()

@@ -158,7 +158,7 @@ def test_figure_30_variances_have_the_structure_of_ours():
 
 
 def test_feature_18_correction_table_of_figure_23():
-    nodes = np.vstack(table_nodes((125_000.0, 125_000.0)))
+    nodes = np.vstack(table_nodes(125_000.0))
     expected = document("derived_reference.json")["plot_table_fig30_um"]
     assert nodes / 1e6 == pytest.approx(np.array([[row["x"], row["y"]] for row in expected]), abs=1e-9)
     values = printed_polynomial().evaluate(nodes)

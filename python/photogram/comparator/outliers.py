@@ -106,7 +106,7 @@ class Screening:
     Attributes
     ----------
     outliers
-        Case by case.
+        Case by case, point by point.
     limit
         Of the ratios, for all coordinates together at the level of 5 percent.
     change_um
@@ -196,7 +196,7 @@ def screen(
         kept = remaining
     outliers = tuple(
         _outlier(cases[k], grids[cases[k].case.plate], clean, k, point, ratio)
-        for k, point, ratio in sorted(removed, key=lambda entry: entry[0])
+        for k, point, ratio in sorted(removed)
     )
     return Screening(outliers, limit, _change(stage, clean, cases) if outliers else 0.0, clean.sigma0_um)
 

@@ -80,6 +80,7 @@ def _on_grid(
         for percent, factor in CONFIDENCE_FACTORS.items():
             _ellipses(axes, places, ellipses, factor * scale, faint=percent != LEAST)
         plain(axes, "X of the plate, mm", "Y of the plate, mm")
+        axes.margins(0.12)
         key([axes], scale, round_length(largest))
     pooled = f"pooled {total.sd_point_um:.2f} µm" if total.degrees_of_freedom > 0 else "no repeated readings"
     axes.set_title(f"{title}: {pooled}\nellipses of {LEVELS} percent; * no deviation", fontsize=10)
@@ -101,21 +102,12 @@ def pooled_ellipses(calibration: Calibration) -> Figure:
     for panel, (name, own) in zip(axes, known, strict=False):
         for percent, factor in CONFIDENCE_FACTORS.items():
             _ellipses(panel, np.zeros((1, 2)), [own.ellipse], factor, faint=percent != LEAST)
-            end = factor * own.ellipse.major_um
-            angle = own.ellipse.angle_rad
-            panel.annotate(
-                f"{percent}",
-                (end * math.cos(angle), end * math.sin(angle)),
-                fontsize=6,
-                ha="center",
-                va="center",
-            )
         panel.set_title(f"{name}: {own.sd_point_um:.3f} µm", fontsize=9, loc="left")
         plain(panel, "x, µm", "y, µm")
         panel.set_xlim(-reach, reach)
         panel.set_ylim(-reach, reach)
         panel.label_outer()
-    figure.suptitle(f"Pooled error ellipses of a pointing ({LEVELS} percent)", fontsize=11)
+    figure.suptitle(f"Pooled error ellipses of a pointing ({LEVELS} percent, from the inside out)", fontsize=11)
     return figure
 
 
