@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
+from photogram.messages import quoted
 from photogram.numbers import is_whole_number, whole_number
 
 if TYPE_CHECKING:
@@ -143,6 +144,8 @@ def find_grid(name: str) -> Grid:
     InputError
         It is neither.
     """
+    if "\0" in name:
+        raise InputError(f"grid {quoted(name)} is no name of a file")
     if is_whole_number(name) and not Path(name).exists():
         return built_in_grid(_plate_number(name))
     return read_grid(Path(name))

@@ -107,7 +107,9 @@ def pooled_ellipses(calibration: Calibration) -> Figure:
         panel.set_xlim(-reach, reach)
         panel.set_ylim(-reach, reach)
         panel.label_outer()
-    figure.suptitle(f"Pooled error ellipses of a pointing ({LEVELS} percent, from the inside out)", fontsize=11)
+    figure.suptitle(
+        f"Pooled error ellipses of a pointing ({LEVELS} percent, from the inside out)", fontsize=11
+    )
     return figure
 
 
