@@ -108,7 +108,7 @@ def pooled_ellipses(calibration: Calibration) -> Figure:
         panel.set_ylim(-reach, reach)
         panel.label_outer()
     figure.suptitle(
-        f"Pooled error ellipses of a pointing ({LEVELS} percent, from the inside out)", fontsize=11
+        f"Pooled error ellipses of a pointing ({LEVELS} percent, outward)", fontsize=11
     )
     return figure
 
