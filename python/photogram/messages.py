@@ -31,17 +31,20 @@ def quoted(text: str) -> str:
 def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
     """Put the place (file, record number, record text) before and after a message.
 
-    Of a long record the beginning is shown. Characters that do not print, which could do anything to a
-    terminal, stand there as U+FFFD, one for one.
+    Of a long record the beginning is shown. Characters that do not print stand there as U+FFFD, one for one.
     """
     place = ", ".join(
-        part for part in (str(file) if file else "", f"record {record}" if record else "") if part
+        part for part in (printable(str(file)) if file else "", f"record {record}" if record else "") if part
     )
     head = f"{place}: {message}" if place else message
     if text is None:
         return head
-    shown = "".join(character if character.isprintable() else "\ufffd" for character in shortened(text))
-    return f"{head}\n    |{shown}|"
+    return f"{head}\n    |{printable(shortened(text))}|"
+
+
+def printable(text: str) -> str:
+    """Return a text with U+FFFD for each character that does not print: no terminal should get it."""
+    return "".join(character if character.isprintable() else "\ufffd" for character in text)
 
 
 def listed(names: list[str], most: int = MOST_NAMES) -> str:

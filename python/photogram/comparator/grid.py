@@ -12,7 +12,6 @@ import numpy as np
 
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
-from photogram.messages import quoted
 from photogram.numbers import is_whole_number, whole_number
 
 if TYPE_CHECKING:
@@ -42,6 +41,8 @@ class Grid:
         Standard deviation of a calibrated coordinate; None where it is not known.
     adopted
         Date of the calibration, as text.
+    source
+        The file that it was read from.
     """
 
     number: int
@@ -49,6 +50,7 @@ class Grid:
     xy_um: Floats
     sigma_um: float | None = None
     adopted: str = ""
+    source: Path | None = None
 
     def __post_init__(self) -> None:
         """Refuse plates that cannot be."""
@@ -113,6 +115,7 @@ def read_grid(path: Path) -> Grid:
             np.array(xy, dtype=float).reshape(-1, 2),
             deviation,
             table.text("adopted"),
+            path,
         )
     except InputError as error:
         raise InputError(error.message, file=path) from None
@@ -144,8 +147,6 @@ def find_grid(name: str) -> Grid:
     InputError
         It is neither.
     """
-    if "\0" in name:
-        raise InputError(f"grid {quoted(name)} is no name of a file")
     if is_whole_number(name) and not Path(name).exists():
         return built_in_grid(_plate_number(name))
     return read_grid(Path(name))
