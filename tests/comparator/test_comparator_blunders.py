@@ -94,6 +94,18 @@ def test_a_point_that_is_off_everywhere_is_one_of_the_grid():
     assert not any("point 13: a residual" in text for text in texts(calibration))
 
 
+def test_labels_exchanged_in_every_case_are_exchanged_labels():
+    session = noisy(4)
+    for case in range(4):
+        session = exchanged_labels(session, case, 12, 14)
+    first, *named = texts(calibrate(session, QUICK))[:3]
+    assert first.startswith("outliers change")
+    head = "plate 1, point {}: off in every case in which it was measured: it lies where point {} is expected"
+    assert named[0].startswith(head.format(12, 14))
+    assert named[1].startswith(head.format(14, 12))
+    assert all(text.endswith("are labels exchanged?") for text in named)
+
+
 def test_a_pointing_ten_sigma_off_is_named_with_its_record(run, tmp_path):
     session = noisy(4)
     xy = session.cases[1].xy_um.copy()

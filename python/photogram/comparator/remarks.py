@@ -67,17 +67,15 @@ def _outliers(
     for case in cases:
         for point in case.points.tolist():
             measured.setdefault((case.case.plate, point), []).append(case.number)
-    off: dict[tuple[int, int], list[int]] = {}
+    off: dict[tuple[int, int], list[Outlier]] = {}
     for outlier in screening.outliers:
-        off.setdefault((plate_of[outlier.case], outlier.point), []).append(outlier.case)
-    everywhere = {key for key, own in off.items() if len(own) > 1 and own == measured[key]}
-    found = [
-        Message(
-            f"plate {plate}, point {point}: off in every case in which it was measured:"
-            " are its grid coordinates wrong?"
-        )
-        for plate, point in sorted(everywhere)
-    ]
+        off.setdefault((plate_of[outlier.case], outlier.point), []).append(outlier)
+    everywhere = {
+        key: own
+        for key, own in sorted(off.items())
+        if len(own) > 1 and [outlier.case for outlier in own] == measured[key]
+    }
+    found = [Message(_everywhere(plate, point, own)) for (plate, point), own in everywhere.items()]
     single = [own for own in screening.outliers if (plate_of[own.case], own.point) not in everywhere]
     found += [places[own.case, own.point].message(_outlier(own, screening.limit)) for own in _largest(single)]
     return found + _more(len(single), "points")
@@ -89,6 +87,14 @@ def _largest(found: Sequence[Found]) -> list[Found]:
 
 def _more(count: int, what: str) -> list[Message]:
     return [Message(f"{count - MOST} more {what} are off")] if count > MOST else []
+
+
+def _everywhere(plate: int, point: int, outliers: Sequence[Outlier]) -> str:
+    head = f"plate {plate}, point {point}: off in every case in which it was measured: "
+    instead = {outlier.instead for outlier in outliers}
+    if len(instead) == 1 and None not in instead:
+        return f"{head}it lies where point {instead.pop()} is expected: are labels exchanged?"
+    return f"{head}are its grid coordinates wrong?"
 
 
 def _outlier(outlier: Outlier, limit: float) -> str:

@@ -107,9 +107,7 @@ def pooled_ellipses(calibration: Calibration) -> Figure:
         panel.set_xlim(-reach, reach)
         panel.set_ylim(-reach, reach)
         panel.label_outer()
-    figure.suptitle(
-        f"Pooled error ellipses of a pointing ({LEVELS} percent, outward)", fontsize=11
-    )
+    figure.suptitle(f"Pooled error ellipses of a pointing ({LEVELS} percent, outward)", fontsize=11)
     return figure
 
 
