@@ -86,7 +86,7 @@ def average_vectors(calibration: Calibration, plate: int) -> Figure:
     averages = result.averages
     grid = calibration.session.grids[plate]
     own = grid.xy_um[grid.rows_of(averages.points)]
-    figure, axes = panels(1 + len(averages.by_location), side=4.2)
+    figure, axes = panels(1 + len(averages.by_location), side=4.2, shared=False)
     corrections = averages.corrections_um
     together = np.vstack([corrections, averages.location_um])
     scale = magnification(own / MM, together)
@@ -98,7 +98,8 @@ def average_vectors(calibration: Calibration, plate: int) -> Figure:
         arrows(panel, place.xy_um, place.residuals_um, scale)
         panel.set_title(_of_cases("by comparator location", place.cases), fontsize=9, loc="left")
         plain(panel, "x, mm", "y, mm")
-    key(axes, scale, length)
+    for panel in axes:
+        key([panel], scale, length)
     figure.suptitle(f"Average residuals of {len(averages.cases)} cases, plate {plate}", fontsize=11)
     return figure
 
