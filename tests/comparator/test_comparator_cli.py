@@ -211,6 +211,22 @@ def test_names_of_plates_that_cannot_be(run, tables, grid):
     assert isinstance(result.exception, SystemExit)
 
 
+def test_no_result_goes_over_a_plate_that_was_read(run, tables, tmp_path):
+    """The corrected plate would have the name of the given one."""
+    given = tmp_path / "grid-1.csv"
+    tables[3].rename(given)
+    before = given.read_bytes()
+    for named in (["--grid", given], []):
+        if not named:
+            first = tables[0].read_text()
+            tables[0].write_text(f"# grid = grid-1.csv\n{first}")
+        result = run(*tables[:2], *named, "--no-pictures", "--out", tmp_path)
+        assert result.exit_code == 1
+        assert isinstance(result.exception, SystemExit)
+        assert str(given) in result.stderr
+        assert given.read_bytes() == before
+
+
 def test_the_middle_of_the_range_comes_from_the_table(run, tables):
     tables[0].write_text("# range_centre_um = 130000\n" + tables[0].read_text())
     session = read(tables[:2], [read_grid(tables[3])])[0]
