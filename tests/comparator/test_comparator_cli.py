@@ -128,6 +128,13 @@ def test_bad_input_writes_nothing(run, tables, tmp_path):
     assert names(tmp_path) == before
 
 
+def test_as_published_cuts_the_sigmas_after_the_linear_fit_only(run):
+    lines = run("--example", "--as-published", "--no-pictures", "--out", "out").output.splitlines()
+    sigmas = {line[:40].strip(): line.split()[-3:] for line in lines if line.startswith("  AFTER LINEAR")}
+    assert sigmas["AFTER LINEAR CORRECTIONS"] == ["1.448", "0.923", "1.214"]
+    assert sigmas["AFTER LINEAR AND NONLINEAR CORRECTIONS"] == ["0.897", "0.897", "0.897"]
+
+
 def test_usage(run):
     for arguments in ([], ["a.csv", "--example"], ["--example", "--hand", "up"]):
         assert run(*arguments).exit_code == 2
