@@ -719,6 +719,11 @@ x - c_x = s A (X - c_X) + t."""
 ParametersRow = tuple[float, _Matrix, _Vector]
 """Scale s, rotation A (3 x 3), translation B of the similarity x = s A X + B."""
 
+TraceRow = tuple[_Matrix, tuple[list[tuple[int, int]], _Floats], _Floats, _Floats, list[float], list[float]]
+"""One cycle of the bulletin: rotation A as it began; (station, component) and (m, 8) P-values of equations;
+normal equations C (7, 8); auxiliary table D (7, 8); seven results; corrected omega, phi, kappa, s, b1, b2,
+b3."""
+
 class SimilarityError(Exception):
     """A model that cannot be oriented.
 
@@ -738,6 +743,7 @@ def orient_model(
     max_iterations: int,
     tolerance: float,
     threads: int,
+    trace: bool,
 ) -> SimilaritySolution:
     """Find the similarity x = s A X + B between control X and model x (C&GS Technical Bulletin 19).
 
@@ -747,7 +753,8 @@ def orient_model(
         (n, 3) ground units: coordinates, NaN where unknown, and standard deviations, zero for an exact one,
         infinite for one that takes no part.
     model, model_sd
-        (n, 3) model units: coordinates and their standard deviations, positive.
+        (n, 3) model units: coordinates and their standard deviations; zero where those of the control are
+        positive.
     method
         `rigorous`, `report` or `fill-in`.
     start
@@ -760,6 +767,8 @@ def orient_model(
         Fraction of its standard deviation by which no unknown changes any more (rigorous method).
     threads
         Number of threads; 0 for all processors.
+    trace
+        Whether the report's methods keep what each cycle computed on its way.
 
     Raises
     ------
@@ -800,6 +809,10 @@ class SimilaritySolution:
     @property
     def cycles(self) -> list[float] | None:
         """Largest correction of an angle (rad) in each cycle of the report's methods, else None."""
+
+    @property
+    def traces(self) -> list[TraceRow]:
+        """What each of these cycles computed on its way, where it was asked for."""
 
     @property
     def tangent_cofactors(self) -> _Floats:

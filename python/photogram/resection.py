@@ -226,7 +226,8 @@ def resect(
     known = np.concatenate(
         [_known("position", position, position_sd), _known("attitude", attitude, attitude_sd)]
     )
-    if whole_number("max_iterations", max_iterations) < 1 or not number("tolerance", tolerance) > 0:
+    limit = number("tolerance", tolerance)
+    if whole_number("max_iterations", max_iterations) < 1 or not 0 < limit < math.inf:
         raise InputError("there must be one iteration at least, and a positive criterion of convergence")
     solution = solve(
         given,
@@ -236,7 +237,7 @@ def resect(
         ),
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
-        limit=tolerance,
+        limit=limit,
         max_iterations=max_iterations,
     )
     return Resection(

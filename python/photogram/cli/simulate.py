@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import failures, output, print_remark
+from photogram.cli.console import output, print_remark
+from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.simulated import NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -20,10 +21,14 @@ if TYPE_CHECKING:
 __all__ = ["simulate"]
 
 
+@with_job
 @takes_network
 def simulate(
+    job: Job,
     out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="Directory for the project; it is made if need be.")
+        Path,
+        Writes.DIRECTORY,
+        typer.Argument(metavar="OUT", help="Directory for the project; it is made if need be."),
     ],
     network: NetworkOptions,
     check_points: Annotated[int, typer.Option(help="Points with known positions that are not held.")] = 20,
@@ -47,8 +52,7 @@ def simulate(
     initial ones with their errors as standard deviations; every weight counts in the unit variance (COMMON
     column 12). Without, the initial ones with the weak default standard deviations of the files.
     """
-    with failures():
-        from photogram.files import write_whole
+    with job:
         from photogram.giant import Project
         from photogram.giant.project import project_files
         from photogram.simulation import simulate as make
@@ -64,7 +68,7 @@ def simulate(
         block, common = _filed(simulation.block, position_error, attitude_error)
         project = Project.from_block(block, common)
         written = {**project_files(project, out, overwrite=overwrite), out / "truth.json": _truth(simulation)}
-        write_whole(written)
+        job.write(written)
         for message in project.messages:
             print_remark(message)
         output.print(
