@@ -10,11 +10,28 @@ __all__ = ["Message"]
 MOST_NAMES = 12
 """Names that a message lists at most."""
 
+MOST_CHARACTERS = 200
+"""Characters of a record that a message shows at most; the cards of all programs have fewer."""
+
+MOST_QUOTED = 40
+"""Characters of a field that a message quotes at most."""
+
+
+def shortened(text: str, most: int = MOST_CHARACTERS) -> str:
+    """Return the beginning of a long text, and how long it is; a short one as it is."""
+    return text if len(text) <= most else f"{text[:most]}... ({len(text)} characters)"
+
+
+def quoted(text: str) -> str:
+    """Return a field between quotation marks as messages show it: escaped, and shortened where it is long."""
+    rest = "" if len(text) <= MOST_QUOTED else f"... ({len(text)} characters)"
+    return f"{text[:MOST_QUOTED]!r}{rest}"
+
 
 def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
     """Put the place (file, record number, record text) before and after a message.
 
-    Characters that do not print stand there as U+FFFD, one for one.
+    Of a long record the beginning is shown. Characters that do not print stand there as U+FFFD, one for one.
     """
     place = ", ".join(
         part for part in (printable(str(file)) if file else "", f"record {record}" if record else "") if part
@@ -22,7 +39,7 @@ def locate(message: str, file: Path | None, record: int | None, text: str | None
     head = f"{place}: {message}" if place else message
     if text is None:
         return head
-    return f"{head}\n    |{printable(text)}|"
+    return f"{head}\n    |{printable(shortened(text))}|"
 
 
 def printable(text: str) -> str:

@@ -420,6 +420,7 @@ def test_section_2_adjusted_stations_and_points_keep_weights_and_codes(tmp_path)
     np.testing.assert_array_equal(restart.point_sd, block.point_sd)
 
 
+@pytest.mark.speed
 def test_a_hundred_thousand_images_are_read_in_a_second(tmp_path):
     rng = np.random.default_rng(5)
     block = small_block(rng, geographic=False, photos=100, points=1000)

@@ -104,6 +104,16 @@ def absolute_orientation(
         Writes.FILE,
         typer.Option(metavar="FILE", help="Draw the residuals of the control (PNG).", show_default=False),
     ] = None,
+    trace: Annotated[
+        Path | None,
+        Writes.FILE,
+        typer.Option(
+            metavar="FILE",
+            help="Write the bulletin's eight prints under sense switches, cycle by cycle (--method report or"
+            " fill-in).",
+            show_default=False,
+        ),
+    ] = None,
     reject: Annotated[
         list[str] | None,
         typer.Option(
@@ -150,14 +160,17 @@ def absolute_orientation(
     """Orient a model absolutely: s, A, B of x = s A X + B from full, horizontal and height control.
 
     Prints problems, figures, parameters and residuals; writes what is asked for, whole or not at all.
-    Stations without control are transformed too.
+    Stations without control are transformed too. Exit code 3: not converged, or control that does not fit.
     """
     if example == (file is not None):
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
+    if trace and method is Method.RIGOROUS:
+        raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
     with job, ExitStack() as resources:
         from photogram import orient
         from photogram.absolute_orientation.document import read_similarity
         from photogram.absolute_orientation.report import summary
+        from photogram.messages import Message
 
         target = points_out
         if file is None:
@@ -178,9 +191,13 @@ def absolute_orientation(
             former=read_similarity(restart) if restart else former,
             reject=reject or (),
             unit_variance=unit_variance.value,
+            trace=trace is not None,
         )
         result.messages[:0] = messages
-        made = _small_files(result, listing, plot, None if points else json)
+        if points and not result.usable:
+            result.messages.append(Message("no points were transformed: the orientation is not to be used"))
+            points = None
+        made = _small_files(result, listing, plot, trace, None if points else json)
         written = list(made)
         with job.outputs() as outputs:
             if points and target:
@@ -191,7 +208,7 @@ def absolute_orientation(
         if not quiet:
             print_sections(summary(result), "the listing", SHOWN)
             print_written(written)
-    if not result.converged:
+    if not result.usable:
         raise typer.Exit(NOT_CONVERGED)
 
 
@@ -241,7 +258,7 @@ def _former(path: Path) -> Similarity:
     from photogram.files import read_lines
 
     document = any(line.lstrip().startswith("{") for line in read_lines(path)[:1])
-    return read_similarity(path) if document else read_transformation(path)
+    return read_similarity(path, usable=True) if document else read_transformation(path)
 
 
 def _read(
@@ -257,7 +274,7 @@ def _read(
 
 
 def _small_files(
-    result: Orientation, listing: Path | None, plot: Path | None, json: Path | None
+    result: Orientation, listing: Path | None, plot: Path | None, trace: Path | None, json: Path | None
 ) -> dict[Path, bytes]:
     """Make everything that is small, before anything is written."""
     made: dict[Path, bytes] = {}
@@ -265,6 +282,10 @@ def _small_files(
         made[listing] = result.report().encode()
     if plot:
         made[plot] = result.plot()
+    if trace:
+        from photogram.absolute_orientation.trace import trace_text
+
+        made[trace] = trace_text(result).encode()
     if json:
         made[json] = result.to_json()
     return made
