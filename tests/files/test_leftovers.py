@@ -160,6 +160,27 @@ def test_where_there_are_no_links_a_set_that_cannot_be_undone_is_marked(tmp_path
     assert staging(tmp_path) == []
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_that_ends_a_command_leaves_nothing(tmp_path, number):
+    (tmp_path / "old").write_bytes(b"old")
+    program = (
+        "import os, sys\n"
+        "from pathlib import Path\n"
+        "from photogram.cli.ending import end_by_signals\n"
+        "from photogram.writing import OutputSet\n"
+        "end_by_signals()\n"
+        "with OutputSet() as outputs:\n"
+        "    outputs.write(Path('made/deeper/new'), b'new')\n"
+        "    outputs.open(Path('old')).write(b'new')\n"
+        "    os.kill(os.getpid(), int(sys.argv[1]))\n"
+    )
+    command = [sys.executable, "-c", program, str(int(number))]
+    done = subprocess.run(command, capture_output=True, cwd=tmp_path, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, b"", b"")
+    assert list(tmp_path.rglob("*")) == [tmp_path / "old"]
+    assert (tmp_path / "old").read_bytes() == b"old"
+
+
 def test_signals_wait_while_files_are_put_in_place():
     seen = []
 

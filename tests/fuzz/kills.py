@@ -1,6 +1,6 @@
 """Runs that are killed or told to end at random moments, and what they leave.
 
-`python tests/fuzz/kills.py` prints how 200 trials of each kind ended; a number as argument makes it another.
+`python tests/fuzz/kills.py` prints as a table how 200 trials of each kind ended; another number as argument.
 """
 
 from __future__ import annotations
@@ -173,10 +173,10 @@ def wait_until_caught(process: subprocess.Popen[str], number: int) -> None:
 
 def kinds(trials: Trials) -> Iterator[tuple[str, Callable[[], None]]]:
     """Return the kinds of trials with their titles."""
-    yield "SIGKILL, a command", trials.killed
-    yield "SIGKILL, a program that does nothing but write", trials.writer_killed
+    yield "SIGKILL to `photogram giant`", trials.killed
+    yield "SIGKILL to a program that does nothing but write four files", trials.writer_killed
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        yield f"{number.name}, a command", lambda number=number: trials.told_to_end(number)
+        yield f"{number.name} to `photogram giant`", lambda number=number: trials.told_to_end(number)
 
 
 def main() -> None:
@@ -185,14 +185,14 @@ def main() -> None:
     place = Path(tempfile.mkdtemp())
     try:
         trials = Trials(place)
+        print("| what was done | how it ended | times |\n|---|---|---:|", flush=True)
         for title, trial in kinds(trials):
             trials.counts.clear()
             for _ in range(count):
                 trial()
             trials.put_in_order()
-            print(f"{title}: {count} trials")
             for ended, times in sorted(trials.counts.items()):
-                print(f"  {times:4d}  {ended}")
+                print(f"| {title} | {ended} | {times} |", flush=True)
     finally:
         shutil.rmtree(place)
 

@@ -35,10 +35,9 @@ def ignore_signals() -> None:
 
 def _end(number: int, _frame: FrameType | None) -> None:
     # If the writer is not loaded yet, it has begun nothing.
-    staging = sys.modules.get("photogram.writing.staging")
-    remove_all = getattr(staging, "remove_all", None)
-    if remove_all is not None:
-        remove_all()
+    abandon_all = getattr(sys.modules.get("photogram.writing.outputs"), "abandon_all", None)
+    if abandon_all is not None:
+        abandon_all()
     try:
         if os.isatty(2):
             os.write(2, SHOW_CURSOR)
