@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import typer
 
 from photogram.cli.console import failures, print_remark
+from photogram.messages import printable
 
 if TYPE_CHECKING:
     from photogram.writing import OutputSet
@@ -155,7 +156,8 @@ class Job:
         from photogram.writing.markers import doubtful
 
         for path, mark in doubtful(self._inputs()).items():
-            print_remark(f"{path}: an interrupted run may have left it out of step with other files: {mark}")
+            told = f"{path}: an interrupted run may have left it out of step with other files: {mark}"
+            print_remark(printable(told))
 
     def _check_projects(self, path: Path) -> None:
         """Refuse an output by which a project that is read would have two files of one name."""
