@@ -130,6 +130,7 @@ class Trials:
             stderr=subprocess.PIPE,
             text=True,
             env=ENV,
+            preexec_fn=heed_signals,
         )
 
     def _put_old(self) -> None:
@@ -152,6 +153,12 @@ class Trials:
             assert marks == {self.place, self.place / "out"}, (old, marks)
             return "of two runs, marked"
         return ("all old" if old else "all new") + (" though marked" if marks else "")
+
+
+def heed_signals() -> None:
+    """Undo that signals are ignored, as a shell does for what it starts in the background."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def leftovers(place: Path) -> list[Path]:
