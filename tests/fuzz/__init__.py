@@ -1,0 +1,1 @@
+"""A fuzzer that knows the formats: sound inputs of every program with damaged values."""
