@@ -4,6 +4,7 @@ from photogram._photocore import __version__
 from photogram.absolute_orientation import Orientation, orient
 from photogram.adjusted import Iteration
 from photogram.adjustment import AsPublished, Progress, adjust
+from photogram.arguments import check_arguments
 from photogram.block import Block
 from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
 from photogram.geometry import Spheroid
@@ -41,3 +42,5 @@ __all__ = [
     "resect",
     "simulate",
 ]
+
+check_arguments(globals(), ["AsPublished", "adjust", "orient", "plan", "predict", "resect", "simulate"])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
+from photogram.arguments import check_arguments
 from photogram.errors import InputError
 from photogram.refraction import Refraction
 
@@ -248,3 +249,20 @@ def refraction_shift(
 
 def _floats(values: ArrayLike) -> Floats:
     return np.asarray(values, dtype=np.float64)
+
+
+check_arguments(
+    globals(),
+    [
+        "Spheroid",
+        "geocentric_to_geographic",
+        "geographic_to_geocentric",
+        "lengths_of_units",
+        "local_frames",
+        "project",
+        "refraction_shift",
+        "rotation_angles",
+        "rotation_matrix",
+        "viewing_directions",
+    ],
+)

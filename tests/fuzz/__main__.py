@@ -6,12 +6,6 @@ python -m tests.fuzz --replay 12:345 --keep damaged
 
 from __future__ import annotations
 
-import os
-
-# Before the numerical libraries are loaded: a worker is one thread.
-for _name in ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
 import argparse
 import sys
 from pathlib import Path
@@ -19,7 +13,6 @@ from pathlib import Path
 from .case import Outcome
 from .page import lines, table, write_section
 from .run import fuzz, replay
-
 
 SHOWN = 5
 """Failing inputs of one cause that are named."""
@@ -39,6 +32,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the run (0)")
     parser.add_argument("--first", type=int, default=0, help="number of the first input (0)")
     parser.add_argument("--jobs", type=int, default=1, help="worker processes (1)")
+    parser.add_argument(
+        "--logs", type=Path, help="directory of logs: the same command goes on where it stopped"
+    )
     parser.add_argument("--page", type=Path, help="page whose section on the fuzzer gets the figures")
     parser.add_argument("--replay", metavar="SEED:NUMBER", help="run one input again and say how it ends")
     parser.add_argument("--keep", type=Path, help="with --replay: directory for the files of the input")
@@ -47,7 +43,7 @@ def main() -> int:
         outcome = replay(*map(int, asked.replay.split(":")), asked.keep)
         print(f"{outcome.format}: {outcome.ending}\n{outcome.fault or outcome.warned or ''}")
         return int(outcome.fault is not None)
-    figures = fuzz(asked.seed, asked.inputs, asked.jobs, first=asked.first, told=True)
+    figures = fuzz(asked.seed, asked.inputs, asked.jobs, first=asked.first, logs=asked.logs, told=True)
     print("\n".join([*lines(figures), "", *table(figures)]))
     told: dict[str, list[int]] = {}
     for number, outcome in figures.faults:

@@ -47,7 +47,7 @@ class Outcome:
 
     format: str
     ending: str
-    reached: bool
+    reached: bool = False
     warned: str | None = None
     fault: str | None = None
 

@@ -23,7 +23,7 @@ CPU_SECONDS = 20
 """Of one input; more is a hang."""
 WALL_SECONDS = 900
 """Of one input, for waits that use no processor."""
-MEMORY = 4 << 30
+MEMORY = 3 << 30
 """Address space of a worker, bytes."""
 TOLD = 60.0
 """Seconds between two lines about the progress of a run."""
@@ -37,7 +37,7 @@ class Figures:
 
     Attributes
     ----------
-    seed, inputs
+    seed
         Of the run.
     endings
         How many inputs of a format ended in a way.
@@ -52,7 +52,6 @@ class Figures:
     """
 
     seed: int
-    inputs: int
     endings: Counter[tuple[str, str]] = field(default_factory=Counter)
     reached: Counter[str] = field(default_factory=Counter)
     warned: Counter[str] = field(default_factory=Counter)
@@ -70,12 +69,19 @@ class Figures:
         if outcome.fault:
             self.faults.append((number, outcome))
 
+    @property
+    def inputs(self) -> int:
+        """How many there were."""
+        return sum(self.endings.values())
+
     def of_format(self, name: str) -> int:
         """Return how many inputs there were of a format."""
         return sum(count for (kind, _), count in self.endings.items() if kind == name)
 
 
-def fuzz(seed: int, inputs: int, jobs: int = 1, *, first: int = 0, told: bool = False) -> Figures:
+def fuzz(
+    seed: int, inputs: int, jobs: int = 1, *, first: int = 0, logs: Path | None = None, told: bool = False
+) -> Figures:
     """Run inputs of a seed.
 
     Parameters
@@ -84,15 +90,17 @@ def fuzz(seed: int, inputs: int, jobs: int = 1, *, first: int = 0, told: bool = 
         Which: `first` to `first + inputs`.
     jobs
         Worker processes.
+    logs
+        A directory to keep what becomes of each input: a run that was stopped goes on where it was.
     told
         Whether to tell on standard error how far the run is.
     """
-    figures = Figures(seed, inputs)
-    before = _children_seconds()
+    figures = Figures(seed)
     with TemporaryDirectory(dir=IN_MEMORY if os.access(IN_MEMORY, os.W_OK) else None) as folder:
+        numbers = [range(first + job, first + inputs, jobs) for job in range(jobs)]
         workers = [
-            _Worker(seed, range(first + job, first + inputs, jobs), Path(folder) / str(job))
-            for job in range(jobs)
+            _Worker(seed, own, Path(folder) / str(job), (logs or Path(folder)) / f"{job}.log")
+            for job, own in enumerate(numbers)
         ]
         running = {worker.start(): worker for worker in workers}
         shown = time.monotonic()
@@ -109,7 +117,6 @@ def fuzz(seed: int, inputs: int, jobs: int = 1, *, first: int = 0, told: bool = 
                 print(f"{sum(worker.done() for worker in workers)} inputs", file=sys.stderr, flush=True)
         for worker in workers:
             worker.count(figures)
-    figures.cpu_seconds = _children_seconds() - before
     figures.faults.sort(key=lambda fault: fault[0])
     return figures
 
@@ -133,9 +140,11 @@ def replay(seed: int, number: int, keep: Path | None = None) -> Outcome:
         return fuzzer.run(number)
 
 
-def _children_seconds() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+def _line(outcome: Outcome, seconds: float) -> str:
+    return (
+        json.dumps([{name: value for name, value in asdict(outcome).items() if value}, round(seconds, 6)])
+        + "\n"
+    )
 
 
 class _Worker:
@@ -144,18 +153,19 @@ class _Worker:
     Every input that is done has a line in its log: the one behind the last line is at work.
     """
 
-    def __init__(self, seed: int, numbers: range, place: Path) -> None:
+    def __init__(self, seed: int, numbers: range, place: Path, log: Path) -> None:
         self.seed = seed
         self.numbers = numbers
         self.place = place
-        self.log = place / "log"
+        self.log = log
         place.mkdir()
-        self.log.touch()
+        log.parent.mkdir(parents=True, exist_ok=True)
+        log.touch()
 
     def done(self) -> int:
         """Return how many inputs are done."""
-        with self.log.open() as file:
-            return sum(1 for _ in file)
+        with self.log.open("rb") as file:
+            return sum(line.endswith(b"\n") for line in file)
 
     def start(self) -> int:
         """Start the process; return its identifier."""
@@ -188,14 +198,16 @@ class _Worker:
         kind, _ = kind_of(self.seed, self.numbers[done])
         outcome = Outcome(kind, "failed", True, None, hung.get(name, name))
         with self.log.open("a") as file:
-            file.write(json.dumps(asdict(outcome)) + "\n")
+            file.write(_line(outcome, CPU_SECONDS))
         return done + 1 == len(self.numbers)
 
     def count(self, figures: Figures) -> None:
         """Count what is in the log."""
         with self.log.open() as file:
-            for number, line in zip(self.numbers, file, strict=True):
-                figures.add(number, Outcome(**json.loads(line)))
+            for number, line in zip(self.numbers, file, strict=False):
+                outcome, seconds = json.loads(line)
+                figures.cpu_seconds += seconds
+                figures.add(number, Outcome(**outcome))
 
     def _work(self, begin: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
@@ -205,6 +217,7 @@ class _Worker:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         fuzzer = Fuzzer(self.seed, self.place / "case")
         rmtree(fuzzer.place, ignore_errors=True)
+        before = time.process_time()
         with self.log.open("a", buffering=1) as log:
             for number in self.numbers[begin:]:
                 fuzzer.prepare(number)
@@ -213,4 +226,6 @@ class _Worker:
                 outcome = fuzzer.run(number)
                 signal.setitimer(signal.ITIMER_PROF, 0)
                 signal.setitimer(signal.ITIMER_REAL, 0)
-                log.write(json.dumps(asdict(outcome)) + "\n")
+                spent = time.process_time()
+                log.write(_line(outcome, spent - before))
+                before = spent

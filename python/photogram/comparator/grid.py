@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments import path
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
 
@@ -22,6 +23,8 @@ __all__ = ["BUILT_IN", "Grid", "built_in_grid", "find_grid", "read_grid"]
 
 BUILT_IN = (773, 1320, 778)
 """The master grids of the program, in the order of its option MASTER (0, 1, 2)."""
+DIGITS = 18
+"""Of a plate's number; there is none of more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,7 @@ class Grid:
         values, counts = np.unique(self.points, return_counts=True)
         if (counts > 1).any():
             raise InputError(f"plate {self.number} has point {values[counts > 1][0]} twice")
-        if self.xy_um.shape != (len(self.points), 2) or not np.isfinite(self.xy_um).all():
+        if self.xy_um.shape != (*np.shape(self.points)[:1], 2) or not np.isfinite(self.xy_um).all():
             raise InputError(f"plate {self.number} needs two coordinates for each of its points")
         if self.sigma_um is not None and not 0 <= self.sigma_um < np.inf:
             raise InputError(f"plate {self.number}: {self.sigma_um} um is no standard deviation")
@@ -145,6 +148,7 @@ def find_grid(name: str) -> Grid:
     InputError
         It is neither.
     """
-    if name.isdigit() and not Path(name).exists():
-        return built_in_grid(int(name))
-    return read_grid(Path(name))
+    file = path("name", name)
+    if name.isdecimal() and not file.exists():
+        return built_in_grid(int(name[:DIGITS]))
+    return read_grid(file)

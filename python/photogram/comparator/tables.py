@@ -38,6 +38,8 @@ def read_csv(
     InputError
         A file that is no such table, no plate, a case measured twice.
     """
+    if not paths:
+        raise InputError("there is no table to read")
     tables = [read_table(path) for path in paths]
     plates = {grid.number: grid for grid in grids}
     if not plates:
