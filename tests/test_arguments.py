@@ -1,4 +1,4 @@
-"""Every public function and input class with hostile values for every parameter: errors of our own, nothing else."""
+"""Public functions and input classes with hostile values for every parameter: errors of our own."""
 
 import importlib
 import inspect
@@ -29,8 +29,8 @@ MADE_BY_THE_LIBRARY = {
     "photogram": "Iteration Message Orientation Plan Pose Progress Resection Result Simulation",
     "photogram.absolute_orientation": "Orientation",
     "photogram.collection": "AdjustedCollection Simulation",
-    "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading Session"
-    " Simulation collect_cases",
+    "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
+    " Session Simulation collect_cases",
     "photogram.giant": "Check ErrorWarning Finding ImageFrame Project Section",
     "photogram.perspective_center": "Cycle PerspectiveCenter Run Stop",
     "photogram.stellar": "Result",
@@ -114,7 +114,9 @@ def good(tmp_path_factory):
     problem = read_plain(examples / "stellar" / "plate.toml")
     points, places = np.array([[100.0, 200.0, 30.0]]), np.array([[0.0, 0.0, 1000.0]])
     resected = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 5.0], [0.0, 100.0, 3.0], [100.0, 100.0, 0.0]])
-    seen = photogram.geometry.project(resected, [[50.0, 50.0, 500.0]] * 4, np.zeros((4, 3)), np.full(4, -150.0))
+    seen = photogram.geometry.project(
+        resected, [[50.0, 50.0, 500.0]] * 4, np.zeros((4, 3)), np.full(4, -150.0)
+    )
     return {
         "photogram": {
             "AsPublished": {"percent": 5.0, "max_iterations": 4},
@@ -259,9 +261,9 @@ def public():
         for name in module.__all__:
             found = getattr(module, name)
             error = inspect.isclass(found) and issubclass(found, BaseException)
-            if callable(found) and inspect.signature is not None and name not in results and not error:
-                if isinstance(found, type) or inspect.isfunction(found):
-                    yield package, name
+            called = inspect.isclass(found) or inspect.isfunction(found)
+            if called and name not in results and not error:
+                yield package, name
 
 
 @pytest.mark.parametrize(("package", "name"), list(public()))
@@ -282,9 +284,7 @@ def test_hostile_arguments_are_refused_by_errors_of_our_own(package, name, good,
             try:
                 with np.errstate(all="ignore"):
                     function(**{**arguments, parameter: make()})
-            except PhotogramError as error:
-                assert str(error).isascii() or str(error).encode()
-            except OSError:
+            except (PhotogramError, OSError):
                 pass
             except BaseException as error:  # panics of the extension are no Exceptions
                 failed.append(f"{parameter} = {what}: {type(error).__name__}: {error}"[:200])
@@ -304,5 +304,5 @@ def test_paths_may_be_strings(tmp_path):
     example = Path(photogram.__file__).parent / "examples" / "absolute_orientation" / "stations.csv"
     assert len(photogram.absolute_orientation.read_csv(str(example)).ids) > 3
     for wrong in (None, 3, b"x", "a\0b", "\ud800"):
-        with pytest.raises(InputError, match="directory is .* not a path"):
+        with pytest.raises(InputError, match=r"directory is .* not a path"):
             read_project(wrong)

@@ -9,6 +9,7 @@ import inspect
 import math
 import os
 import reprlib
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from pathlib import Path
@@ -49,7 +50,8 @@ def check_arguments(names: dict[str, Any], public: Iterable[str]) -> None:
         found = names[name]
         if inspect.isclass(found):
             if not hasattr(found.__init__, "__wrapped__"):
-                found.__init__ = _checked(found.__init__, found.__name__, names, nan=True)
+                checking = _checked(found.__init__, found.__name__, names, nan=True)
+                type.__setattr__(found, "__init__", checking)
         elif not hasattr(found, "__wrapped__"):
             names[name] = _checked(found, name, names, nan=False)
 
@@ -97,13 +99,24 @@ def _checked(
     return checked
 
 
+class _Names(dict[str, Any]):
+    """Names of annotations, which are strings: those imported for type checking only are looked for."""
+
+    def __missing__(self, name: str) -> Any:
+        modules = [vars(module) for key, module in list(sys.modules.items()) if key.startswith("photogram.")]
+        found = {names[name] for names in modules if inspect.isclass(names.get(name))}
+        if len(found) != 1:
+            raise KeyError(name)
+        return found.pop()
+
+
 def _checks(function: Callable[..., Any], names: dict[str, Any], nan: bool) -> dict[str, Check]:
     """Return a check for each parameter whose annotation says enough."""
-    checks = {"": _anything}
+    checks: dict[str, Check] = {"": _anything}
+    known = _Names(names)
     for name, annotation in inspect.get_annotations(function).items():
         try:
-            # Annotations are strings; few names that are imported for type checking only are not there.
-            hint = eval(annotation, names) if isinstance(annotation, str) else annotation
+            hint = eval(annotation, {}, known) if isinstance(annotation, str) else annotation
         except NameError:
             continue
         if name != "return" and (check := _check_of(hint, nan)):
