@@ -120,6 +120,9 @@ class Fuzzer:
             return "failed", f"exit code {leaving.exit_code}", None
         except typer.BadParameter:
             return "refused as input", None, None
+        except MemoryError as error:
+            # The commands say it in one line; anything without one is a traceback's beginning.
+            return "refused as input", None if str(error) else traceback.format_exc(), None
         except OSError as error:
             if error.filename is not None:
                 return "refused as input", None, None

@@ -1,4 +1,4 @@
-"""Ways to damage an input: mostly its values, so that most damaged inputs are still read and computed with."""
+"""Ways to damage an input: mostly its values, so that most inputs are still read and computed with."""
 
 from __future__ import annotations
 

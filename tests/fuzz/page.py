@@ -33,8 +33,8 @@ def lines(figures: Figures) -> list[str]:
     """Say what a run was, and what it found."""
     reached = sum(figures.reached.values())
     return [
-        f"{figures.inputs:,} inputs of seed {figures.seed}; {reached:,} ({100 * reached / figures.inputs:.0f} %)"
-        f" reached the computation; {len(figures.faults):,} failed.",
+        f"{figures.inputs:,} inputs of seed {figures.seed}: {reached:,}"
+        f" ({100 * reached / figures.inputs:.0f} %) reached the computation, {len(figures.faults):,} failed.",
         f"{figures.cpu_seconds / 60:.0f} minutes of processor time"
         f" ({1000 * figures.cpu_seconds / figures.inputs:.1f} ms an input) on {machine()}.",
     ]

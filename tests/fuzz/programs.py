@@ -93,7 +93,7 @@ def _as_they_are() -> Iterator[None]:
 def _giant(place: Path, rng: Random, quiet: bool) -> list[str]:
     listing = place / "listing.txt" if rng.random() < 0.2 else None
     giant.giant(
-        place / "in",
+        directory=place / "in",
         out=place / "out",
         json=place / "result.json",
         listing=listing,
@@ -106,14 +106,14 @@ def _giant(place: Path, rng: Random, quiet: bool) -> list[str]:
 
 
 def _check(place: Path, rng: Random, quiet: bool) -> list[str]:
-    check.check(place / "in", json=place / "result.json", threads=1, quiet=quiet)
+    check.check(directory=place / "in", json=place / "result.json", threads=1, quiet=quiet)
     return ["result.json"]
 
 
 def _collection(place: Path, rng: Random, quiet: bool) -> list[str]:
     ending = rng.choice(("", ".gz", ".bz2"))
     collection.collection(
-        place / "in" / "input",
+        problem=place / "in" / "input",
         out=place / f"adjusted{ending}",
         report=place / "report.txt",
         json=place / "result.json",
@@ -129,7 +129,7 @@ def _collection(place: Path, rng: Random, quiet: bool) -> list[str]:
 
 def _orientation(place: Path, rng: Random, quiet: bool) -> list[str]:
     absolute_orientation.absolute_orientation(
-        place / "in" / "input",
+        file=place / "in" / "input",
         json=place / "result.json",
         listing=place / "listing.txt",
         reject=["S1"] if rng.random() < 0.1 else None,
@@ -144,9 +144,9 @@ def _orientation(place: Path, rng: Random, quiet: bool) -> list[str]:
 
 def _transform(place: Path, rng: Random, quiet: bool) -> list[str]:
     absolute_orientation.transform(
-        place / "in" / "result",
-        place / "in" / "points",
-        place / "transformed.csv",
+        result=place / "in" / "result",
+        points=place / "in" / "points",
+        out=place / "transformed.csv",
         point_sd=rng.choice((0.0, 0.001)),
         decimals=rng.randrange(16),
         quiet=quiet,
@@ -156,7 +156,7 @@ def _transform(place: Path, rng: Random, quiet: bool) -> list[str]:
 
 def _perspective(place: Path, rng: Random, quiet: bool) -> list[str]:
     perspective_center.perspective_center(
-        place / "in" / "grid.deck",
+        deck=place / "in" / "grid.deck",
         json=place / "result.json",
         listing=place / "listing.txt",
         as_published=rng.random() < 0.3,
@@ -168,7 +168,7 @@ def _perspective(place: Path, rng: Random, quiet: bool) -> list[str]:
 
 def _tables(place: Path, rng: Random, quiet: bool) -> list[str]:
     comparator.comparator(
-        [place / "in" / "readings.csv"],
+        paths=[place / "in" / "readings.csv"],
         grid=[str(place / "in" / "grid.csv")],
         out=place / "out",
         json=place / "result.json",
@@ -183,7 +183,7 @@ def _tables(place: Path, rng: Random, quiet: bool) -> list[str]:
 
 def _cards(place: Path, rng: Random, quiet: bool) -> list[str]:
     comparator.comparator(
-        [place / "in" / "deck.txt"],
+        paths=[place / "in" / "deck.txt"],
         out=place / "out",
         json=place / "result.json",
         pictures=False,
@@ -197,7 +197,10 @@ def _cards(place: Path, rng: Random, quiet: bool) -> list[str]:
 def _correct(place: Path, rng: Random, quiet: bool) -> list[str]:
     source = place / "in"
     comparator.correct(
-        source / "correction.json", source / "points.csv", out=place / "out.csv", invert=rng.random() < 0.5
+        correction=source / "correction.json",
+        measurements=source / "points.csv",
+        out=place / "out.csv",
+        invert=rng.random() < 0.5,
     )
     return ["out.csv"]
 
@@ -205,7 +208,7 @@ def _correct(place: Path, rng: Random, quiet: bool) -> list[str]:
 def _plate(name: str) -> Run:
     def run(place: Path, rng: Random, quiet: bool) -> list[str]:
         stellar_camera.stellar_camera(
-            place / "in" / name,
+            deck=place / "in" / name,
             out=place / "out",
             json=place / "result.json",
             as_published=rng.random() < 0.3,
@@ -218,13 +221,17 @@ def _plate(name: str) -> Run:
 
 def _exposures(place: Path, rng: Random, quiet: bool) -> list[str]:
     stellar_camera.exposures(
-        place / "in" / "input.toml", out=place / "out", json=place / "result.json", threads=1, quiet=quiet
+        night=place / "in" / "input.toml",
+        out=place / "out",
+        json=place / "result.json",
+        threads=1,
+        quiet=quiet,
     )
     return ["out/report.txt", "out/camera.json", "result.json"]
 
 
 def _simulate(place: Path, rng: Random, quiet: bool) -> list[str]:
-    """Simulate and adjust by the Python interface: the values come as a document, as a program would have them."""
+    """Simulate and adjust by the Python interface, with values as a program would have them."""
     try:
         values = json.loads((place / "in" / "options").read_text())
         if not isinstance(values, dict):
@@ -271,7 +278,7 @@ PROGRAMS: dict[str, tuple[Run, int]] = {
 
 
 def unsound(result: Any) -> str | None:
-    """Name what is not finite in a result that says it converged and has no remark; None where all is well."""
+    """Name what is not finite in a result that converged without a remark; None where all is well."""
     if not getattr(result, "converged", False) or getattr(result, "messages", None):
         return None
     values = {

@@ -183,7 +183,7 @@ def night() -> list[Files]:
     degrees = np.degrees(catalogue.places)
     rows = ["id,ra_deg,dec_deg,pm_ra_mas,pm_dec_mas,parallax_mas,magnitude"]
     rows += [
-        f"{catalogue.ids[k]},{degrees[k, 0]:.7f},{degrees[k, 1]:.7f},0.0,0.0,10.0,{catalogue.magnitudes[k]:.2f}"
+        f"{catalogue.ids[k]},{degrees[k, 0]:.7f},{degrees[k, 1]:.7f},0,0,10,{catalogue.magnitudes[k]:.2f}"
         for k in seen
     ]
     bare, named = ["exposure,x_px,y_px,magnitude"], ["exposure,x_px,y_px,star"]

@@ -8,6 +8,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+
 from fuzz import case, run
 from fuzz.case import ENDINGS, Fuzzer, Outcome
 from fuzz.damage import damaged
@@ -20,7 +21,17 @@ INPUTS = 2500
 
 
 def test_damaged_inputs_end_in_good_order(tmp_path):
-    command = [sys.executable, "-m", "tests.fuzz", "--inputs", str(INPUTS), "--seed", "1", "--logs", str(tmp_path)]
+    command = [
+        sys.executable,
+        "-m",
+        "tests.fuzz",
+        "--inputs",
+        str(INPUTS),
+        "--seed",
+        "1",
+        "--logs",
+        str(tmp_path),
+    ]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     outcomes = [json.loads(line)[0] for line in (tmp_path / "0.log").read_text().splitlines()]
