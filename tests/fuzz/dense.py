@@ -174,8 +174,9 @@ def _compared(block: Block, result: Result) -> Comparison:
         correlations = root @ root.T
         deviations = np.sqrt(np.diag(correlations))
         place.unknowns[free] += step / scale
-    # A coordinate of 5 km has its last digit at 1e-12 m: what is known better cannot be written.
-    unwritten = 4 * np.spacing(np.abs(start[free]))
+    # Coordinates of 5 km have their last digits at 1e-12 m, angles at 1e-16: what is known better is lost.
+    size = np.where(place.angles, 1.0, np.nanmax(np.abs(start[~place.angles])))
+    unwritten = 4 * np.spacing(size)[free]
     change = np.maximum(np.abs(place.unknowns - start)[free] - unwritten, 0.0)
     moved = float((change * scale / deviations).max())
     found = _cofactors(block, result)[np.ix_(free, free)]
@@ -211,6 +212,8 @@ class _Place:
         self.images = np.flatnonzero(result.used_images)
         used_photos = np.isin(np.arange(self.photos), block.image_photos[self.images])
         self.used = np.concatenate([np.repeat(used_photos, 6), np.repeat(result.used_points, 3)])
+        self.angles = np.zeros(len(self.unknowns), bool)
+        self.angles[: 6 * self.photos].reshape(-1, 6)[:, 3:] = True
         count = self.photos + len(block.point_ids)
         self.blocks = np.repeat(np.arange(count), [6] * self.photos + [3] * len(block.point_ids))
 
