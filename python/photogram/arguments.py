@@ -8,7 +8,6 @@ from __future__ import annotations
 import inspect
 import math
 import os
-import reprlib
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
@@ -19,6 +18,8 @@ from typing import Any, Literal, Union, get_args, get_origin
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from photogram.arrays import _shown as shown
+from photogram.arrays import number, one_of, whole_number
 from photogram.errors import InputError
 
 __all__ = ["check_arguments", "path"]
@@ -139,8 +140,8 @@ def _check_of(hint: Any, nan: bool) -> Check | None:
     if inspect.isclass(origin):
         return _instance(origin)
     simple: dict[Any, Check] = {
-        int: _whole,
-        float: _real if nan else _number,
+        int: whole_number,
+        float: number if nan else _number,
         bool: _truth,
         str: _text,
         Path: path,
@@ -202,7 +203,7 @@ def _name(name: str, value: Any) -> Any:
     if isinstance(value, str):
         return _text(name, value)
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
-        return _whole(name, value)
+        return whole_number(name, value)
     return _number(name, value)
 
 
@@ -222,36 +223,18 @@ def _instance(*kinds: type) -> Check:
 
 
 def _one_of(choices: tuple[Any, ...]) -> Check:
-    def one_of(name: str, value: Any) -> Any:
-        if not any(type(value) is type(choice) and value == choice for choice in choices):
-            raise _refused(name, value, f"one of {', '.join(map(str, choices))}")
+    def one_of_them(name: str, value: Any) -> Any:
+        one_of(name, value, choices)
         return value
 
-    return one_of
-
-
-def _whole(name: str, value: Any) -> int:
-    if isinstance(value, int | np.integer) and not isinstance(value, bool) and abs(int(value)) < 2**63:
-        return int(value)
-    raise _refused(name, value, "a whole number of 64 bits")
-
-
-def _real(name: str, value: Any) -> float:
-    if isinstance(value, np.ndarray) and value.ndim == 0:
-        value = value.item()
-    if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
-        try:
-            return float(value)
-        except OverflowError:
-            pass
-    raise _refused(name, value, "a number")
+    return one_of_them
 
 
 def _number(name: str, value: Any) -> float:
-    number = _real(name, value)
-    if math.isnan(number):
+    found = number(name, value)
+    if math.isnan(found):
         raise _refused(name, value, "a number")
-    return number
+    return found
 
 
 def _truth(name: str, value: Any) -> bool:
@@ -307,8 +290,4 @@ def _numpy(kind: type[np.generic]) -> Check:
 
 
 def _refused(name: str, value: object, what: str) -> InputError:
-    try:
-        shown = reprlib.repr(value)
-    except Exception:  # a foreign object may fail at anything
-        shown = f"a {type(value).__name__}"
-    return InputError(f"{name} is {shown.encode('ascii', 'backslashreplace').decode()}, not {what}")
+    return InputError(f"{name} is {shown(value)}, not {what}")

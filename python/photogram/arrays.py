@@ -251,7 +251,10 @@ def _shown(value: object) -> str:
     """Show what a caller gave, in a line, however long it is."""
     if isinstance(value, int) and value.bit_length() > 128:
         return f"a whole number of {value.bit_length()} bits"
-    return ascii(value)[:80]
+    try:
+        return ascii(value)[:80]
+    except Exception:  # a foreign object may fail at anything, a deep one at its depth
+        return f"a {type(value).__name__}"
 
 
 def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
