@@ -276,12 +276,16 @@ def _array(name: str, value: Any) -> Any:
 
 def _numpy(kind: type[np.generic]) -> Check:
     """Return a check that makes an array of a type: floating-point, whole numbers or truth values."""
-    needed = {"f": "biuf", "i": "iu", "b": "b"}[np.dtype(kind).kind]
+    needed, what = {
+        "f": ("biuf", "numbers"),
+        "i": ("iu", "whole numbers"),
+        "b": ("b", "truth values"),
+    }[np.dtype(kind).kind]
 
     def converted(name: str, value: Any) -> Any:
         array = np.asarray(_array(name, value))
         if array.size and array.dtype.kind not in needed:
-            raise _refused(name, value, f"an array of {np.dtype(kind).name}")
+            raise _refused(name, value, f"an array of {what}")
         if kind is np.int64 and array.dtype.kind == "u" and array.size and array.max() >= 2**63:
             raise _refused(name, value, "an array of whole numbers of 64 bits")
         return array.astype(kind, copy=False)
