@@ -58,11 +58,13 @@ while wanted:
     kind, _ = case.kind_of(0, number)
     if kind in wanted:
         outcome = fuzzer.run(number)
-        assert outcome.fault is None and outcome.reached, outcome
-        assert outcome.ending in ("converged", "not converged"), outcome
-        assert kind == "GIANT project, check" or outcome.ending == "converged", outcome
-        wanted.discard(kind)
+        assert outcome.fault is None, outcome
+        # Options are drawn by lot: not every method can start everywhere. A check may find something.
+        if outcome.ending == "converged" or kind == "GIANT project, check":
+            assert outcome.reached, outcome
+            wanted.discard(kind)
     number += 1
+    assert number < 5000, wanted
 """
 
 
