@@ -6,7 +6,6 @@ An argument of a wrong kind would otherwise fail somewhere inside, as whatever P
 from __future__ import annotations
 
 import inspect
-import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -51,10 +50,10 @@ def check_arguments(names: dict[str, Any], public: Iterable[str]) -> None:
         found = names[name]
         if inspect.isclass(found):
             if not hasattr(found.__init__, "__wrapped__"):
-                checking = _checked(found.__init__, found.__name__, names, nan=True)
+                checking = _checked(found.__init__, found.__name__, names)
                 type.__setattr__(found, "__init__", checking)
         elif not hasattr(found, "__wrapped__"):
-            names[name] = _checked(found, name, names, nan=False)
+            names[name] = _checked(found, name, names)
 
 
 def path(name: str, value: object) -> Path:
@@ -87,7 +86,7 @@ def _checked(
     @wraps(function)
     def checked(*arguments: Any, **options: Any) -> Any:
         if not checks:
-            checks.update(_checks(function, {**_ARRAYS, **names, **function.__globals__}, nan))
+            checks.update(_checks(function, {**_ARRAYS, **names, **function.__globals__}))
         try:
             bound = signature.bind(*arguments, **options)
         except TypeError as error:
@@ -111,7 +110,7 @@ class _Names(dict[str, Any]):
         return found.pop()
 
 
-def _checks(function: Callable[..., Any], names: dict[str, Any], nan: bool) -> dict[str, Check]:
+def _checks(function: Callable[..., Any], names: dict[str, Any]) -> dict[str, Check]:
     """Return a check for each parameter whose annotation says enough."""
     checks: dict[str, Check] = {"": _anything}
     known = _Names(names)
@@ -120,28 +119,28 @@ def _checks(function: Callable[..., Any], names: dict[str, Any], nan: bool) -> d
             hint = eval(annotation, {}, known) if isinstance(annotation, str) else annotation
         except NameError:
             continue
-        if name != "return" and (check := _check_of(hint, nan)):
+        if name != "return" and (check := _check_of(hint)):
             checks[name] = check
     return checks
 
 
-def _check_of(hint: Any, nan: bool) -> Check | None:
+def _check_of(hint: Any) -> Check | None:
     if hint is ArrayLike:
         return _array
     origin, inner = get_origin(hint), get_args(hint)
     if origin in (Union, UnionType):
-        return _check_of_union(inner, nan)
+        return _check_of_union(inner)
     if origin is Literal:
         return _one_of(inner)
     if origin is np.ndarray:
         return _numpy(get_args(inner[1])[0])
     if origin in (list, tuple, Sequence, Iterable):
-        return _several(hint, nan)
+        return _several(hint)
     if inspect.isclass(origin):
         return _instance(origin)
     simple: dict[Any, Check] = {
         int: whole_number,
-        float: number if nan else _number,
+        float: number,
         bool: _truth,
         str: _text,
         Path: path,
@@ -152,14 +151,14 @@ def _check_of(hint: Any, nan: bool) -> Check | None:
     return _instance(hint) if usable else None
 
 
-def _check_of_union(inner: tuple[Any, ...], nan: bool) -> Check | None:
+def _check_of_union(inner: tuple[Any, ...]) -> Check | None:
     kinds = [kind for kind in inner if kind is not type(None)]
     if set(get_args(ArrayLike)) <= set(inner):
         check: Check | None = _array
     elif all(kind in (str, Path) or get_origin(kind) is os.PathLike for kind in kinds) and kinds != [str]:
         check = path
     elif len(kinds) == 1:
-        check = _check_of(kinds[0], nan)
+        check = _check_of(kinds[0])
     elif all(inspect.isclass(kind) for kind in kinds):
         check = _instance(*kinds)
     else:
@@ -170,14 +169,12 @@ def _check_of_union(inner: tuple[Any, ...], nan: bool) -> Check | None:
     return lambda name, value: None if value is None else needed(name, value)
 
 
-def _several(hint: Any, nan: bool) -> Check | None:
+def _several(hint: Any) -> Check | None:
     """Return a check of a sequence: of each element, and of their number where the annotation tells it."""
     origin, inner = get_origin(hint), get_args(hint)
     fixed = origin is tuple and (len(inner) < 2 or inner[1] is not Ellipsis)
     checks = [
-        _name if kind is object else _check_of(kind, nan) or _anything
-        for kind in inner
-        if kind is not Ellipsis
+        _name if kind is object else _check_of(kind) or _anything for kind in inner if kind is not Ellipsis
     ]
 
     def several(name: str, value: Any) -> Any:
@@ -204,7 +201,7 @@ def _name(name: str, value: Any) -> Any:
         return _text(name, value)
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
         return whole_number(name, value)
-    return _number(name, value)
+    return number(name, value)
 
 
 def _anything(name: str, value: Any) -> Any:
@@ -228,13 +225,6 @@ def _one_of(choices: tuple[Any, ...]) -> Check:
         return value
 
     return one_of_them
-
-
-def _number(name: str, value: Any) -> float:
-    found = number(name, value)
-    if math.isnan(found):
-        raise _refused(name, value, "a number")
-    return found
 
 
 def _truth(name: str, value: Any) -> bool:

@@ -229,7 +229,7 @@ def test_a_start_in_the_plane_of_the_projection_centre_is_an_error():
         ({"ordering": "none"}, "ordering is one of"),
         ({"max_iterations": 0}, "one iteration"),
         ({"tolerance": 0.0}, "must be positive"),
-        ({"tolerance": float("nan")}, "tolerance is nan, not a number"),
+        ({"tolerance": float("nan")}, "must be positive"),
         ({"threads": 0}, "threads must be positive"),
         ({"loss": "tukey"}, "loss is one of huber, cauchy"),
         ({"loss": "huber", "scale": -1.0}, "scale must be positive"),

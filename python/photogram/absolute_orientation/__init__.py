@@ -19,4 +19,4 @@ __all__ = [
     "transform_file",
 ]
 
-check_arguments(globals(), ["Similarity", "Stations", "orient", "read_cards", "read_csv", "transform_file"])
+check_arguments(globals(), ["read_cards", "read_csv", "transform_file"])

@@ -42,6 +42,8 @@ class Grid:
         Standard deviation of a calibrated coordinate; None where it is not known.
     adopted
         Date of the calibration, as text.
+    source
+        The file that it was read from.
     """
 
     number: int
@@ -49,6 +51,7 @@ class Grid:
     xy_um: Floats
     sigma_um: float | None = None
     adopted: str = ""
+    source: Path | None = None
 
     def __post_init__(self) -> None:
         """Refuse plates that cannot be."""
@@ -113,6 +116,7 @@ def read_grid(path: Path) -> Grid:
             np.array(xy, dtype=float).reshape(-1, 2),
             deviation,
             table.text("adopted"),
+            path,
         )
     except InputError as error:
         raise InputError(error.message, file=path) from None
