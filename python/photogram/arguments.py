@@ -77,9 +77,7 @@ def path(name: str, value: object) -> Path:
     return value if isinstance(value, Path) else Path(text)
 
 
-def _checked(
-    function: Callable[..., Any], name: str, names: dict[str, Any], *, nan: bool
-) -> Callable[..., Any]:
+def _checked(function: Callable[..., Any], name: str, names: dict[str, Any]) -> Callable[..., Any]:
     signature = inspect.signature(function)
     checks: dict[str, Check] = {}
 
