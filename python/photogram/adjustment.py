@@ -11,7 +11,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.arrays import number, one_of, whole_number
+from photogram.arrays import number, one_of, truth_value, whole_number
 from photogram.block import Block, checked
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.memory import available_memory
@@ -143,6 +143,8 @@ def adjust(
     if max_iterations is None:
         max_iterations = 50 if loss is None else 200
     checked(block)
+    truth_value("covariance", covariance)
+    truth_value("fix_photos", fix_photos)
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads, progress)
     row = loss_row(loss, scale)
     if row and as_published:

@@ -27,6 +27,7 @@ __all__ = [
     "shaped",
     "standard_deviations",
     "text",
+    "truth_value",
     "whole_number",
 ]
 
@@ -170,7 +171,8 @@ def names(name: str, values: Iterable[object]) -> list[str]:
     InputError
         A name that is missing, empty, no string, or not printable; the message tells its row.
     """
-    if isinstance(values, str | bytes) or not isinstance(values, Iterable):
+    no_row = isinstance(values, np.ndarray) and values.ndim != 1
+    if no_row or isinstance(values, str | bytes) or not isinstance(values, Iterable):
         raise InputError(f"{name} is not a list of names: {_shown(values)}")
     found: list[Any] = values.tolist() if isinstance(values, np.ndarray) else list(values)
     if {str} != set(map(type, found)):
@@ -233,6 +235,19 @@ def whole_number(name: str, value: object) -> int:
     if not isinstance(value, Integral) or isinstance(value, bool) or not -(2**63) <= int(value) < 2**63:
         raise InputError(f"{name} is not a whole number of 64 bits: {_shown(value)}")
     return int(value)
+
+
+def truth_value(name: str, value: object) -> bool:
+    """Return True or False.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} is True or False, not {_shown(value)}")
+    return bool(value)
 
 
 def one_of(name: str, value: object, choices: Sequence[str]) -> None:
