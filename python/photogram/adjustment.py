@@ -11,7 +11,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.arrays import number, one_of, truth_value, whole_number
+from photogram.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.block import Block, checked
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.memory import available_memory
@@ -219,7 +219,7 @@ def _check_options(
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
     one_of("ordering", ordering, get_args(Ordering))
     if as_published is not None and not isinstance(as_published, AsPublished):
-        raise InputError(f"as_published is an AsPublished or None, not {as_published!r}")
+        raise InputError(f"as_published is an AsPublished or None, not {shown(as_published)}")
     if whole_number("max_iterations", as_published.max_iterations if as_published else max_iterations) < 1:
         raise InputError("there must be one iteration at least")
     if not number("the criterion", as_published.percent if as_published else tolerance) > 0:
@@ -227,7 +227,7 @@ def _check_options(
     if threads is not None and whole_number("threads", threads) < 1:
         raise InputError(f"threads must be positive, not {threads}")
     if progress is not None and not callable(progress):
-        raise InputError(f"progress is no function: {progress!r}")
+        raise InputError(f"progress is no function: {shown(progress)}")
 
 
 def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:

@@ -17,8 +17,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arrays import _shown as shown
-from photogram.arrays import number, one_of, whole_number
+from photogram.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import InputError
 
 __all__ = ["check_arguments", "path"]
@@ -139,7 +138,7 @@ def _check_of(hint: Any) -> Check | None:
     simple: dict[Any, Check] = {
         int: whole_number,
         float: number,
-        bool: _truth,
+        bool: truth_value,
         str: _text,
         Path: path,
     }
@@ -223,12 +222,6 @@ def _one_of(choices: tuple[Any, ...]) -> Check:
         return value
 
     return one_of_them
-
-
-def _truth(name: str, value: Any) -> bool:
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    raise _refused(name, value, "True or False")
 
 
 def _text(name: str, value: Any) -> str:
