@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arrays import indices, length, names, shaped, text, truth_value
+from photogram.arrays import indices, length, names, shaped, shown, text, truth_value
 from photogram.errors import InputError
 from photogram.geometry import Spheroid
 from photogram.refraction import Refraction, metres_per_unit
@@ -193,10 +193,10 @@ class Block:
         text("linear_unit", self.linear_unit)
         self._set("photo_to_ground", truth_value("photo_to_ground", self.photo_to_ground))
         if self.spheroid is not None and not isinstance(self.spheroid, Spheroid):
-            raise InputError(f"spheroid is a Spheroid or None, not {self.spheroid!r}")
+            raise InputError(f"spheroid is a Spheroid or None, not {shown(self.spheroid)}")
         if self.refraction is not None:
             if not isinstance(self.refraction, Refraction):
-                raise InputError(f"refraction is a Refraction or None, not {self.refraction!r}")
+                raise InputError(f"refraction is a Refraction or None, not {shown(self.refraction)}")
             metres_per_unit(self.linear_unit)
 
     def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
@@ -366,7 +366,7 @@ def _columns(
     key = "photo" if table_name == "photos" else "point"
     named = _column(table, table_name, key)
     if not isinstance(named, Sized):
-        raise InputError(f"{table_name}, column {key} is not a list of names: {named!r}")
+        raise InputError(f"{table_name}, column {key} is not a list of names: {shown(named)}")
     rows = len(named)
     stacked = []
     for name in columns:

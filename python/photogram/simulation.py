@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import geometry
-from photogram.arrays import number, one_of, shaped, truth_value, whole_number
+from photogram.arrays import number, one_of, shaped, shown, truth_value, whole_number
 from photogram.block import Block
 from photogram.errors import InputError
 from photogram.geometry import Spheroid
@@ -319,7 +319,7 @@ def _check_types(arguments: Mapping[str, object]) -> None:
             whole_number(name, value)
         elif name in _CLASSES:
             if value is not None and not isinstance(value, _CLASSES[name]):
-                raise InputError(f"{name} is a {_CLASSES[name].__name__} or None, not {value!r}")
+                raise InputError(f"{name} is a {_CLASSES[name].__name__} or None, not {shown(value)}")
         elif name not in _OTHERS and _HUGE < abs(number(name, value)) < math.inf:
             raise InputError(f"{name} must be below {_HUGE:g}")
 

@@ -18,7 +18,7 @@ from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.adjusted import Iteration
 from photogram.arrays import names as names_of
-from photogram.arrays import number, one_of, whole_number
+from photogram.arrays import number, one_of, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 from photogram.statistics import externally_studentized, global_test
@@ -240,6 +240,7 @@ def _check_options(
         raise InputError("there must be one iteration at least")
     if not 0 < number("tolerance", tolerance) < math.inf:
         raise InputError(f"the criterion of convergence must be positive, not {tolerance!r}")
+    truth_value("trace", trace)
     if trace and method == "rigorous":
         raise InputError("only the report's methods, 'report' and 'fill-in', have cycles to trace")
     unknown = [name for name in rejected if name not in stations.ids]

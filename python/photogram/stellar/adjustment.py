@@ -53,10 +53,12 @@ def calibrate(
     AdjustmentError
         Errors 2 to 4 of the report: stars or parameters that are not determined, observations too few.
     InputError
-        Stars of the minimum solution that are not there.
+        Stars of the minimum solution that are not there; fewer than one thread.
     KeyboardInterrupt
         Ctrl-C.
     """
+    if threads is not None and threads < 1:
+        raise InputError(f"{threads} threads are too few")
     iterate = (
         published.iterate
         if problem.options.as_published

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.angles import ARCSEC
+from photogram.arrays import shaped
 
 __all__ = ["ABERRATION", "TAU", "Air", "Site", "refraction"]
 
@@ -59,13 +60,18 @@ def refraction(
     Returns
     -------
     (n,) radians.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes.
     """
     air = air or Air()
     return _photocore.refraction(
-        np.atleast_1d(np.asarray(zenith_distances, float)),
+        np.atleast_1d(shaped("zenith_distances", zenith_distances, np.shape(zenith_distances)[:1])),
         air.temperature,
         air.pressure,
-        np.asarray(tau, float),
+        shaped("tau", tau, (len(TAU),)),
         observed,
     )
 
