@@ -30,13 +30,13 @@ def test_a_blunder_on_a_plate_of_eight_points_is_named(eight):
     result = determine(eight(error=5.0))
     assert result.degrees_of_freedom == 10
     assert 3.15 < abs(result.standardized[2, 1]) <= np.sqrt(10)
-    assert result.limit == pytest.approx(4.15, abs=0.01)
+    assert result.limit == pytest.approx(3.997, abs=0.001)
     assert result.outliers[0] == (2, 1)
     assert abs(result.studentized[2, 1]) > 50
     (message,) = result.messages
-    assert "data set 1: readings beyond the limit 4.1" in str(message)
+    assert "data set 1: readings beyond the limit 4.00" in str(message)
     assert "point 3 Y (t " in str(message)
-    assert summary(result)[-1].startswith("  studentized residuals beyond 4.1")
+    assert summary(result)[-1].startswith("  studentized residuals beyond 4.00")
     assert "3 Y (+" in summary(result)[-1]
     document = json.loads(to_json(Run([result], result.messages)))
     (each,) = document["sets"]

@@ -177,6 +177,7 @@ def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> str
         "whether the model is a mirror image of its control cannot be decided: the elevations are those of"
         " points in one plane"
     )
-    if fit.upright < 0 < mirrored.upright:
+    # Mirrored, the third axis points the other way.
+    if fit.upright < 0 < -mirrored.upright:
         text += "; as it is the model lies upside down, mirrored it would lie upright"
     return text
