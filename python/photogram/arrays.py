@@ -22,6 +22,7 @@ __all__ = [
     "length",
     "names",
     "number",
+    "numbers",
     "one_of",
     "shaped",
     "standard_deviations",
@@ -55,7 +56,7 @@ def shaped(
         Another shape, what is no number, or masked values where none may be missing; the message names the
         argument.
     """
-    array = _real(name, value, missing)
+    array = numbers(name, value, missing=missing)
     if array.ndim == 0:
         array = np.full(shape, array)
     if array.shape != shape:
@@ -63,7 +64,14 @@ def shaped(
     return frozen(array)
 
 
-def _real(name: str, value: ArrayLike, missing: bool) -> NDArray[np.float64]:
+def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
+    """Return an array of any shape, perhaps that of the caller; see :func:`shaped`.
+
+    Raises
+    ------
+    InputError
+        What is no number, or masked values where none may be missing.
+    """
     array = _plain(name, value, "numbers")
     kind = array.dtype.kind
     if kind == "O":
@@ -74,14 +82,14 @@ def _real(name: str, value: ArrayLike, missing: bool) -> NDArray[np.float64]:
         raise InputError(f"{name} is not an array of numbers: its type is {array.dtype}")
     try:
         with np.errstate(over="ignore"):  # infinite then, which is for the caller to judge
-            numbers = array.astype(np.float64, copy=False)
+            found: NDArray[np.float64] = array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} is not an array of numbers: {error}") from None
     if _masked(value):
         if not missing:
             raise InputError(f"{name} has masked values")
-        numbers = np.where(np.ma.getmaskarray(np.ma.asarray(value)), math.nan, numbers)
-    return numbers
+        found = np.where(np.ma.getmaskarray(np.ma.asarray(value)), math.nan, found)
+    return found
 
 
 def _is_real(value: object) -> bool:

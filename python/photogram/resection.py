@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.arrays import length, number, shaped, whole_number
-from photogram.arrays import names as names_of
+from photogram.arrays import length, names, number, numbers, shaped, whole_number
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
@@ -221,6 +220,8 @@ def resect(
     >>> photo.position.round(3).tolist(), photo.attitude.round(6).tolist()
     ([390.0, 430.0, 1500.0], [0.02, -0.03, 1.5])
     """
+    if spheroid is not None and not isinstance(spheroid, Spheroid):
+        raise InputError(f"spheroid is a Spheroid or None, not {spheroid!r}")
     given = Observed.checked(object_points, object_sd, image_xy, image_sd, principal_distance, point_ids)
     known = np.concatenate(
         [_known("position", position, position_sd), _known("attitude", attitude, attitude_sd)]
@@ -280,7 +281,7 @@ class Observed:
         xy: ArrayLike,
         xy_sd: ArrayLike,
         principal_distance: float,
-        names: Sequence[str] | None,
+        point_ids: Sequence[str] | None,
     ) -> Self:
         """Check what a caller gave.
 
@@ -290,7 +291,7 @@ class Observed:
             Another shape, a value that is not finite, or a standard deviation that is none.
         """
         count = length("image_xy", xy)
-        ids = [str(i + 1) for i in range(count)] if names is None else names_of("point_ids", names)
+        ids = [str(i + 1) for i in range(count)] if point_ids is None else names("point_ids", point_ids)
         if len(ids) != count:
             raise InputError(f"point_ids has {len(ids)} names, but image_xy has {count} rows")
         made = cls(
@@ -370,7 +371,7 @@ def solve(
 
 def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Return standard deviations; a row of three stands for every point."""
-    array = np.asarray(value)
+    array = numbers(name, value)
     if len(shape) == 2 and array.shape == shape[1:]:
         array = np.broadcast_to(array, shape)
     deviations = shaped(name, array, shape)
@@ -382,7 +383,7 @@ def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
 def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
     """Return known values, NaN where nothing is known."""
     if value is None:
-        if np.isfinite(np.asarray(sd, dtype=np.float64)).any():
+        if np.isfinite(numbers(f"{name}_sd", sd)).any():
             raise InputError(f"{name}_sd is finite, but {name} is not given")
         return np.full(3, np.nan)
     values = shaped(name, value, (3,))

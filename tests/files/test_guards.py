@@ -226,6 +226,26 @@ def test_files_of_an_output_directory_spare_the_inputs(run, place, name):
     assert content(place) == before
 
 
+@pytest.mark.parametrize(
+    ("name", "taken"),
+    [
+        ("giant adjust", "report.txt"),
+        ("comparator calibrate", "correction.json"),
+        ("stellar-camera plate", "camera.json"),
+        ("stellar-camera exposures", "report.txt"),
+    ],
+)
+def test_files_of_an_output_directory_spare_the_other_results(run, place, name, taken):
+    before = content(place)
+    line = [
+        word for word in words(name, out="out", json=f"out/{taken}") if word not in ("--grid", "grid.csv")
+    ]
+    result = run(*line)
+    assert result.exit_code == 1, result.output
+    assert "another result has this name" in result.stderr
+    assert content(place) == before
+
+
 def test_the_packaged_example_is_an_input(run, tmp_path):
     packaged = EXAMPLES / "collection" / "ring.txt"
     before = packaged.read_bytes()

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
-from photogram.absolute_orientation.stations import numbers
-from photogram.arrays import number, shaped
+from photogram.arrays import number, numbers, shaped
 from photogram.errors import InputError
 from photogram.geometry import rotation_angles
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arrays import names, shaped, text
+from photogram.arrays import names, numbers, text
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
@@ -163,23 +163,8 @@ class Stations:
             raise InputError(f"station {self.ids[int(np.flatnonzero(faulty.any(axis=1))[0])]} {text}")
 
 
-def numbers(name: str, values: ArrayLike) -> Floats:
-    """Return an array of numbers of any shape.
-
-    Raises
-    ------
-    InputError
-        What is no number, or masked; the message names the argument.
-    """
-    try:
-        shape = np.shape(values)
-    except ValueError:
-        raise InputError(f"{name} is not an array of numbers: its rows are of different lengths") from None
-    return shaped(name, values, shape)
-
-
 def _table(name: str, values: ArrayLike, count: int) -> Floats:
-    array = numbers(name, values)
+    array = numbers(name, values, missing=name == "control")
     if array.ndim == 2 and array.shape != (count, 3):
         raise InputError(f"{name} has the shape {array.shape}, not ({count}, 3)")
     try:

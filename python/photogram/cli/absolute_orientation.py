@@ -172,14 +172,16 @@ def absolute_orientation(
         from photogram.absolute_orientation.report import summary
         from photogram.messages import Message
 
+        target = points_out
         if file is None:
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
             file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
-            points_out = points_out or (Path("points-transformed.csv") if points is None else None)
-            points = points or directory / "points.csv"
+            if points is None:
+                points, target = directory / "points.csv", target or Path("points-transformed.csv")
             job.reads(file, points)
-        target = _points_out(points, points_out)
-        if target:
+        if points and not target:
+            target = points.with_name(f"{points.stem}-transformed.csv")
+        if target and target is not points_out:
             job.writes(target)
         stations, former, messages = _read(file, format, zero_missing, ground_unit, model_unit)
         result = orient(
@@ -269,13 +271,6 @@ def _read(
         return read_csv(file, ground_unit=ground_unit, model_unit=model_unit), None, []
     deck = read_cards(file, zero_missing=zero_missing, ground_unit=ground_unit, model_unit=model_unit)
     return deck.stations, deck.former, deck.messages
-
-
-def _points_out(points: Path | None, given: Path | None) -> Path | None:
-    """Return where transformed points go: beside the model points if nothing else is said."""
-    if points is None:
-        return None
-    return given or points.with_name(f"{points.stem}-transformed.csv")
 
 
 def _small_files(

@@ -127,13 +127,12 @@ def comparator(
                 )
         folder = out or default_out((paths or [])[0], "-calibrated")
         written = _results(calibrations, folder, pdf=pdf, pictures=pictures, quiet=quiet)
-        if json is not None:
-            written[json] = _documents(calibrations)
-        job.write(written)
+        documents = {json: _documents(calibrations)} if json is not None else {}
+        job.write(written, documents)
         if not quiet:
             for calibration in calibrations:
                 _summarize(calibration)
-            print_written(written)
+            print_written([*written, *documents])
 
 
 def _with(options: Options, polynomial: bool, estimate_grid: bool) -> Options:

@@ -140,17 +140,18 @@ def giant(
                 errors.print(escape(str(message)))
             raise
         written = _result_files(project, block, result, out, as_published)
+        documents = {}
         if json is not None:
-            written[json] = result.to_json()
+            documents[json] = result.to_json()
         if listing is not None:
             from photogram.giant import listing as printout
 
             text = printout(project, block, result, as_published=as_published, limits=allowed)
-            written[listing] = text.encode()
-        job.write(written)
+            documents[listing] = text.encode()
+        job.write(written, documents)
         if not quiet:
             print_sections(summary(result), "report.txt")
-            print_written(written)
+            print_written([*written, *documents])
     if not result.converged:
         raise typer.Exit(NOT_CONVERGED)
 

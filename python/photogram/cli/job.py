@@ -103,13 +103,16 @@ class Job:
         self._outputs += files
         self._check()
 
-    def write(self, files: Mapping[Path, bytes]) -> None:
-        """Write results: all of them or none, and none over an input."""
+    def write(self, *results: Mapping[Path, bytes]) -> None:
+        """Write results: all of them or none, none over an input, and no two to one place.
+
+        Those whose names a user chose are given apart from those that have names of their own.
+        """
         with self.outputs() as outputs:
-            for path in files:
-                self._check_projects(path)
-            for path, content in files.items():
-                outputs.write(path, content)
+            for files in results:
+                for path, content in files.items():
+                    self._check_projects(path)
+                    outputs.write(path, content)
 
     def outputs(self) -> OutputSet:
         """Return a set of files, for results that are written piece by piece."""

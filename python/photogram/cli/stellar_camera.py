@@ -66,6 +66,7 @@ def stellar_camera(
         from dataclasses import replace
 
         from photogram.stellar import calibrate
+        from photogram.stellar.document import to_json
         from photogram.stellar.listing import summary
 
         if deck is None:
@@ -74,6 +75,7 @@ def stellar_camera(
         job.reads(*inputs)
         target = out or Path(f"{deck.stem}-calibrated")
         written: dict[Path, bytes] = {}
+        documents: dict[Path, bytes] = {}
         converged = True
         for number, problem in enumerate(problems, 1):
             if as_published:
@@ -81,12 +83,14 @@ def stellar_camera(
             result = calibrate(problem)
             converged = converged and result.converged
             mark = f"-{number}" if len(problems) > 1 else ""
-            written |= _files(result, target, mark, json, plots)
+            written |= _files(result, target, mark, plots)
+            if json is not None:
+                documents[json.with_stem(json.stem + mark)] = to_json(result)
             if not quiet:
                 print_sections(summary(result), "the listing")
-        job.write(written)
+        job.write(written, documents)
         if not quiet:
-            print_written(written)
+            print_written([*written, *documents])
     if not converged:
         raise typer.Exit(NOT_CONVERGED)
 
@@ -118,6 +122,7 @@ def exposures(
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
     with job, ExitStack() as resources:
         from photogram.stellar.night import calibrate_night
+        from photogram.stellar.night_document import to_json
         from photogram.stellar.night_file import inputs, read_night
         from photogram.stellar.night_report import summary
 
@@ -125,12 +130,13 @@ def exposures(
             night = resources.enter_context(_example("exposures")) / "night.toml"
         job.reads(*inputs(night))
         result = calibrate_night(read_night(night), threads)
-        written = _night_files(result, out or Path(f"{night.stem}-calibrated"), json, plots)
+        written = _night_files(result, out or Path(f"{night.stem}-calibrated"), plots)
+        documents = {json: to_json(result)} if json is not None else {}
         if not quiet:
             print_sections(summary(result), "the report")
-        job.write(written)
+        job.write(written, documents)
         if not quiet:
-            print_written(written)
+            print_written([*written, *documents])
     if not result.converged:
         raise typer.Exit(NOT_CONVERGED)
 
@@ -147,10 +153,9 @@ def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
     return ([read_plain(deck)], inputs(deck)) if deck.suffix.lower() == ".toml" else (read_deck(deck), [deck])
 
 
-def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool) -> dict[Path, bytes]:
+def _files(result: Result, out: Path, mark: str, plots: bool) -> dict[Path, bytes]:
     """Make everything that is written for one problem."""
     from photogram.stellar.cameras import camera_document
-    from photogram.stellar.document import to_json
     from photogram.stellar.listing import listing, plate_list
 
     made = {
@@ -159,8 +164,6 @@ def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool)
     }
     if result.problem.options.plate_list:
         made[out / f"plate{mark}.txt"] = plate_list(result)
-    if json is not None:
-        made[json.with_stem(json.stem + mark)] = to_json(result)
     if plots:
         from photogram.stellar.plots import figures
 
@@ -170,14 +173,11 @@ def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool)
     return made
 
 
-def _night_files(result: CalibratedNight, out: Path, json: Path | None, plots: bool) -> dict[Path, bytes]:
+def _night_files(result: CalibratedNight, out: Path, plots: bool) -> dict[Path, bytes]:
     """Make everything that is written for a night."""
-    from photogram.stellar.night_document import to_json
     from photogram.stellar.night_report import report
 
     made = {out / "report.txt": report(result).encode(), out / "camera.json": result.camera.to_json()}
-    if json is not None:
-        made[json] = to_json(result)
     if plots:
         from photogram.stellar.night_plots import figures
 

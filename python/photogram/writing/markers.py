@@ -10,6 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from photogram.writing.staging import NEW, Staging, alive, sync_directory
+from photogram.writing.targets import naming
 
 __all__ = ["clear_marks", "doubtful", "mark", "unmark"]
 
@@ -24,22 +25,23 @@ that stand in this directory have been written again, or remove it yourself.
 def mark(staging: Staging, places: Iterable[str]) -> None:
     """Put a mark into the directory of a set: from now on it may be incomplete."""
     lines = [json.dumps(os.path.relpath(place, staging.directory)) for place in places]
+    content = (TEXT + "\n".join(lines) + "\n").encode()
     made = os.path.join(staging.path, "mark")
-    opened = os.open(made, os.O_WRONLY | NEW, 0o666)
-    try:
-        content = (TEXT + "\n".join(lines) + "\n").encode()
-        while content:
-            content = content[os.write(opened, content) :]
-        os.fsync(opened)
-    finally:
-        os.close(opened)
-    os.replace(made, _path(staging))
-    sync_directory(staging.directory)
+    with naming(Path(_path(staging))):
+        opened = os.open(made, os.O_WRONLY | NEW, 0o666)
+        try:
+            while content:
+                content = content[os.write(opened, content) :]
+            os.fsync(opened)
+        finally:
+            os.close(opened)
+        os.replace(made, _path(staging))
+        sync_directory(staging.directory)
 
 
 def unmark(staging: Staging) -> None:
     """Take the mark of a set away: it is complete."""
-    with suppress(FileNotFoundError):
+    with naming(Path(_path(staging))), suppress(FileNotFoundError):
         os.unlink(_path(staging))
         sync_directory(staging.directory)
 
