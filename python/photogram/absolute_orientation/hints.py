@@ -175,7 +175,7 @@ def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> str
         return None
     text = (
         "whether the model is a mirror image of its control cannot be decided: the elevations are those of"
-        " points in one plane"
+        " points in one plane, as far as the residuals tell"
     )
     # Mirrored, the third axis points the other way.
     if fit.upright < 0 < -mirrored.upright:
