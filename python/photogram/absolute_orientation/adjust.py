@@ -32,6 +32,8 @@ UnitVariance = Literal["estimated", "unity"]
 Floats = NDArray[np.float64]
 
 MOST_ITERATIONS = 50
+TRIAL_ITERATIONS = 15
+"""Control that fits needs four or five; one that needs more explains nothing."""
 WEAK = 1e3
 """Condition number from which control is called weak."""
 WEAKNESS = {
@@ -152,7 +154,7 @@ def orient(
 
     def fit(changed: Floats) -> Fit | None:
         try:
-            found = solve(changed, method="rigorous", start="auto", max_iterations=MOST_ITERATIONS)
+            found = solve(changed, method="rigorous", start="auto", max_iterations=TRIAL_ITERATIONS)
         except _photocore.SimilarityError:
             return None
         usable = found.status == "converged" and np.isfinite(found.sum_of_squares)
