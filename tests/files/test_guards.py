@@ -23,7 +23,16 @@ RUNS = {
     "giant adjust": (["giant", "galveston"], [f"galveston/{name}" for name in PROJECT]),
     "giant check": (["giant", "check", "galveston"], [f"galveston/{name}" for name in PROJECT]),
     "absolute-orientation orient": (
-        ["absolute-orientation", "stations.csv", "--points", "points.csv", "--restart", "former.json"],
+        [
+            "absolute-orientation",
+            "stations.csv",
+            "--points",
+            "points.csv",
+            "--restart",
+            "former.json",
+            "--method",
+            "report",
+        ],
         ["stations.csv", "points.csv", "former.json"],
     ),
     "absolute-orientation transform": (
