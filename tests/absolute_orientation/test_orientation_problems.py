@@ -222,3 +222,16 @@ def test_no_file_is_taken_for_a_good_one(run, tmp_path):
     with pytest.raises(InputError, match="not to be used"):
         read_similarity(tmp_path / "result.json", usable=True)
     read_similarity(tmp_path / "result.json")  # to start from
+
+
+def test_with_few_degrees_of_freedom_a_cause_is_possible_only():
+    generator = np.random.default_rng(23)
+    model = simulate(generator, (FULL,) * 3, angles=(0.03, -0.02, 1.0))
+    ground = model.ground.copy()
+    ground[0, :2] = [100.0, 130.0]
+    exact = model.truth.to_model(ground) + NOISE * generator.standard_normal((3, 3))
+    ground[0, :2] = [130.0, 100.0]
+    result = orient(Stations(list("ABC"), ground, exact))
+    assert result.degrees_of_freedom == 2
+    assert result.usable
+    assert result.problems[0].startswith("possibly X and Y of station A are exchanged: residuals would be ")
