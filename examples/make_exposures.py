@@ -17,7 +17,7 @@ from photogram.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.night_file import attitude_of
+from photogram.stellar.pointing import attitude_of
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
 from photogram.stellar.skies import project_sky
 

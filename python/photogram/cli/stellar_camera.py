@@ -127,7 +127,7 @@ def exposures(
         write_results(written, inputs(night))
         if not quiet:
             print_written(written)
-    if not result.converged:
+    if not result.usable:
         raise typer.Exit(NOT_CONVERGED)
 
 

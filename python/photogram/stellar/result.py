@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.messages import Message
+from photogram.statistics import GlobalTest, global_test
 from photogram.stellar.counts import Counts
 from photogram.stellar.moved import Movement
 from photogram.stellar.parameters import INDEX, NAMES
@@ -197,6 +198,12 @@ class Result:
     def computed_mean_error(self) -> float:
         """Mean error of unit weight from the residuals, metres for unit plate weight."""
         return math.sqrt(sum(self.solved.sums) / self.counts.usable)
+
+    @property
+    def test(self) -> GlobalTest | None:
+        """The global test where the mean error of unit weight is given (option 14); else it is not known."""
+        given = self.problem.options.mean_error
+        return global_test(sum(self.solved.sums) / given**2, self.degrees_of_freedom) if given else None
 
     @property
     def mean_error(self) -> float:
