@@ -18,12 +18,10 @@ Bools = NDArray[np.bool_]
 
 _SEEDS = 25
 """Brightest images that make hypotheses; three times as many vote for them."""
-_PAIRS, _MORE = 400, 2000
-"""Hypotheses that are tried, and when none of those is good enough."""
+_RASTER, _BATCH, _EXACT = 2000, 4096, 20
+"""Cells of a raster a side, hypotheses that are counted in it at once, and those that are counted exactly."""
 _CANDIDATES = 1500
 """Pairs of an image and a star that make hypotheses at most: they are compared two by two."""
-_PLAIN = 0.7
-"""Share of bright images that a hypothesis has to explain to be taken at once."""
 _DEEPER = 2
 """Stars in the frame for each image: where the catalogue has more, the faint ones only match by chance."""
 STRETCH = 0.01
@@ -127,18 +125,15 @@ def match(
         return none
     seeds = measured[: 3 * _SEEDS]
     bright = _Sky.as_deep(predicted, len(seeds), frame, radius)
-    pairs, count = _hypotheses(measured[:_SEEDS], bright.predicted, radius, tolerance, stretch)
-    best, most, expected = None, 2, math.inf
-    for tried, transform in enumerate(pairs):
-        if tried >= _PAIRS and expected < ACCEPTED:
-            break
+    transforms = _hypotheses(measured[:_SEEDS], bright.predicted, radius, tolerance, stretch)
+    count = len(transforms)
+    best, most = None, 2
+    for transform in _promising(transforms, seeds, bright.predicted, 3 * tolerance):
         found = mutually_nearest(_apply(transform, seeds), bright.predicted, 3 * tolerance)
         matched = int((found >= 0).sum())
         if matched > most:
             best, most = transform, matched
-            expected = expected_false(len(seeds), 2, bright.mu(3 * tolerance), matched, 2 * count)
-        if most > _PLAIN * len(seeds) and expected < ACCEPTED:
-            break
+    expected = expected_false(len(seeds), 2, bright.mu(3 * tolerance), most, 2 * count)
     if best is None:
         return none
     if bright.mu(3 * tolerance) > CROWDED:
@@ -181,11 +176,8 @@ def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: floa
 
 def _hypotheses(
     measured: Floats, predicted: Floats, radius: float, tolerance: float, stretch: float
-) -> tuple[list[Floats], int]:
-    """Return similarities (3, 2) from pairs of candidates whose separations agree, the widest pairs first.
-
-    And how many there are; not all are returned.
-    """
+) -> Floats:
+    """Return similarities (h, 3, 2) from pairs of candidates whose separations agree."""
     distance = np.linalg.norm(measured[:, None] - predicted[None], axis=2)
     i, k = np.nonzero(distance <= radius)
     if len(i) > _CANDIDATES:
@@ -200,18 +192,35 @@ def _hypotheses(
     agree = (np.abs(np.abs(first) - np.abs(second)) < 3 * tolerance + stretch * np.abs(first)) & (
         np.abs(first) > min(radius, 0.25 * np.ptp(measured, axis=0).max())
     )
-    # Small turns first: the approximate attitude is nearly right.
-    turn = np.abs(np.angle(second[agree] / first[agree]))
-    order = np.argsort(np.round(turn, 2) * 10 - np.abs(first[agree]) / np.abs(first).max(initial=1.0))
-    made = []
-    order = order[:_MORE]
-    for p, z, w in zip(a[agree][order], first[agree][order], second[agree][order], strict=True):
-        factor = w / z
-        shift = predicted[k[p]] @ np.array([1, 1j]) - factor * (measured[i[p]] @ np.array([1, 1j]))
-        made.append(
-            np.array([[factor.real, factor.imag], [-factor.imag, factor.real], [shift.real, shift.imag]])
-        )
-    return made, int(agree.sum())
+    a, b, z, w = a[agree], b[agree], first[agree], second[agree]
+    factor = w / z
+    shift = predicted[k[a]] @ np.array([1, 1j]) - factor * (measured[i[a]] @ np.array([1, 1j]))
+    rows = [[factor.real, factor.imag], [-factor.imag, factor.real], [shift.real, shift.imag]]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _promising(transforms: Floats, seeds: Floats, predicted: Floats, limit: float) -> Floats:
+    """Return the similarities (h, 3, 2) under which the most images fall near a star, counted in a raster."""
+    corner = predicted.min(axis=0) - 3 * limit
+    size = max(0.5 * limit, float(np.ptp(predicted, axis=0).max()) / _RASTER)
+    shape = np.ceil((predicted.max(axis=0) + 3 * limit - corner) / size).astype(np.int64) + 1
+    near = np.zeros(shape, bool)
+    steps = math.ceil(limit / size)
+    x, y = np.floor((predicted - corner) / size).astype(np.int64).T
+    for dx in range(-steps, steps + 1):
+        for dy in range(-steps, steps + 1):
+            if math.hypot(dx, dy) * size <= limit:
+                near[np.clip(x + dx, 0, shape[0] - 1), np.clip(y + dy, 0, shape[1] - 1)] = True
+    # The rim is far from every star: what falls outside goes there.
+    near[0] = near[-1] = False
+    near[:, 0] = near[:, -1] = False
+    counts = np.empty(len(transforms), np.int64)
+    for first in range(0, len(transforms), _BATCH):
+        some = transforms[first : first + _BATCH]
+        cells = (seeds @ some[:, :2] + some[:, 2:] - corner) / size
+        column, row = np.clip(cells, 0, shape - 1).astype(np.int64).transpose(2, 0, 1)
+        counts[first : first + _BATCH] = near[column, row].sum(axis=1)
+    return transforms[np.argsort(-counts, kind="stable")[:_EXACT]]
 
 
 def _apply(transform: Floats, points: Floats) -> Floats:
