@@ -83,9 +83,12 @@ def calibrate(
     free = free_parameters(problem)
     _check_groups(problem)
     limit = problem.options.max_iterations
-    solved = iterate(problem, initial, free, solution="maximum", limit=limit)
-    stages = (*stages, _stage(problem, solved))
     remarks: list[str] = []
+    if problem.options.as_published:
+        solved, remarks = _from_far(problem, initial, free)
+    else:
+        solved = iterate(problem, initial, free, solution="maximum", limit=limit)
+    stages = (*stages, _stage(problem, solved))
     if problem.options.refraction and solved.converged:
         solved = _refraction(problem, iterate, solved)
         stages = (*stages, _stage(problem, solved))
@@ -99,6 +102,33 @@ def calibrate(
         )
     result = _result(problem, problem, solved, stages, remarks=remarks)
     return _combined(result, threads) if problem.options.movement_factor > 0 else result
+
+
+def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, list[str]]:
+    """Iterate as published; where its steps, which nothing damps, lead astray, from better attitudes.
+
+    A deck starts all groups with the attitude of the event. Attitudes by the strict iteration, the camera held,
+    begin where the report's steps lead to its solution, which does not depend on the beginning.
+    """
+    run = partial(published.iterate, solution="maximum", limit=problem.options.max_iterations)
+    failed: AdjustmentError | None = None
+    try:
+        solved = run(problem, initial, free)
+        if solved.stop != published.DIVERGED:
+            return solved, []
+    except AdjustmentError as error:
+        failed = error
+    attitudes = free & (np.arange(len(free)) < INDEX["epsilon"])
+    try:
+        start = strict.iterate(problem, initial, attitudes, solution="maximum", limit=0).parameters
+        again = run(problem, start, free)
+        if again.converged:
+            return again, ["the initial attitudes are far: the iteration began with those of a damped one"]
+    except AdjustmentError:
+        pass
+    if failed is not None:
+        raise failed
+    return solved, []
 
 
 def free_parameters(problem: Problem) -> Bools:
