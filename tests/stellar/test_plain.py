@@ -148,7 +148,11 @@ def test_every_option_can_be_given(folder):
         ("[axis]", "[axle]", "there is no table axle"),
         ("curves = true", "curfes = true", "there is no option curfes"),
         ("curves = true", 'curves = "no"', r"\[options\] curves is 'no', neither true nor false"),
-        ("max_iterations = 8", 'max_iterations = "many"', r"\[options\] max_iterations is 'many', not a whole number"),
+        (
+            "max_iterations = 8",
+            'max_iterations = "many"',
+            r"\[options\] max_iterations is 'many', not a whole number",
+        ),
         ("max_iterations = 8", "max_iterations = -1", "cannot be negative"),
         ("interval = 0.01", "interval = 0.0", "must be positive"),
         ('minimum_stars = [1, "2"]', "minimum_stars = []", "option 7 .pre-run. needs option 6"),

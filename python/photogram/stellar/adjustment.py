@@ -107,8 +107,8 @@ def calibrate(
 def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, list[str]]:
     """Iterate as published; where its steps, which nothing damps, lead astray, from better attitudes.
 
-    A deck starts all groups with the attitude of the event. Attitudes by the strict iteration, the camera held,
-    begin where the report's steps lead to its solution, which does not depend on the beginning.
+    A deck starts all groups with the attitude of the event. Attitudes by the strict iteration, the camera
+    held, begin where the report's steps lead to its solution, which does not depend on the beginning.
     """
     run = partial(published.iterate, solution="maximum", limit=problem.options.max_iterations)
     failed: AdjustmentError | None = None

@@ -120,7 +120,7 @@ def find_hint(exposures: Sequence[Exposure], names: Sequence[str], setting: Sett
         rank = (len(explained), -odds)
         if explained and (best is None or rank > best[0]):
             width = 2 * math.degrees(math.atan(setting.frame[0] / 2 / float(np.median(scales))))
-            best = (rank, Hint(mistake.text.format(field=width), tuple(explained)))
+            best = (rank, Hint(mistake.text.format(field=width), tuple(n for n in names if n in explained)))
     return best and best[1]
 
 
@@ -141,7 +141,9 @@ def _mistakes() -> list[_Mistake]:
         _Mistake("roll_deg counts counterclockwise", _pointed(lambda a, e, r: (a, e, -r))),
         _Mistake("the longitude counts to the east, not to the west", _other_longitude),
     ]
-    found += [_Mistake(f"roll_deg is {turn:+d} degrees more", _rolled(turn)) for turn in (90, 180, -90)]
+    found += [
+        _Mistake(f"roll_deg has to be changed by {turn:+d} degrees", _rolled(turn)) for turn in (90, 180, -90)
+    ]
     found += [
         _Mistake("the horizontal field of view is about {field:.1f} degrees", _scaled(scale), _WIDE)
         for scale in _SCALES

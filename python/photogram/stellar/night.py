@@ -151,8 +151,19 @@ class CalibratedNight:
 
     @property
     def usable(self) -> bool:
-        """Whether the camera may be used: converged, and residuals of the size of their errors or near it."""
-        return self.converged and not (self.test and self.test.rejected_high and self.test.factor > DOUBTFUL)
+        """Whether the camera may be used.
+
+        Not so when the adjustment has not converged, residuals are larger than assumed by a factor of
+        `DOUBTFUL`, or more exposures are left out than take part.
+        """
+        test = self.test
+        beyond = test is not None and test.rejected_high and test.factor > DOUBTFUL
+        return self.converged and not beyond and not self.mostly_left_out
+
+    @property
+    def mostly_left_out(self) -> bool:
+        """Whether more exposures are left out than take part."""
+        return len(self.night.exposures) > 2 * len(self.exposures)
 
     @property
     def camera(self) -> BrownCamera:
@@ -436,9 +447,12 @@ def _failed(result: CalibratedNight) -> list[Message]:
     texts = []
     if not result.converged:
         texts.append(f"the adjustment has not converged: {result.calibration.status}: do not use this camera")
-    failed = result.test.problem() if result.test else None
-    if failed:
-        texts.append(failed if result.usable else f"{failed}: do not use this camera")
+    if result.mostly_left_out:
+        texts.append("more exposures are left out than take part: do not use this camera")
+    test = result.test
+    failed = test.problem() if test else None
+    if test and failed:
+        texts.append(f"{failed}: do not use this camera" if test.factor > DOUBTFUL else failed)
         texts.append(
             "the stars are found beyond doubt: sd_px is too small, or the terms of Brown do not describe this"
             " camera (a fisheye needs others)"

@@ -31,8 +31,8 @@ _LIMIT, _MORE = 100, 5
 _FIRST, _NEXT = 25, 8
 """Iterations after which the sum of squares is looked at, and again and again."""
 _STILL = 1e-6
-"""Change of the sum of squares, in units of the squared mean error of unit weight, that is none: the root of it
-is what unknowns move in mean errors where it is smallest."""
+"""Change of the sum of squares, in units of the squared mean error of unit weight, that is none: its root is how
+far unknowns are from the smallest sum, in mean errors."""
 
 
 def iterate(
@@ -148,7 +148,7 @@ class _Run:
     def settle(
         self, parameters: Floats, places: Floats, free: Bools, unit: float, fraction: float
     ) -> dict[str, Any]:
-        """Adjust until the corrections are small, the sum of squares stands still, or the limit is reached."""
+        """Adjust until corrections are small, the sum of squares stands still, or the limit is reached."""
         found = self.adjust(parameters, places, free, unit, fraction, most=_FIRST)
         while found["status"] != "converged":
             if self._still():
