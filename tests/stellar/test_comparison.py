@@ -105,8 +105,8 @@ def test_the_failed_global_test_comes_first_and_the_camera_is_not_usable(folder)
 
 
 def test_a_fisheye_under_the_terms_of_brown_is_not_usable(night):
-    """An equidistant lens of 100 degrees, its stars named."""
-    camera = BrownCamera.of_field(*night.frame, np.radians(100))
+    """An equidistant lens of more than 100 degrees, its stars named."""
+    camera = BrownCamera.of_field(*night.frame, np.radians(130))
     exposures = []
     for given in night.exposures[:3]:
         bright = night.catalogue.brighter(5.0)
@@ -117,7 +117,7 @@ def test_a_fisheye_under_the_terms_of_brown_is_not_usable(night):
         radius = np.linalg.norm(seen, axis=1, keepdims=True)
         xy = camera.values[2:4] + camera.values[0] * seen * np.arctan(radius) / radius
         with np.errstate(invalid="ignore"):
-            inside = np.flatnonzero(((xy > 0) & (xy < night.frame)).all(axis=1) & (radius[:, 0] < 1.2))
+            inside = np.flatnonzero(((xy > 0) & (xy < night.frame)).all(axis=1) & (radius[:, 0] < 2.2))
         exposures.append(replace(given, xy=xy[inside], stars=inside))
     result = calibrate_night(replace(night, exposures=exposures, names=("1", "2", "3"), camera=camera))
     assert not result.usable
@@ -144,4 +144,5 @@ def test_a_star_that_is_named_is_used_though_it_is_too_faint(folder, result):
     night = read_night(file)
     assert night.catalogue.magnitudes.max() > 5.5
     again = calibrate_night(night)
-    assert again.camera.values == pytest.approx(result.camera.values, rel=1e-9)
+    errors = np.sqrt(np.diag(result.camera.covariance))
+    assert np.abs((again.camera.values - result.camera.values) / errors).max() < 1e-2

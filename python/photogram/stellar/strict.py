@@ -31,8 +31,8 @@ _LIMIT, _MORE = 100, 5
 _FIRST, _NEXT = 25, 8
 """Iterations after which the sum of squares is looked at, and again and again."""
 _STILL = 1e-6
-"""Change of the sum of squares, in units of the squared mean error of unit weight, that is none: its root is how
-far unknowns are from the smallest sum, in mean errors."""
+"""Change of the sum of squares, in units of the squared mean error of unit weight, that is none: its root is
+how far unknowns are from the smallest sum, in mean errors."""
 
 
 def iterate(
