@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -26,6 +27,9 @@ _STATION = {
     "number",
     "name",
 }
+_MOST_DIGITS = 1000
+_ENDLESS = re.compile(rf"\d[\d_]{{{_MOST_DIGITS}}}")
+"""Python refuses whole numbers of thousands of digits, and does not say where they stand."""
 _LONGEST = 60
 """Characters of a value that an error shows."""
 
@@ -298,11 +302,20 @@ def read_document(path: Path, tables: Mapping[str, Collection[str] | None]) -> D
         The file cannot be read, is not TOML, or has tables or keys besides these.
     """
     try:
-        document = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+        text = read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(str(error), file=path) from None
+    for number, line in enumerate(text.splitlines(), 1):
+        if _ENDLESS.search(line):
+            key = line.split("=")[0].strip()[:_LONGEST]
+            raise InputError(
+                f"{key} has a number of more than {_MOST_DIGITS} digits", file=path, record=number
+            )
+    try:
+        document = tomllib.loads(text)
     except RecursionError:
         raise InputError("brackets are nested too deeply", file=path) from None
-    except ValueError as error:
-        # Not TOML, not UTF-8, or a whole number of thousands of digits.
+    except tomllib.TOMLDecodeError as error:
         raise InputError(str(error), file=path) from None
     unknown = sorted(set(document) - set(tables))
     if unknown:
