@@ -251,6 +251,8 @@ class BlockError(Exception):
 def adjust_block(
     photo_positions: _Floats,
     photo_attitudes: _Floats,
+    photo_positions_observed: _Floats,
+    photo_attitudes_observed: _Floats,
     photo_position_sd: _Floats,
     photo_attitude_sd: _Floats,
     principal_distances: _Floats,
@@ -282,9 +284,12 @@ def adjust_block(
 
     Parameters
     ----------
-    photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd
-        (P, 3) initial (and, where weighted, observed) values and their standard deviations; omega, phi, kappa
-        in radians.
+    photo_positions, photo_attitudes
+        (P, 3) initial values, at which fixed components stay; omega, phi, kappa in radians.
+    photo_positions_observed, photo_attitudes_observed
+        (P, 3) observed values where weighted; angles may differ from initial ones by whole turns.
+    photo_position_sd, photo_attitude_sd
+        (P, 3) standard deviations of the observed values.
     principal_distances
         (P,) millimetres, signed.
     point_positions, point_sd
@@ -714,6 +719,11 @@ x - c_x = s A (X - c_X) + t."""
 ParametersRow = tuple[float, _Matrix, _Vector]
 """Scale s, rotation A (3 x 3), translation B of the similarity x = s A X + B."""
 
+TraceRow = tuple[_Matrix, tuple[list[tuple[int, int]], _Floats], _Floats, _Floats, list[float], list[float]]
+"""One cycle of the bulletin: rotation A as it began; (station, component) and (m, 8) P-values of equations;
+normal equations C (7, 8); auxiliary table D (7, 8); seven results; corrected omega, phi, kappa, s, b1, b2,
+b3."""
+
 class SimilarityError(Exception):
     """A model that cannot be oriented.
 
@@ -733,6 +743,7 @@ def orient_model(
     max_iterations: int,
     tolerance: float,
     threads: int,
+    trace: bool,
 ) -> SimilaritySolution:
     """Find the similarity x = s A X + B between control X and model x (C&GS Technical Bulletin 19).
 
@@ -742,7 +753,8 @@ def orient_model(
         (n, 3) ground units: coordinates, NaN where unknown, and standard deviations, zero for an exact one,
         infinite for one that takes no part.
     model, model_sd
-        (n, 3) model units: coordinates and their standard deviations, positive.
+        (n, 3) model units: coordinates and their standard deviations; zero where those of the control are
+        positive.
     method
         `rigorous`, `report` or `fill-in`.
     start
@@ -755,6 +767,8 @@ def orient_model(
         Fraction of its standard deviation by which no unknown changes any more (rigorous method).
     threads
         Number of threads; 0 for all processors.
+    trace
+        Whether the report's methods keep what each cycle computed on its way.
 
     Raises
     ------
@@ -795,6 +809,10 @@ class SimilaritySolution:
     @property
     def cycles(self) -> list[float] | None:
         """Largest correction of an angle (rad) in each cycle of the report's methods, else None."""
+
+    @property
+    def traces(self) -> list[TraceRow]:
+        """What each of these cycles computed on its way, where it was asked for."""
 
     @property
     def tangent_cofactors(self) -> _Floats:

@@ -11,7 +11,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.block import Block
+from photogram.arrays import number, one_of, whole_number
+from photogram.block import Block, checked
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.memory import available_memory
 from photogram.messages import Message, listed
@@ -141,18 +142,27 @@ def adjust(
     """
     if max_iterations is None:
         max_iterations = 50 if loss is None else 200
-    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads)
+    checked(block)
+    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads, progress)
     row = loss_row(loss, scale)
     if row and as_published:
         raise InputError("the 1987 program has no robust loss: as_published or loss")
     check_cameras(block)
     if fix_photos:
-        block = block.replace(photo_position_sd=np.array(0.0), photo_attitude_sd=np.array(0.0))
+        block = block.replace(
+            photo_position_sd=0.0,
+            photo_attitude_sd=0.0,
+            photo_positions_observed=None,
+            photo_attitudes_observed=None,
+        )
+    positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
 
     try:
         solution = _photocore.adjust_block(
             block.photo_positions,
             block.photo_attitudes,
+            block.photo_positions if positions is None else positions,
+            block.photo_attitudes if attitudes is None else attitudes,
             block.photo_position_sd,
             block.photo_attitude_sd,
             block.principal_distances,
@@ -202,19 +212,20 @@ def _check_options(
     tolerance: float,
     as_published: AsPublished | None,
     threads: int | None,
+    progress: object,
 ) -> None:
-    if unit_variance not in get_args(UnitVariance):
-        raise InputError(
-            f"unit_variance is one of {', '.join(get_args(UnitVariance))}, not {unit_variance!r}"
-        )
-    if ordering not in get_args(Ordering):
-        raise InputError(f"ordering is one of {', '.join(get_args(Ordering))}, not {ordering!r}")
-    if max_iterations < 1 or (as_published and as_published.max_iterations < 1):
+    one_of("unit_variance", unit_variance, get_args(UnitVariance))
+    one_of("ordering", ordering, get_args(Ordering))
+    if as_published is not None and not isinstance(as_published, AsPublished):
+        raise InputError(f"as_published is an AsPublished or None, not {as_published!r}")
+    if whole_number("max_iterations", as_published.max_iterations if as_published else max_iterations) < 1:
         raise InputError("there must be one iteration at least")
-    if not tolerance > 0 or (as_published and not as_published.percent > 0):
+    if not number("the criterion", as_published.percent if as_published else tolerance) > 0:
         raise InputError("the criterion of convergence must be positive")
-    if threads is not None and threads < 1:
+    if threads is not None and whole_number("threads", threads) < 1:
         raise InputError(f"threads must be positive, not {threads}")
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress is no function: {progress!r}")
 
 
 def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:

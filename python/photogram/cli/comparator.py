@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import failures, output, print_remark, print_written
+from photogram.cli.console import output, print_remark, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import Quiet, default_out
-from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, Options
@@ -33,9 +33,12 @@ class Hand(StrEnum):
     RIGHT = "right"
 
 
+@with_job
 def comparator(
+    job: Job,
     paths: Annotated[
         list[Path] | None,
+        Reads.FILE,
         typer.Argument(
             metavar="FILE...",
             help="Tables (*.csv) of one calibration; or files of decks of cards, one calibration a deck.",
@@ -48,6 +51,7 @@ def comparator(
     ] = False,
     grid: Annotated[
         list[str] | None,
+        Reads.FILE,
         typer.Option(
             metavar="GRID",
             help="Grid plate: 773, 1320, 778 or a file (point, x_um, y_um); again for more plates."
@@ -60,6 +64,7 @@ def comparator(
     ] = Hand.FILE,
     out: Annotated[
         Path | None,
+        Writes.DIRECTORY,
         typer.Option(
             metavar="OUT",
             help="Directory for the results. Default: FILE-calibrated beside the first FILE.",
@@ -68,6 +73,7 @@ def comparator(
     ] = None,
     json: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="FILE",
             help="Write everything as one JSON document (a list of them for several decks).",
@@ -100,13 +106,14 @@ def comparator(
     """
     if example == bool(paths):
         raise typer.BadParameter("give files, or --example", param_hint="FILE")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from photogram.comparator import Options, calibrate, find_grid, read
         from photogram.errors import InputError
 
         if example:
             packaged = files("photogram") / "examples" / "comparator" / EXAMPLE
             paths = [resources.enter_context(as_file(packaged))]
+            job.reads(*paths)
             out = out or Path("comparator-calibrated")
         left_handed = None if hand is Hand.FILE else hand is Hand.LEFT
         sessions = read(paths or [], [find_grid(name) for name in grid or []], left_handed=left_handed)
@@ -120,13 +127,12 @@ def comparator(
                 )
         folder = out or default_out((paths or [])[0], "-calibrated")
         written = _results(calibrations, folder, pdf=pdf, pictures=pictures, quiet=quiet)
-        if json is not None:
-            written[json] = _documents(calibrations)
-        write_results(written, paths or [])
+        documents = {json: _documents(calibrations)} if json is not None else {}
+        job.write(written, documents)
         if not quiet:
             for calibration in calibrations:
                 _summarize(calibration)
-            print_written(written)
+            print_written([*written, *documents])
 
 
 def _with(options: Options, polynomial: bool, estimate_grid: bool) -> Options:
@@ -188,16 +194,22 @@ def _summarize(calibration: Calibration) -> None:
         )
 
 
+@with_job
 def correct(
+    job: Job,
     correction: Annotated[
         Path,
+        Reads.FILE,
         typer.Argument(metavar="CORRECTION", help="correction.json, or the JSON document of a calibration."),
     ],
     measurements: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Table with columns x_um, y_um (or x_mm, y_mm).")
+        Path,
+        Reads.FILE,
+        typer.Argument(metavar="FILE", help="Table with columns x_um, y_um (or x_mm, y_mm)."),
     ],
     out: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(metavar="OUT", help="Table to write. Default: standard output.", show_default=False),
     ] = None,
     invert: Annotated[
@@ -208,7 +220,7 @@ def correct(
 
     Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (what the calibration contributes).
     """
-    with failures():
+    with job:
         from photogram.comparator.apply import correct_table
         from photogram.comparator.correction import Correction
         from photogram.comparator.csvfile import read_table
@@ -217,4 +229,4 @@ def correct(
         if out is None:
             typer.echo(made.decode(), nl=False)
         else:
-            write_results({out: made}, [correction, measurements])
+            job.write({out: made})

@@ -38,7 +38,7 @@ def correct_table(correction: Correction, table: Table, *, invert: bool = False)
         A row without coordinates, or no row.
     """
     places = []
-    for row in table.rows:
+    for row in table.records.rows():
         xy = table.coordinates_um(row)
         if xy is None:
             raise row.place.error("the coordinates are blank")
@@ -56,6 +56,6 @@ def correct_table(correction: Correction, table: Table, *, invert: bool = False)
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([*table.columns, *columns])
-    for row, own in zip(table.rows, values.tolist(), strict=True):
+    for row, own in zip(table.records.rows(), values.tolist(), strict=True):
         writer.writerow([*row.cells.values(), *(f"{value:.4f}" for value in own)])
     return buffer.getvalue().encode()

@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
+from photogram.numbers import is_whole_number, whole_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,28 +96,25 @@ def read_grid(path: Path) -> Grid:
     InputError
         The file cannot be read or is not such a table.
     """
-    table = read_table(path)
-    table.require("point")
+    table = read_table(path, "point")
     points, xy = [], []
-    for row in table.rows:
+    for row in table.records.rows():
         coordinates = table.coordinates_um(row)
         if coordinates is not None:
             points.append(row.integer("point"))
             xy.append(coordinates)
-    number = table.integer_setting("grid", 0)
-    sigma = table.settings.get("sigma_um")
+    number, sigma = table.settings.get("grid"), table.settings.get("sigma_um")
+    deviation = None if sigma is None else sigma.number()
     try:
         return Grid(
-            number,
+            0 if number is None else number.integer(),
             np.array(points, dtype=np.int64),
             np.array(xy, dtype=float).reshape(-1, 2),
-            None if sigma is None else float(sigma),
-            table.settings.get("adopted", ""),
+            deviation,
+            table.text("adopted"),
         )
     except InputError as error:
         raise InputError(error.message, file=path) from None
-    except ValueError:
-        raise InputError(f"sigma_um = {sigma!r} is not a number", file=path) from None
 
 
 @cache
@@ -145,6 +143,13 @@ def find_grid(name: str) -> Grid:
     InputError
         It is neither.
     """
-    if name.isdigit() and not Path(name).exists():
-        return built_in_grid(int(name))
+    if is_whole_number(name) and not Path(name).exists():
+        return built_in_grid(_plate_number(name))
     return read_grid(Path(name))
+
+
+def _plate_number(name: str) -> int:
+    try:
+        return whole_number(name)
+    except ValueError as error:
+        raise InputError(f"grid {error}") from None

@@ -9,6 +9,7 @@ from photogram.comparator.csvfile import Table, read_table
 from photogram.comparator.grid import Grid, find_grid
 from photogram.comparator.readings import Case, Reading, Session, collect_cases
 from photogram.errors import InputError
+from photogram.numbers import is_whole_number
 from photogram.rows import Row
 
 __all__ = ["read_csv", "to_csv"]
@@ -38,22 +39,22 @@ def read_csv(
     InputError
         A file that is no such table, no plate, a case measured twice.
     """
-    tables = [read_table(path) for path in paths]
+    tables = [read_table(path, "case", "point") for path in paths]
     plates = {grid.number: grid for grid in grids}
     if not plates:
         plates = {grid.number: grid for table in tables for grid in _named_grids(table)}
     if not plates:
         raise InputError("names no grid plate: '# grid = 1320', or --grid", file=paths[0])
     cases = collect_cases(reading for table in tables for reading in _readings(table, plates))
-    said = [table.switch("left_handed") for table in tables]
+    said = [table.settings["left_handed"].switch() for table in tables if "left_handed" in table.settings]
     session = Session(
         cases=cases,
         grids=plates,
-        comparator=max(table.integer_setting("comparator", 0) for table in tables),
-        date=next((table.settings["date"] for table in tables if "date" in table.settings), ""),
-        left_handed=left_handed
-        if left_handed is not None
-        else next((s for s in said if s is not None), None),
+        comparator=max(
+            (t.settings["comparator"].integer() for t in tables if "comparator" in t.settings), default=0
+        ),
+        date=next((table.text("date") for table in tables if "date" in table.settings), ""),
+        left_handed=left_handed if left_handed is not None else next(iter(said), None),
         source=paths[0],
     )
     session.check()
@@ -62,15 +63,14 @@ def read_csv(
 
 def _named_grids(table: Table) -> list[Grid]:
     """Return the plates that a table names: built in, or files beside it."""
-    names = [name.strip() for name in table.settings.get("grid", "").split(",") if name.strip()]
-    return [find_grid(name if name.isdigit() else str(table.path.parent / name)) for name in names]
+    names = [name.strip() for name in table.text("grid").split(",") if name.strip()]
+    return [find_grid(name if is_whole_number(name) else str(table.path.parent / name)) for name in names]
 
 
 def _readings(table: Table, plates: dict[int, Grid]) -> list[Reading]:
-    table.require("case", "point")
     return [
         _reading(row, xy, next(iter(plates)) if len(plates) == 1 else 0)
-        for row in table.rows
+        for row in table.records.rows()
         if (xy := table.coordinates_um(row)) is not None
     ]
 

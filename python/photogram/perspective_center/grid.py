@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arrays import shaped
+from photogram.arrays import names, number, shaped
 from photogram.errors import InputError
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "reduce"]
@@ -95,7 +96,7 @@ class Grid:
     number: int = 1
 
     def __post_init__(self) -> None:
-        count = len(self.ids)
+        count = len(names("ids", self.ids))
         shapes: dict[str, tuple[int, ...]] = {
             "plate_xy": (count, 2),
             "model": (count, 3),
@@ -108,11 +109,11 @@ class Grid:
             if not np.isfinite(values).all():
                 raise InputError(f"{name} holds values that are not finite")
             object.__setattr__(self, name, values)
-        readings = shaped("readings", self.readings, (count,)).astype(np.int64)
-        if (readings < 1).any():
-            raise InputError("readings: every point has one reading at least")
-        object.__setattr__(self, "readings", readings)
-        if not self.principal_distance > 0:
+        readings = shaped("readings", self.readings, (count,))
+        if not ((readings >= 1) & (readings < 2**53) & (readings == np.trunc(readings))).all():
+            raise InputError("readings: every point has a whole number of them, one at least")
+        object.__setattr__(self, "readings", readings.astype(np.int64))
+        if not 0 < number("principal_distance", self.principal_distance) < math.inf:
             raise InputError(f"the principal distance must be positive, not {self.principal_distance}")
 
 

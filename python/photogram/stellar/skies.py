@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.errors import AdjustmentError, InputError
+from photogram.memory import available_memory
 from photogram.stellar.cameras import BROWN_PLACE, COMMON, BrownCamera, weight_of
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
@@ -37,6 +38,8 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _STILL = Earth()
 _SLACK = math.radians(2.0)
+_PER_IMAGE = 2000
+"""Bytes of memory that an image takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +204,7 @@ def calibrate_exposures(
     InputError
         An exposure without stars; a parameter that does not exist; a standard deviation that is not positive.
     AdjustmentError
-        The stars do not determine the camera.
+        The stars do not determine the camera, or the memory does not hold the adjustment.
     """
     unknown = sorted(set(fixed) - set(BrownCamera.NAMES))
     if unknown:
@@ -210,6 +213,7 @@ def calibrate_exposures(
         raise InputError(f"the standard deviation of an image coordinate is {pixel_sd} pixels")
     place = earth.site_of_date(site)
     images = _Images(exposures, place, catalogue, earth.dut1, weigh_stars)
+    _refuse_too_large(len(images.xy), len(exposures), weigh_stars)
     free = np.array([name not in fixed for name in BrownCamera.NAMES])
     core = _core(images, exposures, camera, place, free, prior, pixel_sd)
     try:
@@ -227,6 +231,18 @@ def calibrate_exposures(
     turned = [transformed_angles(angles, place, site, earth.pole) for angles in result.attitudes]
     change = np.array(turned) - result.attitudes
     return replace(result, attitudes=result.attitudes + np.remainder(change + np.pi, 2 * np.pi) - np.pi)
+
+
+def _refuse_too_large(images: int, exposures: int, weigh_stars: bool) -> None:
+    """Refuse what the machine cannot hold: stars that are estimated tie all attitudes to each other."""
+    attitudes = 3 * exposures
+    needed = _PER_IMAGE * images + (16 * attitudes**2 if weigh_stars else 0)
+    free = available_memory()
+    if free is not None and needed > free:
+        raise AdjustmentError(
+            f"{exposures} exposures with {images} images take {needed / 2**30:.1f} GiB of memory, and"
+            f" {free / 2**30:.1f} GiB are free" + ("; hold the stars" if weigh_stars else "")
+        )
 
 
 def partials(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["critical", "fit", "mad_sd"]
+__all__ = ["critical", "fit", "mad_sd", "normal_of_chi_square"]
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +28,12 @@ def mad_sd(values: Floats) -> float:
 def critical(tests: int, chance: float = 0.01) -> float:
     """Return what the largest of so many normal values exceeds with a given chance (Bonferroni)."""
     return NormalDist().inv_cdf(1 - chance / 2 / max(tests, 1))
+
+
+def normal_of_chi_square(value: float, freedom: int) -> float:
+    """Turn chi-square into a normal value (Wilson and Hilferty, 1931)."""
+    spread = 2 / (9 * freedom)
+    return float(((value / freedom) ** (1 / 3) - (1 - spread)) / math.sqrt(spread))
 
 
 def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:

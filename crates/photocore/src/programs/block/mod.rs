@@ -25,10 +25,14 @@ pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
 /// A photograph as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
 pub struct Photo {
-    /// Initial (and, where weighted, observed) position in the coordinates of the object space.
+    /// Initial position in the coordinates of the object space; that of fixed components.
     pub position: Vector3,
-    /// Initial (and, where weighted, observed) omega, phi, kappa in radians.
+    /// Initial omega, phi, kappa in radians; those of fixed angles.
     pub attitude: Vector3,
+    /// Observed position; of its components those count that are weighted.
+    pub observed_position: Vector3,
+    /// Observed omega, phi, kappa in radians, whole turns apart; those count that are weighted.
+    pub observed_attitude: Vector3,
     /// Standard deviations of the position: infinite free, zero fixed.
     pub position_sd: Vector3,
     /// Standard deviations of the attitude in radians: infinite free, zero fixed.
@@ -236,9 +240,17 @@ impl Block {
             order,
         };
         let photo_values = |photo: &Photo| [local(photo.position), photo.attitude];
+        let photo_prior = |photo: &Photo| {
+            let mut position = photo.observed_position;
+            if let ObjectSpace::Geographic(_) = self.space {
+                [position[0]] = geometry::nearest_turns([position[0]], [photo.position[0]]);
+            }
+            [local(position), geometry::nearest_turns(photo.observed_attitude, photo.attitude)]
+        };
         let photo_sd = |photo: &Photo| [photo.position_sd, photo.attitude_sd];
         let photos =
             self.photos.iter().map(photo_values).collect::<Vec<_>>().into_flattened().into_flattened();
+        let prior = self.photos.iter().flat_map(photo_prior).flatten();
         let met = model.intersect(&model.photos(&photos));
         let coordinates = met.map_err(|point| BlockError::NoIntersection(points[point]))?;
         let own: Vec<Vector3> = model.points.iter().map(|point| point.coordinates).collect();
@@ -251,8 +263,8 @@ impl Block {
         Ok(Problem {
             observation_sd: model.images.iter().flat_map(|image| image.sd).collect(),
             system: System::new(layout, options.ordering),
-            initial: [coordinates.into_flattened(), photos.clone()].concat(),
-            prior: [own.into_flattened(), photos].concat(),
+            initial: [coordinates.into_flattened(), photos].concat(),
+            prior: own.into_flattened().into_iter().chain(prior).collect(),
             sd,
             model,
         })
