@@ -65,7 +65,10 @@ def equations(block, result):
     weighted = np.flatnonzero((sds > 0) & np.isfinite(sds))
     own = np.zeros((len(weighted), unknowns), REAL)
     own[np.arange(len(weighted)), weighted] = 1 / sds[weighted]
-    a, right = np.vstack([a, own]), np.concatenate([right, (given[weighted] - values[weighted]) / sds[weighted]])
+    a, right = (
+        np.vstack([a, own]),
+        np.concatenate([right, (given[weighted] - values[weighted]) / sds[weighted]]),
+    )
     return a, right, np.flatnonzero(sds != 0), values.astype(float)
 
 

@@ -42,7 +42,9 @@ def test_the_others_are_as_if_the_point_were_not_there(tolerance):
     expected = adjust(SOUND.collection, tolerance=tolerance)
     result = adjust(with_point(), tolerance=tolerance)
     assert result.converged
-    assert any(str(m) == f"left out, points that ran into the station of a photo: {WRONG}" for m in result.messages)
+    assert any(
+        str(m) == f"left out, points that ran into the station of a photo: {WRONG}" for m in result.messages
+    )
     assert result.point_rays[WRONG] == 0
     assert np.isnan(result.point_positions[WRONG]).all()
     np.testing.assert_allclose(result.photo_sd, expected.photo_sd, rtol=1e-6)
