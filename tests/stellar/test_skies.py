@@ -112,7 +112,7 @@ def test_what_the_memory_does_not_hold_is_refused(catalogue, monkeypatch):
     bright = catalogue.brighter(4.0)
     exposure = expose(bright, "2024-03-01T21:10:00", np.array([0.2, -0.1, 0.4]), np.random.default_rng(1))
     monkeypatch.setattr("photogram.stellar.skies.available_memory", lambda: 1000)
-    with pytest.raises(AdjustmentError, match="1 exposures with .* images take 0.0 GiB of memory"):
+    with pytest.raises(AdjustmentError, match=r"1 exposures with .* images take 0\.0 GiB of memory"):
         calibrate_exposures([exposure], TRUTH, SITE, bright)
 
 
