@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments import path
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
 from photogram.numbers import is_whole_number, whole_number
@@ -57,7 +58,7 @@ class Grid:
         values, counts = np.unique(self.points, return_counts=True)
         if (counts > 1).any():
             raise InputError(f"plate {self.number} has point {values[counts > 1][0]} twice")
-        if self.xy_um.shape != (len(self.points), 2) or not np.isfinite(self.xy_um).all():
+        if self.xy_um.shape != (*np.shape(self.points)[:1], 2) or not np.isfinite(self.xy_um).all():
             raise InputError(f"plate {self.number} needs two coordinates for each of its points")
         if self.sigma_um is not None and not 0 <= self.sigma_um < np.inf:
             raise InputError(f"plate {self.number}: {self.sigma_um} um is no standard deviation")
@@ -147,9 +148,10 @@ def find_grid(name: str) -> Grid:
     InputError
         It is neither.
     """
-    if is_whole_number(name) and not Path(name).exists():
+    file = path("name", name)
+    if is_whole_number(name) and not file.exists():
         return built_in_grid(_plate_number(name))
-    return read_grid(Path(name))
+    return read_grid(file)
 
 
 def _plate_number(name: str) -> int:

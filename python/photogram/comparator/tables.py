@@ -40,6 +40,8 @@ def read_csv(
     InputError
         A file that is no such table, no plate, a case measured twice.
     """
+    if not paths:
+        raise InputError("there is no table to read")
     tables = [read_table(path, "case", "point") for path in paths]
     plates = {grid.number: grid for grid in grids}
     if not plates:
