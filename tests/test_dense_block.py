@@ -1,7 +1,7 @@
 """Random blocks, ordinary and extreme, against an independent dense solution in extended precision.
 
 Coordinates, standard deviations and origins run from 1e-300 to 1e300. Every block ends in agreement with the
-dense solution or in words: an exception of the package, a status, or a remark that names what is undetermined.
+dense solution or in words: an exception of the package, a status, or a remark.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def images(positions, attitudes, distances, points):
 
 
 def equations(block, result):
-    """Return coefficients and right-hand sides of all observations with unit weight at the adjusted values, free unknowns only."""
+    """Return coefficients and right-hand sides, weighted to one, at the adjusted values."""
     used = result.used_points
     index = np.cumsum(used) - 1
     photos, kept = len(block.photo_ids), result.used_images
@@ -102,8 +102,7 @@ def agrees(block, result):
     rounding = (np.spacing(np.abs(values))[free] / sd).max()
     assert change < 1e-3 + 3 * rounding, f"{change} standard deviations from the dense solution"
     if np.median(block.image_sd) > 1:
-        # Millimetres and more: standard deviations beyond the block itself, as long as the last step before which
-        # cofactors are computed.
+        # Standard deviations exceed the block, and so may be the last step: cofactors hold before it.
         return
     root = np.sqrt(REAL(result.covariance_scale))
     found = np.concatenate([result.photo_sd.ravel(), result.point_sd[result.used_points].ravel()])

@@ -244,8 +244,9 @@ class BlockError(Exception):
     """A block that cannot be adjusted.
 
     `args` is (kind, message, photos, points): kind is `undetermined points`, `undetermined photos`, `no
-    intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or `input`; photos is a list of photo indices for each undetermined
-    combination of unknowns, points a list of point indices.
+    intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or
+    `input`; photos is a list of photo indices for each undetermined combination
+    of unknowns, points a list of point indices.
     """
 
 def adjust_block(

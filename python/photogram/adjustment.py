@@ -317,8 +317,8 @@ def _coarse(photos: list[str], points: list[str]) -> AdjustmentError:
     parts = [f"{kind} {listed(names)}" for kind, names in (("photos", photos), ("points", points)) if names]
     return AdjustmentError(
         f"coordinates or angles of the {' and the '.join(parts)} are so large that double precision rounds"
-        " them by more than their standard deviations, or than image coordinates show: count from an origin nearby"
-        " (a standard deviation of 0 fixes a value)"
+        " them by more than their standard deviations, or than image coordinates show: count from an origin"
+        " nearby (a standard deviation of 0 fixes a value)"
     )
 
 

@@ -38,8 +38,9 @@ def adjust(
     Points with a free coordinate and images on one photo only are left out, and so are points that run into
     the station of a photo, where rays that fit badly meet: they would take all digits from the others.
     Photos that have no image then stay as they are. Where nothing weighted or fixed gives a datum, cofactors
-    are those of minimum constraints: position and attitude of the first photo and one component of the translation of another
-    are held. Residuals, redundancy numbers and the variance of unit weight do not depend on which.
+    are those of minimum constraints: position and attitude of the first photo and one component of the
+    translation of another are held. Residuals, redundancy
+    numbers and the variance of unit weight do not depend on which.
 
     Parameters
     ----------
