@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from photogram.adjusted import Iteration
     from photogram.adjustment import AsPublished, Progress, adjust
     from photogram.block import Block
-    from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
+    from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.geometry import Spheroid
     from photogram.messages import Message
     from photogram.planning import Plan, plan
@@ -29,6 +29,7 @@ __all__ = [
     "Iteration",
     "Message",
     "Orientation",
+    "OutOfMemoryError",
     "PhotogramError",
     "Plan",
     "Pose",
@@ -56,6 +57,7 @@ _HOMES = {
     "Iteration": "adjusted",
     "Message": "messages",
     "Orientation": "absolute_orientation",
+    "OutOfMemoryError": "errors",
     "PhotogramError": "errors",
     "Plan": "planning",
     "Pose": "resection",

@@ -244,7 +244,7 @@ class BlockError(Exception):
     """A block that cannot be adjusted.
 
     `args` is (kind, message, photos, points): kind is `undetermined points`, `undetermined photos`, `no
-    intersection`, `not finite`, `empty` or `input`; photos is a list of photo indices for each undetermined
+    intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or `input`; photos is a list of photo indices for each undetermined
     combination of unknowns, points a list of point indices.
     """
 
@@ -318,7 +318,7 @@ def adjust_block(
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
     threads
-        Number of threads; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 for all processors.
     memory
         Bytes that the adjustment may take; None for any number.
     progress
@@ -408,6 +408,24 @@ class BlockSolution:
     @property
     def image_weights(self) -> _Floats:
         """(m,) factor by which a loss has changed the weight; 1 without a loss."""
+
+    @property
+    def images_behind(self) -> _Indices:
+        """Indices of the images whose point stands behind the camera, ascending."""
+
+    @property
+    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
+        """What the adjusted values leave undetermined, as in a :class:`BlockError`: there are no cofactors.
+
+        None where everything is determined.
+        """
+
+    @property
+    def weak(self) -> list[tuple[int, int]]:
+        """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
+
+        The sum of squares stood still all the same. Empty where the adjustment ended otherwise.
+        """
 
     @property
     def dropped(self) -> list[tuple[int, str]]:
@@ -1094,12 +1112,12 @@ class StellarProblem:
 class CollectionError(Exception):
     """A collection cannot be adjusted: (kind, message, photos of each combination, points)."""
 
-def read_numbers(text: bytes) -> _Floats:
+def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     """Read the numbers of a text, separated by white space, up to the first word that is not a finite number.
 
     Returns
     -------
-    (k,) numbers.
+    (k,) numbers, and whether they are the whole text.
     """
 
 def bundler_images(photo_parameters: _Floats, points: _Floats) -> _Floats:
@@ -1141,6 +1159,7 @@ def adjust_collection(
     loss: tuple[str, float] | None,
     ordering: str,
     threads: int,
+    memory: int | None,
     progress: Callable[[str, int, int, IterationRow | None], None] | None,
 ) -> CollectionSolution:
     """Adjust a collection of photos by Levenberg-Marquardt steps.
@@ -1167,7 +1186,9 @@ def adjust_collection(
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     threads
-        Number of threads; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 for all processors.
+    memory
+        Bytes that the adjustment may take; None for any number.
     progress
         See :func:`adjust_block`.
 
@@ -1233,6 +1254,10 @@ class CollectionSolution:
     @property
     def point_rays_behind(self) -> _Indices:
         """(n,) number of images that have the point behind the camera."""
+
+    @property
+    def collapsed(self) -> list[int]:
+        """Indices of the points that ran into a station and were left out."""
 
     @property
     def residuals(self) -> _Floats:

@@ -6,7 +6,7 @@ use std::ops::{ControlFlow, Range};
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
-use photocore::normals::{Equations, GroupRows, Layout, Ordering, Prior, SelectedInverse, System};
+use photocore::normals::{Equations, GroupRows, Layout, Ordering, Prior, SelectedInverse, Stopped, System};
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -97,10 +97,10 @@ fn go(_: usize) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn done<T>(flow: ControlFlow<(), T>) -> T {
+fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
     match flow {
         ControlFlow::Continue(value) => value,
-        ControlFlow::Break(()) => panic!("interrupted"),
+        ControlFlow::Break(stopped) => panic!("{stopped:?}"),
     }
 }
 

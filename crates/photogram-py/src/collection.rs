@@ -34,11 +34,16 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 }
 
 #[pyfunction]
-fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> Bound<'py, PyArray1<f64>> {
+fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> (Bound<'py, PyArray1<f64>>, bool) {
     let number =
         |word: &[u8]| str::from_utf8(word).ok()?.parse().ok().filter(|value: &f64| value.is_finite());
-    let words = || text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-    PyArray1::from_vec(py, py.detach(|| words().map_while(number).collect()))
+    let (numbers, whole): (Vec<f64>, bool) = py.detach(|| {
+        let mut words = text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let mut numbers = Vec::new();
+        let bad = words.find(|word| number(word).map(|value| numbers.push(value)).is_none());
+        (numbers, bad.is_none())
+    });
+    (PyArray1::from_vec(py, numbers), whole)
 }
 
 #[pyfunction]
@@ -58,7 +63,7 @@ fn bundler_images<'py>(
 #[pyfunction]
 #[pyo3(signature = (
     photo_parameters, photo_sd, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, decrease,
-    max_iterations, covariance, loss, ordering, threads, progress
+    max_iterations, covariance, loss, ordering, threads, memory, progress
 ))]
 fn adjust_collection(
     py: Python<'_>,
@@ -76,6 +81,7 @@ fn adjust_collection(
     loss: Option<(&str, f64)>,
     ordering: &str,
     threads: usize,
+    memory: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<CollectionSolution> {
     let parameters = rows("photo_parameters", &photo_parameters)?;
@@ -104,6 +110,7 @@ fn adjust_collection(
             loss: named_loss(loss)?,
         },
         ordering: named_ordering(ordering)?,
+        memory,
     };
     let solution = watched(py, threads, progress, |pool, watch| collection.adjust(&options, pool, watch))?;
     solution.map(|solution| CollectionSolution { solution }).map_err(|error| match error {
@@ -121,6 +128,7 @@ fn failure(error: &Failure) -> FailureRow {
         Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
+        Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
     (kind, error.to_string(), photos, points)
@@ -196,6 +204,11 @@ impl CollectionSolution {
     fn point_rays_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         let behind = self.solution.points.iter().map(|p| p.map_or(0, |p| p.behind as i64));
         PyArray1::from_vec(py, behind.collect())
+    }
+
+    #[getter]
+    fn collapsed(&self) -> Vec<usize> {
+        self.solution.collapsed.clone()
     }
 
     #[getter]

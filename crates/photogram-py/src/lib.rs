@@ -6,6 +6,7 @@ mod collection;
 mod comparator;
 mod distributions;
 mod geometry;
+mod memory;
 mod options;
 mod resection;
 mod similarity;
@@ -14,8 +15,12 @@ mod stellar;
 
 use pyo3::prelude::*;
 
+#[global_allocator]
+static ALLOCATOR: memory::Reserved = memory::Reserved;
+
 #[pymodule]
 fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    memory::arm()?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     distributions::register(module)?;
     geometry::register(module)?;

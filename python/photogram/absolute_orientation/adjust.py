@@ -31,6 +31,9 @@ UnitVariance = Literal["estimated", "unity"]
 
 Floats = NDArray[np.float64]
 
+MOST_ITERATIONS = 50
+TRIAL_ITERATIONS = 15
+"""Control that fits needs four or five; one that needs more explains nothing."""
 WEAK = 1e3
 """Condition number from which control is called weak."""
 WEAKNESS = {
@@ -59,7 +62,7 @@ def orient(
     former: Similarity | Orientation | None = None,
     reject: Iterable[object] = (),
     unit_variance: UnitVariance = "estimated",
-    max_iterations: int = 50,
+    max_iterations: int = MOST_ITERATIONS,
     tolerance: float = 1e-5,
     trace: bool = False,
 ) -> Orientation:
@@ -151,7 +154,7 @@ def orient(
 
     def fit(changed: Floats) -> Fit | None:
         try:
-            found = solve(changed, method="rigorous", start="auto")
+            found = solve(changed, method="rigorous", start="auto", max_iterations=TRIAL_ITERATIONS)
         except _photocore.SimilarityError:
             return None
         usable = found.status == "converged" and np.isfinite(found.sum_of_squares)
