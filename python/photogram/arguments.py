@@ -85,7 +85,8 @@ def _checked(function: Callable[..., Any], name: str, names: dict[str, Any]) -> 
     @wraps(function)
     def checked(*arguments: Any, **options: Any) -> Any:
         if not checks:
-            checks.update(_checks(function, {**_ARRAYS, **names, **function.__globals__}))
+            plain = inspect.unwrap(function)
+            checks.update(_checks(plain, {**_ARRAYS, **names, **plain.__globals__}))
         try:
             bound = signature.bind(*arguments, **options)
         except TypeError as error:
