@@ -266,7 +266,7 @@ def public():
         for name in module.__all__:
             found = getattr(module, name)
             error = inspect.isclass(found) and issubclass(found, BaseException)
-            called = inspect.isclass(found) or inspect.isfunction(found)
+            called = inspect.isclass(found) or inspect.isroutine(found) or hasattr(found, "__wrapped__")
             if called and name not in results and not error:
                 yield package, name
 

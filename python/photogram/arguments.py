@@ -24,6 +24,8 @@ __all__ = ["check_arguments", "path"]
 
 Check = Callable[[str, Any], Any]
 """Takes the name of an argument and its value; returns the value, converted where it must be, or raises."""
+_MARK = "_checks_arguments"
+"""An attribute of functions that check their arguments: names of several packages are checked once."""
 _ARRAYS = {
     "NDArray": NDArray,
     "np": np,
@@ -48,10 +50,10 @@ def check_arguments(names: dict[str, Any], public: Iterable[str]) -> None:
     for name in public:
         found = names[name]
         if inspect.isclass(found):
-            if not hasattr(found.__init__, "__wrapped__"):
+            if not hasattr(found.__init__, _MARK):
                 checking = _checked(found.__init__, found.__name__, names)
                 type.__setattr__(found, "__init__", checking)
-        elif not hasattr(found, "__wrapped__"):
+        elif not hasattr(found, _MARK):
             names[name] = _checked(found, name, names)
 
 
@@ -83,7 +85,8 @@ def _checked(function: Callable[..., Any], name: str, names: dict[str, Any]) -> 
     @wraps(function)
     def checked(*arguments: Any, **options: Any) -> Any:
         if not checks:
-            checks.update(_checks(function, {**_ARRAYS, **names, **function.__globals__}))
+            plain = inspect.unwrap(function)
+            checks.update(_checks(plain, {**_ARRAYS, **names, **plain.__globals__}))
         try:
             bound = signature.bind(*arguments, **options)
         except TypeError as error:
@@ -93,6 +96,7 @@ def _checked(function: Callable[..., Any], name: str, names: dict[str, Any]) -> 
                 bound.arguments[parameter] = checks[parameter](parameter, value)
         return function(*bound.args, **bound.kwargs)
 
+    setattr(checked, _MARK, True)
     return checked
 
 
