@@ -223,6 +223,7 @@ def test_what_is_no_block(command, block):
         {"unit_variance": None}, {"unit_variance": ["free"]}, {"ordering": np.array(["amd", "rcm"])},
         {"max_iterations": "50"}, {"max_iterations": 2**64}, {"max_iterations": 1.5}, {"tolerance": "1e-5"},
         {"tolerance": None}, {"as_published": True}, {"loss": 1}, {"loss": "huber", "scale": "2"},
+        {"covariance": None}, {"covariance": np.zeros(3)}, {"fix_photos": "no"},
         {"scale": 1.0}, {"threads": "2"}, {"threads": 2**64}, {"threads": True}, {"progress": 1},
     ],
 )  # fmt: skip
@@ -252,6 +253,36 @@ def test_simulations_that_are_too_large():
     with pytest.raises(InputError, match="GiB of memory"):
         simulate(strips=10**6, photos_per_strip=10**6)
     assert len(simulate(strips=1, photos_per_strip=12, forward_overlap=0.9).block.photo_ids) == 12
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"principal_distance": math.inf}, {"principal_distance": 1e-3}, {"frame_size": 1e-320},
+        {"frame_size": 2.0**64}, {"flying_height": 1e308}, {"flying_height": 1e-300},
+        {"points_per_photo": 1e308}, {"control_sd": 1e308}, {"position_sd": 1e308}, {"position_sd": math.nan},
+        {"attitude_sd": -1.0}, {"origin": (1e308, 0, 0)}, {"origin": (0, 0)}, {"photo_to_ground": None},
+        {"blunder_size": 2**64},
+    ],
+)  # fmt: skip
+def test_simulations_that_cannot_be(arguments):
+    with pytest.raises(InputError, match=next(iter(arguments))):
+        simulate(**arguments)
+
+
+def test_angles_without_digits(bad_block):
+    bad_block["photo_attitudes"][1, 2] = 1e16
+    with pytest.raises(InputError, match=r"photo_attitudes of 0102 is beyond 1e\+06 radians"):
+        Block(**bad_block)
+
+
+def test_columns_that_are_no_lists(tables):
+    for name, value in (("photo", (name for name in "ABCDEF")), ("photo", 6), ("photo", np.array("A"))):
+        with pytest.raises(InputError, match="photos, column photo is not a list of names"):
+            Block.from_tables({**tables["photos"], name: value}, tables["images"], principal_distance=-152.74)
+    for table in (None, "photos.csv", Path("photos.csv"), 1, [1]):
+        with pytest.raises(InputError, match="photos"):
+            Block.from_tables(table, tables["images"], principal_distance=-152.74)
 
 
 # What was made stays as it is

@@ -223,6 +223,18 @@ def test_images_that_no_position_explains():
         ({"position_sd": 1.0}, "position_sd is finite, but position is not given"),
         ({"point_ids": ["A"]}, "point_ids has 1 names"),
         ({"max_iterations": 0}, "one iteration at least"),
+        ({"max_iterations": 2**64}, "max_iterations is not a whole number"),
+        ({"max_iterations": "9"}, "max_iterations is not a whole number"),
+        ({"tolerance": None}, "tolerance is not a number"),
+        ({"tolerance": np.nan}, "positive criterion"),
+        ({"principal_distance": "150"}, "principal_distance is not a number"),
+        ({"principal_distance": 10**400}, "principal_distance is not a number"),
+        ({"attitude": [0.0, np.nan, 0.0]}, "attitude is not finite"),
+        ({"attitude": "north"}, "attitude is not an array of numbers"),
+        ({"image_xy": None}, "image_xy is not an array"),
+        ({"image_xy": np.ma.masked_all((7, 2))}, "image_xy has masked values"),
+        ({"object_sd": 1j}, "object_sd is not an array of numbers"),
+        ({"point_ids": 7}, "point_ids is not a list of names"),
     ],
 )
 def test_wrong_input_is_named(change, message):

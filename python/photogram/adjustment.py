@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.arrays import number, one_of, whole_number
+from photogram.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.block import Block, checked
 from photogram.ends import behind, undetermined
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
@@ -148,6 +148,8 @@ def adjust(
     if max_iterations is None:
         max_iterations = 50 if loss is None else 200
     checked(block)
+    truth_value("covariance", covariance)
+    truth_value("fix_photos", fix_photos)
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads, progress)
     row = loss_row(loss, scale)
     if row and as_published:
@@ -233,14 +235,14 @@ def _check_options(
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
     one_of("ordering", ordering, get_args(Ordering))
     if as_published is not None and not isinstance(as_published, AsPublished):
-        raise InputError(f"as_published is an AsPublished or None, not {as_published!r}")
+        raise InputError(f"as_published is an AsPublished or None, not {shown(as_published)}")
     if whole_number("max_iterations", as_published.max_iterations if as_published else max_iterations) < 1:
         raise InputError("there must be one iteration at least")
     if not number("the criterion", as_published.percent if as_published else tolerance) > 0:
         raise InputError("the criterion of convergence must be positive")
     core_threads(threads)
     if progress is not None and not callable(progress):
-        raise InputError(f"progress is no function: {progress!r}")
+        raise InputError(f"progress is no function: {shown(progress)}")
 
 
 def core_threads(threads: int | None) -> int:

@@ -25,8 +25,10 @@ __all__ = [
     "numbers",
     "one_of",
     "shaped",
+    "shown",
     "standard_deviations",
     "text",
+    "truth_value",
     "whole_number",
 ]
 
@@ -77,7 +79,7 @@ def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np
     if kind == "O":
         bad = next((each for each in array.flat if not _is_real(each)), None)
         if bad is not None:
-            raise InputError(f"{name} is not an array of numbers: {_shown(bad)} is none")
+            raise InputError(f"{name} is not an array of numbers: {shown(bad)} is none")
     elif kind not in "fiu":
         raise InputError(f"{name} is not an array of numbers: its type is {array.dtype}")
     try:
@@ -130,7 +132,7 @@ def length(name: str, value: ArrayLike) -> int:
     """
     array = _plain(name, value, "values")
     if array.ndim == 0:
-        raise InputError(f"{name} is not an array: {_shown(value)}")
+        raise InputError(f"{name} is not an array: {shown(value)}")
     return len(array)
 
 
@@ -170,8 +172,9 @@ def names(name: str, values: Iterable[object]) -> list[str]:
     InputError
         A name that is missing, empty, no string, or not printable; the message tells its row.
     """
-    if isinstance(values, str | bytes) or not isinstance(values, Iterable):
-        raise InputError(f"{name} is not a list of names: {_shown(values)}")
+    no_row = isinstance(values, np.ndarray) and values.ndim != 1
+    if no_row or isinstance(values, str | bytes) or not isinstance(values, Iterable):
+        raise InputError(f"{name} is not a list of names: {shown(values)}")
     found: list[Any] = values.tolist() if isinstance(values, np.ndarray) else list(values)
     if {str} != set(map(type, found)):
         found = [_name(name, row, value) for row, value in enumerate(found)]
@@ -187,8 +190,8 @@ def _name(name: str, row: int, value: object) -> str:
     if isinstance(value, str) or (isinstance(value, Integral) and not isinstance(value, bool)):
         return str(value)
     if value is None or (isinstance(value, Real) and value != value):
-        raise InputError(f"{name}[{row}] has no name: {_shown(value)}")
-    raise InputError(f"{name}[{row}] is not a name: {_shown(value)} is neither a string nor a whole number")
+        raise InputError(f"{name}[{row}] has no name: {shown(value)}")
+    raise InputError(f"{name}[{row}] is not a name: {shown(value)} is neither a string nor a whole number")
 
 
 def text(name: str, value: object) -> str:
@@ -200,9 +203,9 @@ def text(name: str, value: object) -> str:
         No string, or characters that do not print: line ends, control characters, halves of surrogate pairs.
     """
     if not isinstance(value, str):
-        raise InputError(f"{name} is not a string: {_shown(value)}")
+        raise InputError(f"{name} is not a string: {shown(value)}")
     if not value.isprintable():
-        raise InputError(f"{name} has characters that do not print: {_shown(value)}")
+        raise InputError(f"{name} has characters that do not print: {shown(value)}")
     return value
 
 
@@ -219,7 +222,7 @@ def number(name: str, value: object) -> float:
             return float(value)  # type: ignore[arg-type]
         except OverflowError:
             pass
-    raise InputError(f"{name} is not a number: {_shown(value)}")
+    raise InputError(f"{name} is not a number: {shown(value)}")
 
 
 def whole_number(name: str, value: object) -> int:
@@ -231,8 +234,21 @@ def whole_number(name: str, value: object) -> int:
         No such number.
     """
     if not isinstance(value, Integral) or isinstance(value, bool) or not -(2**63) <= int(value) < 2**63:
-        raise InputError(f"{name} is not a whole number of 64 bits: {_shown(value)}")
+        raise InputError(f"{name} is not a whole number of 64 bits: {shown(value)}")
     return int(value)
+
+
+def truth_value(name: str, value: object) -> bool:
+    """Return True or False.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} is True or False, not {shown(value)}")
+    return bool(value)
 
 
 def one_of(name: str, value: object, choices: Sequence[str]) -> None:
@@ -244,14 +260,17 @@ def one_of(name: str, value: object, choices: Sequence[str]) -> None:
         Another word, or no string; the message tells the words.
     """
     if not (isinstance(value, str) and value in choices):
-        raise InputError(f"{name} is one of {', '.join(choices)}, not {_shown(value)}")
+        raise InputError(f"{name} is one of {', '.join(choices)}, not {shown(value)}")
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
     """Show what a caller gave, in a line, however long it is."""
     if isinstance(value, int) and value.bit_length() > 128:
         return f"a whole number of {value.bit_length()} bits"
-    return ascii(value)[:80]
+    try:
+        return ascii(value)[:80]
+    except Exception:  # a foreign object may fail at anything, a deep one at its depth
+        return f"a {type(value).__name__}"
 
 
 def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arrays import indices, length, names, shaped, text
+from photogram.arrays import indices, length, names, shaped, shown, text, truth_value
 from photogram.errors import InputError
 from photogram.geometry import Spheroid
 from photogram.refraction import Refraction, metres_per_unit
@@ -23,6 +23,9 @@ Indices = NDArray[np.int64]
 RECTANGULAR_COLUMNS = ("X", "Y", "Z")
 GEOGRAPHIC_COLUMNS = ("longitude_deg", "latitude_deg", "height")
 ATTITUDE_COLUMNS = ("omega_deg", "phi_deg", "kappa_deg")
+
+_ANGLES = 1e6
+"""Radians: larger angles have lost the digits that an attitude needs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +143,8 @@ class Block:
         for name in ("photo_positions", "photo_attitudes", "principal_distances", "image_xy"):
             bad = ~np.isfinite(getattr(self, name))
             self._refuse(name, bad, "is not a finite number", owners.get(name[:5]))
+        beyond = np.abs(self.photo_attitudes) > _ANGLES
+        self._refuse("photo_attitudes", beyond, f"is beyond {_ANGLES:g} radians", self.photo_ids)
         self._refuse("principal_distances", self.principal_distances == 0, "is zero", self.photo_ids)
         self._refuse("point_positions", np.isinf(self.point_positions), "is infinite", self.point_ids)
         for name in ("photo_position_sd", "photo_attitude_sd", "point_sd"):
@@ -160,6 +165,9 @@ class Block:
             if observed is None:
                 continue
             self._refuse(name, np.isinf(observed), "is infinite", self.photo_ids)
+            if initial is self.photo_attitudes:
+                beyond = np.abs(observed) > _ANGLES
+                self._refuse(name, beyond, f"is beyond {_ANGLES:g} radians", self.photo_ids)
             unknown = np.isnan(observed) & np.isfinite(sd)
             self._refuse(name, unknown, "is unknown but weighted (its sd is finite)", self.photo_ids)
             moved = (sd == 0) & (observed != initial)
@@ -183,13 +191,12 @@ class Block:
     def _check_conventions(self) -> None:
         text("title", self.title)
         text("linear_unit", self.linear_unit)
-        if not isinstance(self.photo_to_ground, bool | np.bool_):
-            raise InputError(f"photo_to_ground is True or False, not {self.photo_to_ground!r}")
+        self._set("photo_to_ground", truth_value("photo_to_ground", self.photo_to_ground))
         if self.spheroid is not None and not isinstance(self.spheroid, Spheroid):
-            raise InputError(f"spheroid is a Spheroid or None, not {self.spheroid!r}")
+            raise InputError(f"spheroid is a Spheroid or None, not {shown(self.spheroid)}")
         if self.refraction is not None:
             if not isinstance(self.refraction, Refraction):
-                raise InputError(f"refraction is a Refraction or None, not {self.refraction!r}")
+                raise InputError(f"refraction is a Refraction or None, not {shown(self.refraction)}")
             metres_per_unit(self.linear_unit)
 
     def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
@@ -356,7 +363,11 @@ def _columns(
     table: Mapping[str, Any], table_name: str, columns: Sequence[str], default: ArrayLike | None = None
 ) -> Floats:
     """Stack columns as (rows, len(columns)), `_deg` ones in radians; absent ones get the default."""
-    rows = len(_column(table, table_name, "photo" if table_name == "photos" else "point"))
+    key = "photo" if table_name == "photos" else "point"
+    named = _column(table, table_name, key)
+    if not isinstance(named, Sized):
+        raise InputError(f"{table_name}, column {key} is not a list of names: {shown(named)}")
+    rows = len(named)
     stacked = []
     for name in columns:
         values = default if name not in table and default is not None else _column(table, table_name, name)

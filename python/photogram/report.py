@@ -31,6 +31,7 @@ _ORDERINGS = {
 }
 
 
+@np.errstate(over="ignore")  # what is too large for its unit is infinite
 def report(result: AdjustedBlock) -> str:
     """Return the report of an adjusted block."""
     sections = [
@@ -56,6 +57,7 @@ def report(result: AdjustedBlock) -> str:
     return composed(headline("block adjustment", result.block.title), sections)
 
 
+@np.errstate(over="ignore")
 def summary(result: AdjustedBlock) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
     return [

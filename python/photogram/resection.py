@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.arrays import length, names, number, numbers, shaped, whole_number
+from photogram.arrays import length, names, number, numbers, shaped, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
@@ -221,7 +221,8 @@ def resect(
     ([390.0, 430.0, 1500.0], [0.02, -0.03, 1.5])
     """
     if spheroid is not None and not isinstance(spheroid, Spheroid):
-        raise InputError(f"spheroid is a Spheroid or None, not {spheroid!r}")
+        raise InputError(f"spheroid is a Spheroid or None, not {shown(spheroid)}")
+    truth_value("photo_to_ground", photo_to_ground)
     given = Observed.checked(object_points, object_sd, image_xy, image_sd, principal_distance, point_ids)
     known = np.concatenate(
         [_known("position", position, position_sd), _known("attitude", attitude, attitude_sd)]

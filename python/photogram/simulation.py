@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import geometry
-from photogram.arrays import number, one_of, shaped, whole_number
+from photogram.arrays import number, one_of, shaped, shown, truth_value, whole_number
 from photogram.block import Block
 from photogram.errors import InputError
 from photogram.geometry import Spheroid
@@ -29,6 +29,11 @@ __all__ = ["Blunders", "Simulation", "simulate"]
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+_HUGE = 1e12
+_TINY = 1e-3
+"""What no length of a block exceeds, and what none falls below."""
+_NARROWEST, _WIDEST = 1e-6, 1.4
+"""Radians from the vertical: what photos show beyond it is too far away to simulate."""
 _FAR_MORE = 10.0
 """Times as many points as were asked for are too many."""
 _CANDIDATE_BYTES = 300
@@ -193,6 +198,7 @@ def simulate(
         Arguments outside their ranges.
     """
     _check_types(locals())
+    truth_value("photo_to_ground", photo_to_ground)
     one_of("control", control, ("perimeter", "corners", "none"))
     centre = shaped("origin", origin, (3,))
     footprint = frame_size / abs(principal_distance or math.nan) * flying_height
@@ -204,7 +210,7 @@ def simulate(
             "side_overlap": (0 < side_overlap < 1, "between 0 and 1"),
             "principal_distance": (math.isfinite(footprint), "finite and not 0"),
             "frame_size": (frame_size > 0, "positive"),
-            "flying_height": (flying_height > 0, "positive"),
+            "flying_height": (flying_height > _TINY, f"above {_TINY:g}"),
             "relief": (0 <= relief < flying_height, "between 0 and the flying height"),
             "points_per_photo": (4 <= points_per_photo < math.inf, "at least 4"),
             "crab": (0 <= crab < math.pi / 4, "between 0 and pi/4"),
@@ -217,7 +223,7 @@ def simulate(
             "attitude_error": (0 <= attitude_error < math.inf, "finite and not negative"),
             "position_sd": (position_sd >= 0, "not negative"),
             "attitude_sd": (attitude_sd >= 0, "not negative"),
-            "origin": (bool(np.isfinite(centre).all()), "finite"),
+            "origin": (bool((np.abs(centre) < _HUGE).all()), f"below {_HUGE:g}"),
             "blunders": (blunders >= 0, "not negative"),
             "blunder_size": (0 <= blunder_size < math.inf, "finite and not negative"),
         }
@@ -226,6 +232,8 @@ def simulate(
     terrain_random, flight_random, initial_random, image_random, control_random, blunder_random = streams[:6]
 
     half_angle = math.atan(frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab)))
+    if not _NARROWEST < half_angle < _WIDEST - 2 * tilt:
+        raise InputError("principal_distance and frame_size: the photos see too little, or to the horizon")
     reach = 1.02 * (flying_height + relief) * math.tan(half_angle + 2 * tilt)
     plan = _plan(strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach)
     terrain = _terrain(plan, relief, footprint, terrain_random)
@@ -244,6 +252,8 @@ def simulate(
         photo_to_ground,
         refraction,
     )
+    if not len(image_points):
+        raise InputError("no point is seen on two photos")
     used, image_points = np.unique(image_points, return_inverse=True)
     ground, terrain = ground[used], terrain[used]
 
@@ -309,9 +319,9 @@ def _check_types(arguments: Mapping[str, object]) -> None:
             whole_number(name, value)
         elif name in _CLASSES:
             if value is not None and not isinstance(value, _CLASSES[name]):
-                raise InputError(f"{name} is a {_CLASSES[name].__name__} or None, not {value!r}")
-        elif name not in _OTHERS:
-            number(name, value)
+                raise InputError(f"{name} is a {_CLASSES[name].__name__} or None, not {shown(value)}")
+        elif name not in _OTHERS and _HUGE < abs(number(name, value)) < math.inf:
+            raise InputError(f"{name} must be below {_HUGE:g}")
 
 
 def _generator(seed: int | np.random.Generator) -> np.random.Generator:

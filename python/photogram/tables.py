@@ -120,7 +120,8 @@ def _numbers(names: tuple[str, ...] | list[str], values: Floats, prefix: str) ->
 
 def _columns(names: tuple[str, ...] | list[str], values: Floats, prefix: str = "") -> dict[str, Any]:
     """Name the columns of an array, in degrees where the name says so."""
-    return {
-        prefix + name: np.degrees(column) if name.endswith("_deg") else column
-        for name, column in zip(names, values.T, strict=True)
-    }
+    with np.errstate(over="ignore"):  # infinite then
+        return {
+            prefix + name: np.degrees(column) if name.endswith("_deg") else column
+            for name, column in zip(names, values.T, strict=True)
+        }

@@ -234,6 +234,18 @@ def test_options_that_cannot_be(options, message):
         orient(full(), **options)
 
 
+def test_later_edits_change_no_result():
+    control, model = np.array(full().control), np.array(full().model)
+    given = Stations(range(6), control, model)
+    result = orient(given)
+    before = result.report()
+    control[0] += 100
+    model[0] += 100
+    assert result.report() == before
+    with pytest.raises(ValueError, match="read-only"):
+        given.control[0] = 0
+
+
 def test_the_methods_of_the_report_take_no_weights():
     given = full()
     weighted = Stations(given.ids, given.control, given.model, model_sd=1.0)

@@ -42,7 +42,7 @@ def test_an_outlier_of_few_degrees_of_freedom_is_named(example):
     assert result.outliers == [(row, 2)]
     (problem,) = result.problems
     assert "V203 Z (t 2" in problem
-    assert "wrong by about 10.1 m" in problem
+    assert "wrong by about 10.2 m" in problem
     assert f"{problem}\n" in result.report()
     (marked,) = [line for line in result.report().splitlines() if line.endswith("<--")]
     assert marked.startswith("V203 ")
@@ -185,7 +185,11 @@ def test_a_model_that_is_not_that_of_its_control_is_no_orientation():
     assert result.converged
     assert not result.usable
     assert "the model does not fit its control: the residuals are" in result.problems[0]
-    assert orient(Stations(given.ids, given.control, given.model, control_sd=500.0, model_sd=1.0)).usable
+    # Residuals as large are no fault where the control is no better.
+    model = simulate(generator, (FULL,) * 12, angles=(0.1, 0.1, 1.0))
+    error = 100 * generator.standard_normal((12, 3))
+    assert not orient(model.stations(error)).usable
+    assert orient(model.stations(error, control_sd=100.0, model_sd=NOISE)).usable
 
 
 def test_no_file_is_taken_for_a_good_one(run, tmp_path):
@@ -218,3 +222,16 @@ def test_no_file_is_taken_for_a_good_one(run, tmp_path):
     with pytest.raises(InputError, match="not to be used"):
         read_similarity(tmp_path / "result.json", usable=True)
     read_similarity(tmp_path / "result.json")  # to start from
+
+
+def test_with_few_degrees_of_freedom_a_cause_is_possible_only():
+    generator = np.random.default_rng(23)
+    model = simulate(generator, (FULL,) * 3, angles=(0.03, -0.02, 1.0))
+    ground = model.ground.copy()
+    ground[0, :2] = [100.0, 130.0]
+    exact = model.truth.to_model(ground) + NOISE * generator.standard_normal((3, 3))
+    ground[0, :2] = [130.0, 100.0]
+    result = orient(Stations(list("ABC"), ground, exact))
+    assert result.degrees_of_freedom == 2
+    assert result.usable
+    assert result.problems[0].startswith("possibly X and Y of station A are exchanged: residuals would be ")

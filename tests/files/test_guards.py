@@ -23,7 +23,10 @@ RUNS = {
     "giant adjust": (["giant", "galveston"], [f"galveston/{name}" for name in PROJECT]),
     "giant check": (["giant", "check", "galveston"], [f"galveston/{name}" for name in PROJECT]),
     "absolute-orientation orient": (
-        ["absolute-orientation", "stations.csv", "--points", "points.csv", "--restart", "former.json"],
+        [
+            *("absolute-orientation", "stations.csv", "--points", "points.csv"),
+            *("--restart", "former.json", "--method", "report"),
+        ],
         ["stations.csv", "points.csv", "former.json"],
     ),
     "absolute-orientation transform": (
@@ -214,6 +217,26 @@ def test_no_output_makes_a_project_ambiguous(run, place, name, target):
             result.stderr
         )
         assert not (place / "galveston" / target).exists()
+
+
+@pytest.mark.parametrize("name", ["giant adjust"])
+def test_a_project_that_is_overwritten_gets_no_second_files(run, place, name):
+    (place / "second" / "GROUND").rename(place / "second" / "ground.txt")
+    before = content(place)
+    result = run(*words(name, out="second"), "--overwrite")
+    assert result.exit_code == 1, result.output
+    assert "second/ground.txt: the project there would have a second GROUND" in result.stderr
+    assert content(place) == before
+
+
+@pytest.mark.parametrize("name", ["giant adjust"])
+def test_the_default_directory_may_be_a_link_to_the_input(run, place, name):
+    (place / "galveston-adjusted").symlink_to("galveston")
+    before = content(place)
+    result = run(*words(name))
+    assert result.exit_code == 1, result.output
+    assert "would be written over the input" in result.stderr
+    assert content(place) == before
 
 
 @pytest.mark.parametrize("name", ["comparator calibrate"])

@@ -245,7 +245,10 @@ def test_no_control_at_all_is_remarked_on(tmp_path, ground):
 def test_refraction_is_that_of_the_guide(tmp_path):
     project = project_of(tmp_path, COMMON=replaced(COMMON, 2, "01000000001009 11 1"))
     assert project.to_block().refraction == Refraction("giant", "giant", 0.0)
-    assert texts(project) == []
+    assert [text.split(",")[0] for text in texts(project)] == [
+        "column 16 asks for refraction in air",
+        "column 17 asks for refraction in water",
+    ]
 
 
 def test_no_frames(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from observer import places_of_j2000
 
-from photogram import InputError
+from photogram import AdjustmentError, InputError
 from photogram.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.catalogue import Catalogue
@@ -106,6 +106,14 @@ def test_a_hundred_exposures_adjust(catalogue):
     assert result.status == "converged"
     errors = np.sqrt(np.diag(result.camera.covariance))
     assert np.abs((result.camera.values - TRUTH.values) / errors).max() < 3.5
+
+
+def test_what_the_memory_does_not_hold_is_refused(catalogue, monkeypatch):
+    bright = catalogue.brighter(4.0)
+    exposure = expose(bright, "2024-03-01T21:10:00", np.array([0.2, -0.1, 0.4]), np.random.default_rng(1))
+    monkeypatch.setattr("photogram.stellar.skies.available_memory", lambda: 1000)
+    with pytest.raises(AdjustmentError, match=r"1 exposures with .* images take 0\.0 GiB of memory"):
+        calibrate_exposures([exposure], TRUTH, SITE, bright)
 
 
 def test_times_that_are_none_are_refused():

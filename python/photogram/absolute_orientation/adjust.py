@@ -18,7 +18,7 @@ from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.adjusted import Iteration
 from photogram.arrays import names as names_of
-from photogram.arrays import number, one_of, whole_number
+from photogram.arrays import number, one_of, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 from photogram.statistics import externally_studentized, global_test
@@ -31,6 +31,9 @@ UnitVariance = Literal["estimated", "unity"]
 
 Floats = NDArray[np.float64]
 
+MOST_ITERATIONS = 50
+TRIAL_ITERATIONS = 15
+"""Control that fits needs four or five; one that needs more explains nothing."""
 WEAK = 1e3
 """Condition number from which control is called weak."""
 WEAKNESS = {
@@ -59,7 +62,7 @@ def orient(
     former: Similarity | Orientation | None = None,
     reject: Iterable[object] = (),
     unit_variance: UnitVariance = "estimated",
-    max_iterations: int = 50,
+    max_iterations: int = MOST_ITERATIONS,
     tolerance: float = 1e-5,
     trace: bool = False,
 ) -> Orientation:
@@ -151,7 +154,7 @@ def orient(
 
     def fit(changed: Floats) -> Fit | None:
         try:
-            found = solve(changed, method="rigorous", start="auto")
+            found = solve(changed, method="rigorous", start="auto", max_iterations=TRIAL_ITERATIONS)
         except _photocore.SimilarityError:
             return None
         usable = found.status == "converged" and np.isfinite(found.sum_of_squares)
@@ -240,6 +243,7 @@ def _check_options(
         raise InputError("there must be one iteration at least")
     if not 0 < number("tolerance", tolerance) < math.inf:
         raise InputError(f"the criterion of convergence must be positive, not {tolerance!r}")
+    truth_value("trace", trace)
     if trace and method == "rigorous":
         raise InputError("only the report's methods, 'report' and 'fill-in', have cycles to trace")
     unknown = [name for name in rejected if name not in stations.ids]

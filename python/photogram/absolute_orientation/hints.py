@@ -29,6 +29,9 @@ TESTED = 4
 """Degrees of freedom from which a hypothesis can be accepted and not only be possible."""
 STATIONS = 60
 """Stations that are tried one by one, at the most."""
+WORK = 20_000
+"""Of many stations fewer are tried, so that about as many are oriented anew altogether, but always a few."""
+FEW = 6
 MOST = 5
 """Hypotheses accepted one upon the other, at the most."""
 AS_WELL = 4.0
@@ -148,12 +151,13 @@ def _suspects(control: Floats, residuals: Floats) -> list[int]:
     A station that is far out draws the orientation to itself, and its residual may be small.
     """
     count = len(control)
-    if count <= STATIONS:
+    tried = min(STATIONS, max(FEW, WORK // count))
+    if count <= tried:
         return list(range(count))
     distance = np.nansum(np.abs(control - np.nanmedian(control, axis=0)), axis=1)
     size = np.nansum(np.abs(residuals), axis=1)
-    chosen = {*np.argsort(-distance)[: STATIONS // 2].tolist(), *np.argsort(-size)[: STATIONS // 2].tolist()}
-    return sorted(chosen)
+    worst = (np.argsort(-values)[: tried // 2].tolist() for values in (distance, size))
+    return sorted({row for rows in worst for row in rows})
 
 
 def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> str | None:
@@ -175,8 +179,9 @@ def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> str
         return None
     text = (
         "whether the model is a mirror image of its control cannot be decided: the elevations are those of"
-        " points in one plane"
+        " points in one plane, as far as the residuals tell"
     )
-    if fit.upright < 0 < mirrored.upright:
+    # Mirrored, the third axis points the other way.
+    if fit.upright < 0 < -mirrored.upright:
         text += "; as it is the model lies upside down, mirrored it would lie upright"
     return text

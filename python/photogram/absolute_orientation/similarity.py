@@ -108,7 +108,9 @@ class Similarity:
         """
         a, b = shaped("rotation", rotation, (3, 3)), shaped("translation", translation, (3,))
         scale, deviation_factor = number("scale", scale), number("deviation_factor", deviation_factor)
-        if not (np.abs(a @ a.T - np.eye(3)).max() < ORTHOGONAL and np.linalg.det(a) > 0):
+        if not (
+            np.abs(a).max() < 2 and np.abs(a @ a.T - np.eye(3)).max() < ORTHOGONAL and np.linalg.det(a) > 0
+        ):
             raise InputError("the nine direction cosines do not make a rotation")
         if not (0 < scale < math.inf and 0 < deviation_factor < math.inf):
             raise InputError("a similarity needs a positive scale and a positive factor of deviations")

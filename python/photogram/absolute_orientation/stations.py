@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arrays import names, numbers, text
+from photogram.arrays import frozen, names, numbers, text
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ MODEL_SD_COLUMNS = ("sd_x", "sd_y", "sd_z")
 class Stations:
     """The stations of a model, in their order; arrays are copied and checked.
 
-    A station without any control coordinate is a point to be transformed.
+    A station without any control coordinate is a point to be transformed. The arrays cannot be written, so
+    that results made from them stay what they are.
 
     Attributes
     ----------
@@ -168,7 +169,7 @@ def _table(name: str, values: ArrayLike, count: int) -> Floats:
     if array.ndim == 2 and array.shape != (count, 3):
         raise InputError(f"{name} has the shape {array.shape}, not ({count}, 3)")
     try:
-        return np.broadcast_to(array, (count, 3)).copy()
+        return frozen(np.broadcast_to(array, (count, 3)))
     except ValueError:
         raise InputError(
             f"{name} has the shape {array.shape}, which does not broadcast to ({count}, 3)"

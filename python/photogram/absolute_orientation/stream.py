@@ -146,7 +146,8 @@ def decimals_for(deviation: float) -> int:
 
 def _lines(ids: list[str], positions: Floats, covariances: Floats, decimals: int) -> bytes:
     """Return the lines of a chunk; orjson writes numbers far faster than pandas."""
-    sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    # Rounding can leave a variance below zero.
+    sd = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
     known = bool(np.isfinite(sd).all())
     values: list[Floats] = [np.round(positions, decimals)]
     if known:

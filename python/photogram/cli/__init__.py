@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from photogram.cli.ending import end_by_signals
+from photogram.cli.ending import end_by_signals, ignore_signals
 
 if TYPE_CHECKING:
     from photogram.cli.commands import app
@@ -32,7 +32,9 @@ def main() -> None:
     except OSError as error:
         # Commands name their own files: what is left are the standard streams, to which help goes.
         code = stream_fault(error)
-    sys.exit(finish(code))
+    code = finish(code)
+    ignore_signals()
+    sys.exit(code)
 
 
 def __getattr__(name: str) -> object:

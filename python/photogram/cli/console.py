@@ -83,7 +83,7 @@ def failures() -> Iterator[None]:
         # Files are named where they are read and written; what is left are the standard streams.
         if error.filename is None:
             raise typer.Exit(stream_fault(error)) from None
-        _fail(f"{printable(str(error.filename))}: {error.strerror}", INPUT_ERROR)
+        _fail(f"{printable(str(error.filename))}: {error.strerror or error}", INPUT_ERROR)
 
 
 def _fail(text: str, code: int) -> NoReturn:

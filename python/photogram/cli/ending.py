@@ -7,8 +7,9 @@ import signal
 import sys
 from types import FrameType
 
-__all__ = ["end_by_signals"]
+__all__ = ["end_by_signals", "ignore_signals"]
 
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 SHOW_CURSOR = b"\x1b[?25h\r\x1b[K"
 """Ends a status line: rich hides the cursor meanwhile."""
 
@@ -18,18 +19,25 @@ def end_by_signals() -> None:
 
     Not by an exception: one that is raised inside a destructor or a callback would be lost.
     """
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+    for name in _NAMES:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _end)
 
 
+def ignore_signals() -> None:
+    """Let signals no longer change the end of a run that is through: the interpreter would die of them."""
+    for name in _NAMES:
+        number = getattr(signal, name, None)
+        if number is not None:
+            signal.signal(number, signal.SIG_IGN)
+
+
 def _end(number: int, _frame: FrameType | None) -> None:
     # If the writer is not loaded yet, it has begun nothing.
-    staging = sys.modules.get("photogram.writing.staging")
-    remove_all = getattr(staging, "remove_all", None)
-    if remove_all is not None:
-        remove_all()
+    abandon_all = getattr(sys.modules.get("photogram.writing.outputs"), "abandon_all", None)
+    if abandon_all is not None:
+        abandon_all()
     try:
         if os.isatty(2):
             os.write(2, SHOW_CURSOR)

@@ -157,20 +157,22 @@ def giant(
 
 
 def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Path:
-    """Choose where results go: never over the input, and not over another project unless told."""
+    """Choose where results go: not over another project unless told, and then not beside its files."""
     from photogram.errors import InputError
     from photogram.giant.files import present_files
 
     if out is None:
         return default_out(directory, "-adjusted")
-    if out.exists() and not out.is_dir():
-        raise InputError("is not a directory", file=out)
-    if out.exists() and out.samefile(directory):
-        raise InputError("the results would be written over the input", file=out)
-    if out.exists() and not overwrite:
-        inputs = [path.name for name in ("COMMON", "CAMERAS", "IMAGES") for path in present_files(out)[name]]
-        if inputs:
-            raise InputError(f"holds another project ({', '.join(inputs)}); --overwrite allows it", file=out)
+    if not out.is_dir():
+        return out
+    present = present_files(out)
+    inputs = [path.name for name in ("COMMON", "CAMERAS", "IMAGES") for path in present[name]]
+    if inputs and not overwrite:
+        raise InputError(f"holds another project ({', '.join(inputs)}); --overwrite allows it", file=out)
+    for name in set(RESULTS) & set(present):
+        others = [path for path in present[name] if path.name != name]
+        if inputs and others:
+            raise InputError(f"the project there would have a second {name}", file=others[0])
     return out
 
 

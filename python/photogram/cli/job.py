@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import typer
 
 from photogram.cli.console import failures, print_remark
+from photogram.messages import printable
 
 if TYPE_CHECKING:
     from photogram.writing import OutputSet
@@ -131,11 +132,14 @@ class Job:
 
     def _check(self) -> None:
         from photogram.errors import InputError
+        from photogram.files import reading
         from photogram.writing import check_outputs
 
         for path in [*self._files, *self._projects]:
-            _check_input(path)
+            with reading(path):
+                _check_name(path)
         for path in self._directories:
+            _check_name(path)
             if path.exists() and not path.is_dir():
                 raise InputError("is not a directory", file=path)
             if any(
@@ -152,7 +156,8 @@ class Job:
         from photogram.writing.markers import doubtful
 
         for path, mark in doubtful(self._inputs()).items():
-            print_remark(f"{path}: an interrupted run may have left it out of step with other files: {mark}")
+            told = f"{path}: an interrupted run may have left it out of step with other files: {mark}"
+            print_remark(printable(told))
 
     def _check_projects(self, path: Path) -> None:
         """Refuse an output by which a project that is read would have two files of one name."""
@@ -167,17 +172,13 @@ class Job:
             raise InputError(f"would be taken for the {name} of the project", file=path)
 
 
-def _check_input(path: Path) -> None:
-    """Refuse what no file system call can look at; that nothing is there is said by who reads it."""
-    from photogram.errors import InputError
-
-    if "\0" in str(path):
-        raise InputError("a path cannot hold a NUL character", file=path)
+def _check_name(path: Path) -> None:
+    """Refuse what no call of the system can look at; that nothing is there is said by who reads it."""
     try:
         os.stat(path)
     except OSError as error:
         if error.errno not in (errno.ENOENT, errno.ENOTDIR):
-            raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+            raise OSError(error.errno, error.strerror, str(path)) from None
 
 
 def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:

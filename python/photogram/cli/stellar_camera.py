@@ -137,7 +137,7 @@ def exposures(
         job.write(written, documents)
         if not quiet:
             print_written([*written, *documents])
-    if not result.converged:
+    if not result.usable:
         raise typer.Exit(NOT_CONVERGED)
 
 

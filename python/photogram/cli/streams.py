@@ -11,6 +11,8 @@ from io import TextIOWrapper
 __all__ = ["finish", "open_streams", "stream_fault"]
 
 OUTPUT_FAULT = 1
+STREAM_FAULTS = (errno.ENOSPC, errno.EIO, errno.EFBIG, errno.EBADF)
+"""What writing to a standard stream ends in."""
 
 
 def open_streams() -> None:
@@ -30,10 +32,16 @@ def open_streams() -> None:
 
 
 def stream_fault(error: OSError) -> int:
-    """Say why standard output cannot be written, unless its reader has gone; return the exit code."""
+    """Say what an error that names no file is about, unless the reader of the output has gone.
+
+    Returns
+    -------
+    The exit code.
+    """
     if error.errno != errno.EPIPE:
+        of = "standard output: " if error.errno in STREAM_FAULTS else ""
         with suppress(OSError):
-            print(f"error: {error.filename or 'standard output'}: {error.strerror}", file=sys.stderr)
+            print(f"error: {of}{error.strerror or error}", file=sys.stderr)
     return OUTPUT_FAULT
 
 

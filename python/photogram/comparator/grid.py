@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments import path
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
 from photogram.numbers import is_whole_number, whole_number
@@ -41,6 +42,8 @@ class Grid:
         Standard deviation of a calibrated coordinate; None where it is not known.
     adopted
         Date of the calibration, as text.
+    source
+        The file that it was read from.
     """
 
     number: int
@@ -48,13 +51,14 @@ class Grid:
     xy_um: Floats
     sigma_um: float | None = None
     adopted: str = ""
+    source: Path | None = None
 
     def __post_init__(self) -> None:
         """Refuse plates that cannot be."""
         values, counts = np.unique(self.points, return_counts=True)
         if (counts > 1).any():
             raise InputError(f"plate {self.number} has point {values[counts > 1][0]} twice")
-        if self.xy_um.shape != (len(self.points), 2) or not np.isfinite(self.xy_um).all():
+        if self.xy_um.shape != (*np.shape(self.points)[:1], 2) or not np.isfinite(self.xy_um).all():
             raise InputError(f"plate {self.number} needs two coordinates for each of its points")
         if self.sigma_um is not None and not 0 <= self.sigma_um < np.inf:
             raise InputError(f"plate {self.number}: {self.sigma_um} um is no standard deviation")
@@ -112,6 +116,7 @@ def read_grid(path: Path) -> Grid:
             np.array(xy, dtype=float).reshape(-1, 2),
             deviation,
             table.text("adopted"),
+            path,
         )
     except InputError as error:
         raise InputError(error.message, file=path) from None
@@ -143,9 +148,10 @@ def find_grid(name: str) -> Grid:
     InputError
         It is neither.
     """
-    if is_whole_number(name) and not Path(name).exists():
+    file = path("name", name)
+    if is_whole_number(name) and not file.exists():
         return built_in_grid(_plate_number(name))
-    return read_grid(Path(name))
+    return read_grid(file)
 
 
 def _plate_number(name: str) -> int:

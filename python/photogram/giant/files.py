@@ -18,11 +18,13 @@ def present_files(directory: Path) -> dict[str, list[Path]]:
     found: dict[str, list[Path]] = {name: [] for name in NAMES}
     try:
         entries = sorted(directory.iterdir())
-    except OSError as error:
-        raise InputError(f"the directory cannot be read: {error.strerror}", file=directory) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"the directory cannot be read: {reason}", file=directory) from None
     for entry in entries:
         name = project_name(entry)
-        if name and entry.is_file():
+        # A link that leads nowhere or round in a loop is meant to be the file: reading it says what it is.
+        if name and (entry.is_file() or (entry.is_symlink() and not entry.exists())):
             found[name].append(entry)
     return found
 

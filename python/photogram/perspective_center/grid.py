@@ -139,7 +139,14 @@ def reduce(
         None to leave the means as they are. Standard deviations are always those of the raw readings.
     ids, plate_xy, principal_distance, initial, tolerance, title, number
         As in :class:`Grid`.
+
+    Raises
+    ------
+    InputError
+        Readings of another shape.
     """
+    if any(each.ndim != 2 or each.shape[1] != 3 or not len(each) for each in readings):
+        raise InputError("the readings of a point are an array of the shape (k, 3)")
     means = np.array([np.mean(each, axis=0) for each in readings])
     sd = [np.std(each[:, :2], axis=0, ddof=1) if len(each) > 1 else np.zeros(2) for each in readings]
     if coordinatograph is not None:

@@ -23,7 +23,7 @@ from photogram.writing.targets import Target, naming
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-__all__ = ["OutputSet", "write_whole"]
+__all__ = ["OutputSet", "abandon_all", "write_whole"]
 
 PERMISSIONS = 0o777
 
@@ -132,6 +132,7 @@ class OutputSet:
         self._made: list[str] = []
 
     def __enter__(self) -> Self:
+        _live.append(self)
         return self
 
     def __exit__(
@@ -141,7 +142,7 @@ class OutputSet:
             if kind is None:
                 self._finish()
         finally:
-            self._clean()
+            self.abandon()
 
     def open(self, path: Path) -> io.BufferedWriter:
         """Open a file to be written piece by piece; the set closes it."""
@@ -183,7 +184,9 @@ class OutputSet:
         if directory not in self._stagings:
             self._make(directory)
             remove_leftovers(directory)
+            # Known before it is made, so that it is removed whenever the process is told to end.
             self._stagings[directory] = Staging(directory)
+            self._stagings[directory].begin()
         return self._stagings[directory]
 
     def _make(self, directory: str) -> None:
@@ -242,8 +245,8 @@ class OutputSet:
         for staging in self._stagings.values():
             unmark(staging)
 
-    def _clean(self) -> None:
-        """Remove what the set has made apart from its files."""
+    def abandon(self) -> None:
+        """Remove what the set has made apart from files in place."""
         with deferred():
             for file in [*(staged.file for staged in self._staged), *self._streams]:
                 # Without flushing: what is not complete goes nowhere.
@@ -254,6 +257,18 @@ class OutputSet:
             for directory in reversed(self._made):
                 with suppress(OSError):
                     os.rmdir(directory)
+            if self in _live:
+                _live.remove(self)
+
+
+_live: list[OutputSet] = []
+"""Those at work, for a signal that ends the process."""
+
+
+def abandon_all() -> None:
+    """Remove what the sets of this process have made apart from files in place: it is about to end."""
+    while _live:
+        _live[-1].abandon()
 
 
 def write_whole(files: Mapping[Path, bytes], inputs: Iterable[Path] = ()) -> None:

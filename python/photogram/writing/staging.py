@@ -12,7 +12,7 @@ from contextlib import suppress
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["Staging", "alive", "remove_all", "remove_leftovers", "sync_directory"]
+__all__ = ["Staging", "alive", "remove_leftovers", "sync_directory"]
 
 NAME = re.compile(r"\.photogram-([0-9a-f]{16})")
 LOCK = "lock"
@@ -22,9 +22,6 @@ DIRECTORY = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLO
 TRIALS = 16
 UNSUPPORTED = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EBADF)
 """What file systems answer that cannot put a directory on the disk at a wish."""
-
-_live: set[Staging] = set()
-"""Those of this process, for a signal that ends it."""
 
 
 class Staging:
@@ -39,19 +36,21 @@ class Staging:
         self.directory = directory
         self.token = secrets.token_hex(8)
         self._lock: int | None = None
-        # Before anything is made, so that it is removed whenever the process is told to end.
-        _live.add(self)
-        try:
-            for _ in range(TRIALS):
-                if self._begin():
-                    return
-                self.remove()
-                self.token = secrets.token_hex(8)
-                _live.add(self)
-            raise OSError(errno.EEXIST, os.strerror(errno.EEXIST))
-        except BaseException:
+
+    def begin(self) -> None:
+        """Make the directory; :meth:`remove` is called whatever happens.
+
+        Raises
+        ------
+        OSError
+            It cannot be made.
+        """
+        for _ in range(TRIALS):
+            if self._begin():
+                return
             self.remove()
-            raise
+            self.token = secrets.token_hex(8)
+        raise OSError(errno.EEXIST, os.strerror(errno.EEXIST))
 
     @property
     def path(self) -> str:
@@ -77,13 +76,6 @@ class Staging:
             with suppress(OSError):
                 os.close(self._lock)
             self._lock = None
-        _live.discard(self)
-
-
-def remove_all() -> None:
-    """Remove the staging directories of this process."""
-    for staging in list(_live):
-        staging.remove()
 
 
 def alive(directory: str, token: str) -> bool:

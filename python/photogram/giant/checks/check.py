@@ -57,6 +57,12 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
         The project makes no block.
     """
     block = project.to_block(limits)
+    # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _checked(project, block, limits, threads)
+
+
+def _checked(project: Project, block: Block, limits: Limits | None, threads: int | None) -> Check:
     upright, oriented = orientation(block)
     errors, suspects = gross(oriented)
     if suspects.photos.any():

@@ -44,13 +44,16 @@ def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:
     design
         (n, k) with n > k.
     values
-        (n, d); each row is an outlier or not as a whole.
+        (n, d); each row is an outlier or not as a whole. NaN comes back when their squares overflow.
     """
     weights = np.ones(len(values))
     coefficients: Floats = np.zeros((design.shape[1], values.shape[1]))
     for iteration in range(iterations):
         root = np.sqrt(weights)[:, np.newaxis]
-        coefficients = np.asarray(np.linalg.lstsq(design * root, values * root, rcond=None)[0])
+        try:
+            coefficients = np.asarray(np.linalg.lstsq(design * root, values * root, rcond=None)[0])
+        except np.linalg.LinAlgError:  # of numbers whose squares overflow
+            return np.full_like(coefficients, np.nan)
         size = np.linalg.norm(values - design @ coefficients, axis=1)
         middle = max(float(np.median(size)), ROUNDING * float(size.max()))
         if middle == 0:

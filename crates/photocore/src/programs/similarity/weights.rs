@@ -4,8 +4,9 @@ use super::determinacy;
 use super::start::Chosen;
 use super::{SimilarityError, Station};
 
-/// Median standard deviation of a misclosure inside, as a fraction of the size of the model: the criterion of convergence must mean
-/// something where the unit weight is arbitrary, and where the standard deviations are far below the rounding of the coordinates.
+/// Standard deviations, as a fraction of the size of the model, to which those of the model are scaled inside at the most, and all of
+/// them at the least: the criterion of convergence must mean something where the unit weight is arbitrary, and where the standard
+/// deviations are far below the rounding of the coordinates.
 const INNER_SD: f64 = 1e-7;
 /// Beside the smallest positive standard deviation of its control, a model point is as good as exact with this fraction of it: the
 /// cofactors of its misclosures differ by 1e-8 of themselves, and the normal equations keep half of their digits.
@@ -27,24 +28,30 @@ impl Weighted {
     /// Standard deviations that make no unit of weight.
     pub fn new(stations: &[Station], start: &Chosen) -> Result<Self, SimilarityError> {
         let scale = start.similarity.scale;
-        let mut deviations: Vec<f64> = stations.iter().flat_map(|s| misclosure_sd(s, scale)).collect();
-        deviations.sort_unstable_by(f64::total_cmp);
-        let median = deviations[deviations.len() / 2];
-        let inner = INNER_SD * determinacy::spread(stations) / median;
+        let misclosures = median(stations.iter().flat_map(|s| misclosure_sd(s, scale)));
+        let model_sd = |station: &Station| {
+            let control = positive_control_sd(station).fold(f64::INFINITY, f64::min) * scale;
+            let least = EXACT * if control.is_finite() { control } else { misclosures };
+            station.model_sd.map(|sd| sd.max(least))
+        };
+        let unit = INNER_SD * determinacy::spread(stations);
+        let inner = (unit / median(stations.iter().flat_map(model_sd))).min((unit / misclosures).max(1.0));
         if !(inner.is_finite() && inner > 0.0) {
             return Err(SimilarityError::NotFinite);
         }
-        let scaled = |station: &Station| {
-            let control = positive_control_sd(station).fold(f64::INFINITY, f64::min) * scale;
-            let least = EXACT * if control.is_finite() { control } else { median };
-            Station {
-                control_sd: station.control_sd.map(|sd| inner * sd),
-                model_sd: station.model_sd.map(|sd| inner * sd.max(least)),
-                ..*station
-            }
+        let scaled = |station: &Station| Station {
+            control_sd: station.control_sd.map(|sd| inner * sd),
+            model_sd: model_sd(station).map(|sd| inner * sd),
+            ..*station
         };
         Ok(Self { stations: stations.iter().map(scaled).collect(), inner })
     }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values[values.len() / 2]
 }
 
 /// Standard deviations of the known components that are neither exact nor without part.
