@@ -32,7 +32,7 @@ COMPRESSED: dict[bytes, Callable[[BinaryIO], BinaryIO]] = {
 }
 """How files that begin like this are unpacked piece by piece."""
 LONGEST = max(map(len, COMPRESSED))
-PIECE = 1 << 20
+PIECE = 1 << 17
 """Characters that are read at a time."""
 ROOM = 64
 """Characters that a number and the white space after it take at the most, in the mean over a file."""
