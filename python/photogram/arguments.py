@@ -269,10 +269,6 @@ def _numpy(kind: type[np.generic]) -> Check:
 
     def converted(name: str, value: Any) -> Any:
         array = np.asarray(_array(name, value))
-        if needed == "iu" and array.dtype.kind == "f" and np.all(array == np.rint(array)):
-            with np.errstate(invalid="ignore"):
-                whole = array.astype(np.int64)
-            array = whole if np.array_equal(whole, array) else array
         if array.size and array.dtype.kind not in needed:
             raise _refused(name, value, f"an array of {what}")
         if kind is np.int64 and array.dtype.kind == "u" and array.size and array.max() >= 2**63:
