@@ -119,8 +119,8 @@ def test_a_block_that_does_not_fit_is_refused(monkeypatch):
         adjust(block)
     assert isinstance(raised.value, MemoryError)
     assert isinstance(raised.value, AdjustmentError)
-    monkeypatch.setattr("photogram.adjustment.available_memory", lambda: 1 << 25)
-    assert adjust(small_block).converged
+    monkeypatch.setattr("photogram.adjustment.available_memory", lambda: 1 << 30)
+    assert adjust(block).converged
 
 
 def test_a_collection_that_does_not_fit_is_refused(monkeypatch):
