@@ -15,8 +15,8 @@ impl System {
     /// factor, the fronts that wait for each other, and vectors.
     pub fn memory(&self) -> usize {
         let layout = &self.layout;
-        let vectors = PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.groups() * layout.rows();
-        let cofactors = 2 * layout.locals() * layout.local_dim().pow(2) + 2 * layout.groups() * layout.rows();
+        let vectors = PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.equations();
+        let cofactors = 2 * layout.locals() * layout.local_dim().pow(2) + 2 * layout.equations();
         BYTES * (self.symbolic.values() + self.upward().max(self.downward()) + vectors + cofactors)
     }
 
