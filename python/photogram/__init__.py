@@ -5,7 +5,7 @@ from photogram.absolute_orientation import Orientation, orient
 from photogram.adjusted import Iteration
 from photogram.adjustment import AsPublished, Progress, adjust
 from photogram.block import Block
-from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
+from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
 from photogram.planning import Plan, plan
@@ -23,6 +23,7 @@ __all__ = [
     "Iteration",
     "Message",
     "Orientation",
+    "OutOfMemoryError",
     "PhotogramError",
     "Plan",
     "Pose",

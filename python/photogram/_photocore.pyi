@@ -313,7 +313,7 @@ def adjust_block(
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
     threads
-        Number of threads; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 for all processors.
     memory
         Bytes that the adjustment may take; None for any number.
     progress
@@ -403,6 +403,24 @@ class BlockSolution:
     @property
     def image_weights(self) -> _Floats:
         """(m,) factor by which a loss has changed the weight; 1 without a loss."""
+
+    @property
+    def images_behind(self) -> _Indices:
+        """Indices of the images whose point stands behind the camera, ascending."""
+
+    @property
+    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
+        """What the adjusted values leave undetermined, as in a :class:`BlockError`: then there are no cofactors.
+
+        None where everything is determined.
+        """
+
+    @property
+    def weak(self) -> list[tuple[int, int]]:
+        """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
+
+        The sum of squares stood still all the same. Empty where the adjustment ended otherwise.
+        """
 
     @property
     def dropped(self) -> list[tuple[int, str]]:
@@ -1076,12 +1094,12 @@ class StellarProblem:
 class CollectionError(Exception):
     """A collection cannot be adjusted: (kind, message, photos of each combination, points)."""
 
-def read_numbers(text: bytes) -> _Floats:
+def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     """Read the numbers of a text, separated by white space, up to the first word that is not a finite number.
 
     Returns
     -------
-    (k,) numbers.
+    (k,) numbers, and whether they are the whole text.
     """
 
 def bundler_images(photo_parameters: _Floats, points: _Floats) -> _Floats:

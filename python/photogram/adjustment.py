@@ -12,8 +12,9 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjusted import Iteration
 from photogram.block import Block
-from photogram.errors import AdjustmentError, InputError, RankError
-from photogram.memory import available_memory
+from photogram.ends import behind, undetermined
+from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
+from photogram.memory import available_memory, turned
 from photogram.messages import Message, listed
 from photogram.refracted import check_cameras, remarks
 from photogram.result import Result
@@ -25,6 +26,8 @@ UnitVariance = Literal["free", "constrained", "unity"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 
 
+MOST_THREADS = 2**16
+"""More are as many: the core takes four for each processor at the most."""
 NOTABLE_RISE = 1e-3
 """Percent; less is rounding."""
 
@@ -119,7 +122,8 @@ def adjust(
         approximate minimum degree, by nested dissection across their positions, or across their ties alone.
         `auto` takes the one with the least predicted work.
     threads
-        Number of threads; all processors when None. The result does not depend on it, to the last bit.
+        Number of threads, no more than four for each processor; all processors when None. The result does not
+        depend on it, to the last bit.
     progress
         Called now and then with what is going on; an exception it raises stops the adjustment.
 
@@ -132,8 +136,10 @@ def adjust(
     RankError
         The observations do not determine all unknowns; names the photos and points concerned.
     AdjustmentError
-        There is nothing to adjust, the initial values give no finite image coordinates, or the adjustment
-        would take more memory than there is.
+        There is nothing to adjust, the initial values give no finite image coordinates, or double precision
+        is too coarse for coordinates so large; names the photos and points concerned.
+    OutOfMemoryError
+        The adjustment would take more memory than there is.
     InputError
         An option that cannot be, or a photo that is not above the water of the block.
     KeyboardInterrupt
@@ -172,12 +178,23 @@ def adjust(
             loss=row,
             ordering=ordering,
             unit_variance=unit_variance,
-            threads=threads or 0,
+            threads=core_threads(threads),
             memory=available_memory(),
             progress=None if progress is None else teller(progress),
         )
     except _photocore.BlockError as error:
         raise _named(block, *error.args) from None
+    with turned("the adjusted block"):
+        return _result(block, solution, unit_variance, row, as_published)
+
+
+def _result(
+    block: Block,
+    solution: _photocore.BlockSolution,
+    unit_variance: UnitVariance,
+    row: tuple[str, float] | None,
+    as_published: AsPublished | None,
+) -> Result:
     messages = _messages(block, solution) + remark(row, solution.image_weights)
     if as_published:
         messages += _rises([Iteration(*row) for row in solution.iterations])
@@ -213,8 +230,22 @@ def _check_options(
         raise InputError("there must be one iteration at least")
     if not tolerance > 0 or (as_published and not as_published.percent > 0):
         raise InputError("the criterion of convergence must be positive")
-    if threads is not None and threads < 1:
-        raise InputError(f"threads must be positive, not {threads}")
+    core_threads(threads)
+
+
+def core_threads(threads: int | None) -> int:
+    """Return the number of threads as the core takes it, 0 for all processors; it takes few at the most.
+
+    Raises
+    ------
+    InputError
+        It is not positive.
+    """
+    if threads is None:
+        return 0
+    if not isinstance(threads, int) or threads < 1:
+        raise InputError(f"threads must be a positive number, not {threads!r}")
+    return min(threads, MOST_THREADS)
 
 
 def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
@@ -222,7 +253,9 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     by_reason: dict[str, list[str]] = {}
     for point, reason in solution.dropped:
         by_reason.setdefault(reason, []).append(block.point_ids[point])
-    messages = [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
+    error = None if solution.undetermined is None else _named(block, *solution.undetermined)
+    messages = undetermined(block, solution, error) + behind(block, solution)
+    messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
     held = np.isfinite(block.point_sd) & (solution.point_rays > 0)[:, np.newaxis]
     if not held.any() and not (block.photo_position_sd == 0).all():
         messages.insert(
@@ -259,7 +292,21 @@ def _named(
         return _undetermined_photos(block, photos)
     if kind == "no intersection":
         return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
+    if kind == "coarse":
+        return _coarse([block.photo_ids[i] for i in photos[0]], point_names)
+    if kind == "memory":
+        return OutOfMemoryError(message)
     return AdjustmentError(message)
+
+
+def _coarse(photos: list[str], points: list[str]) -> AdjustmentError:
+    """Name photos and points whose values double precision rounds too coarsely."""
+    parts = [f"{kind} {listed(names)}" for kind, names in (("photos", photos), ("points", points)) if names]
+    return AdjustmentError(
+        f"coordinates or angles of the {' and the '.join(parts)} are so large that double precision rounds them"
+        " by more than their standard deviations, or than image coordinates show: count from an origin nearby"
+        " (a standard deviation of 0 fixes a value)"
+    )
 
 
 def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankError:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from photogram.messages import locate
 
-__all__ = ["AdjustmentError", "InputError", "PhotogramError", "RankError"]
+__all__ = ["AdjustmentError", "InputError", "OutOfMemoryError", "PhotogramError", "RankError"]
 
 
 class PhotogramError(Exception):
@@ -36,6 +36,10 @@ class InputError(PhotogramError, ValueError):
 
 class AdjustmentError(PhotogramError):
     """The adjustment could not be carried out."""
+
+
+class OutOfMemoryError(AdjustmentError, MemoryError):
+    """The work would take more memory than there is, or an allocation has failed. The process goes on."""
 
 
 class RankError(AdjustmentError):

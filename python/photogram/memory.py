@@ -1,30 +1,136 @@
-"""How much memory there is."""
+"""How much memory there is, and the refusal of work that would take more."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["available_memory"]
+from photogram.errors import OutOfMemoryError
 
-_MEMINFO = Path("/proc/meminfo")
-_GROUP = Path("/sys/fs/cgroup")
+__all__ = ["available_memory", "gibibytes", "require", "turned"]
+
+GROUPS = (
+    # Version 2, alone and beside version 1; then version 1.
+    ("", "sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"),
+    ("", "sys/fs/cgroup/unified", "memory.max", "memory.current", "inactive_file"),
+    (
+        "memory",
+        "sys/fs/cgroup/memory",
+        "memory.limit_in_bytes",
+        "memory.usage_in_bytes",
+        "total_inactive_file",
+    ),
+)
+"""Controllers as `/proc/self/cgroup` names them, where the tree of their groups stands, the files with the
+limit of a group and with what it uses, and what of that the kernel gives back when asked."""
 
 
-def available_memory(meminfo: Path = _MEMINFO, group: Path = _GROUP) -> int | None:
-    """Return the bytes that a program can still take without swapping; None where the system does not tell.
+def available_memory(root: Path = Path("/")) -> int | None:
+    """Return the bytes that this process can still take without swapping; None where the system does not tell.
 
-    What Linux says is available, and no more than the control group of the process (a container) may still
-    take.
+    The least of what Linux says is available, of what the control group of the process (a container) and
+    the groups around it may still take, and of what the limits of the process (`ulimit -v`, `ulimit -d`)
+    leave.
+
+    Parameters
+    ----------
+    root
+        Where `proc` and `sys` are.
     """
+    parts = [*_machine(root), *_groups(root), *_limits(root)]
+    return min(parts) if parts else None
+
+
+def require(needed: float, what: str) -> None:
+    """Refuse work that would take more memory than there is, before it begins.
+
+    Parameters
+    ----------
+    needed
+        Bytes, at the most.
+    what
+        What takes them, in a few words: the subject of the message.
+
+    Raises
+    ------
+    OutOfMemoryError
+        There is less.
+    """
+    available = available_memory()
+    if available is not None and needed > available:
+        raise OutOfMemoryError(
+            f"{what} would take {gibibytes(needed)} GiB of memory, and {gibibytes(available)} GiB are free"
+        )
+
+
+@contextmanager
+def turned(what: str) -> Iterator[None]:
+    """Turn an allocation that fails into an :class:`OutOfMemoryError`; `what` says for what it was."""
     try:
-        lines = meminfo.read_text().splitlines()
-        kibibytes = next(line.split()[1] for line in lines if line.startswith("MemAvailable:"))
-    except (OSError, StopIteration):
-        return None
-    available = 1024 * int(kibibytes)
+        yield
+    except OutOfMemoryError:
+        raise
+    except MemoryError as error:
+        detail = f": {error}" if str(error) else ""
+        raise OutOfMemoryError(f"{what}: there is not enough memory{detail}") from None
+
+
+def gibibytes(number: float) -> str:
+    """Return a number of bytes in GiB, as text with three digits."""
+    return f"{number / 2**30:.3g}"
+
+
+def _machine(root: Path) -> Iterator[int]:
+    """Yield what Linux says is available."""
+    for line in _text(root / "proc/meminfo").splitlines():
+        if line.startswith("MemAvailable:"):
+            yield 1024 * int(line.split()[1])
+
+
+def _groups(root: Path) -> Iterator[int]:
+    """Yield what the control groups of the process, and all around them, may still take."""
+    for line in _text(root / "proc/self/cgroup").splitlines():
+        _, _, rest = line.partition(":")
+        controllers, _, path = rest.partition(":")
+        for controller, tree, limit, usage, spare in GROUPS:
+            if controller not in controllers.split(","):
+                continue
+            # In a container the tree may begin at the group itself, whose path is that of the host or leads up.
+            group = root / tree / ("" if ".." in path else path.strip("/"))
+            for place in (group, *group.parents):
+                yield from _group(place, limit, usage, spare)
+                if place == root / tree:
+                    break
+
+
+def _group(place: Path, limit: str, usage: str, spare: str) -> Iterator[int]:
+    most, used = _text(place / limit).strip(), _text(place / usage).strip()
+    if most.isdecimal() and used.isdecimal():
+        counts = dict(line.partition(" ")[::2] for line in _text(place / "memory.stat").splitlines())
+        yield max(int(most) - int(used) + int(counts.get(spare, 0)), 0)
+
+
+def _limits(root: Path) -> Iterator[int]:
+    """Yield what the limits of the process leave."""
     try:
-        limit = int((group / "memory.max").read_text())
-        return min(available, max(limit - int((group / "memory.current").read_text()), 0))
+        import resource
+    except ImportError:
+        # Not on this system.
+        return
+    fields = _text(root / "proc/self/statm").split()
+    if len(fields) > 5:
+        page = os.sysconf("SC_PAGE_SIZE")
+        for kind, used in ((resource.RLIMIT_AS, fields[0]), (resource.RLIMIT_DATA, fields[5])):
+            soft = resource.getrlimit(kind)[0]
+            if soft != resource.RLIM_INFINITY:
+                yield max(soft - page * int(used), 0)
+
+
+def _text(path: Path) -> str:
+    """Read what the system tells; empty where it does not."""
+    try:
+        return path.read_text()
     except (OSError, ValueError):
-        # No such group, or one without limit.
-        return available
+        return ""

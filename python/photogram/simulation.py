@@ -26,6 +26,8 @@ __all__ = ["Blunders", "Simulation", "simulate"]
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+_MOST_PHOTOS = 1_000_000
+_MOST_CANDIDATES = 5e6  # pairs of photographs and points that may be seen: some ten seconds
 _JITTER = 0.15  # of a grid cell, either way: small enough to keep the middle of an overlap in the overlap
 
 
@@ -189,6 +191,7 @@ def simulate(
         {
             "strips": (strips >= 1, "at least 1"),
             "photos_per_strip": (photos_per_strip >= 2, "at least 2"),
+            "strips x photos_per_strip": (strips * photos_per_strip <= _MOST_PHOTOS, f"{_MOST_PHOTOS} at most"),
             "forward_overlap": (0.5 < forward_overlap < 1, "between 0.5 and 1"),
             "side_overlap": (0 < side_overlap < 1, "between 0 and 1"),
             "principal_distance": (math.isfinite(footprint), "finite and not 0"),
@@ -215,6 +218,7 @@ def simulate(
     half_angle = math.atan(frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab)))
     reach = 1.02 * (flying_height + relief) * math.tan(half_angle + 2 * tilt)
     plan = _plan(strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach)
+    _check_size(plan)
     terrain = _terrain(plan, relief, footprint, terrain_random)
     photos, rotations = _flight(plan, flying_height, crab, tilt, flight_random)
     positions, attitudes = _into_object_space(photos, rotations, origin, spheroid, photo_to_ground)
@@ -281,6 +285,18 @@ def _check(ranges: dict[str, tuple[bool, str]]) -> None:
             raise InputError(f"{name} must be {expected}")
 
 
+def _check_size(plan: _Plan) -> None:
+    """Refuse what could not be computed in reasonable time: so many grid points in the reach of so many photos."""
+    columns, rows = (2 * plan.reach / side for side in plan.cell)
+    photos = plan.strips * plan.photos_per_strip
+    if not photos * columns * rows <= _MOST_CANDIDATES:
+        raise InputError(
+            f"{photos} photos with {columns * rows:.3g} grid points in the reach of each are more than can be"
+            f" simulated ({_MOST_CANDIDATES:.0e} together): photographs so near each other, so many of them, or"
+            " so many points"
+        )
+
+
 def _plan(
     strips: int,
     photos_per_strip: int,
@@ -305,7 +321,8 @@ def _covered_once(count: int, step: float, length: float) -> float:
     starts = step * np.arange(count)
     edges = np.sort(np.concatenate([starts, starts + length]))
     middles = (edges[1:] + edges[:-1]) / 2
-    covers = ((starts[:, None] <= middles) & (middles < starts[:, None] + length)).sum(axis=0)
+    begun, ended = (np.searchsorted(at, middles, side="right") for at in (starts, starts + length))
+    covers = begun - ended
     return float(np.diff(edges)[covers == 1].sum())
 
 

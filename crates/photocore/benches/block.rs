@@ -15,7 +15,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use photocore::adjustment;
 use photocore::geometry::{self, ObjectSpace, RotationSense};
-use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, System};
+use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, Stopped, System};
 use photocore::programs::block::{Block, Image, Options, Photo, Point, UnitVariance};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -190,10 +190,10 @@ fn go(_: usize) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn done<T>(flow: ControlFlow<(), T>) -> T {
+fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
     match flow {
         ControlFlow::Continue(value) => value,
-        ControlFlow::Break(()) => unreachable!("nothing interrupts"),
+        ControlFlow::Break(_) => unreachable!("nothing interrupts"),
     }
 }
 

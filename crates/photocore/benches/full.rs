@@ -46,7 +46,7 @@ fn factor(pool: &ThreadPool, system: &System, prior: &Prior) -> Duration {
     let elapsed = start.elapsed();
     match done {
         ControlFlow::Continue(factor) => elapsed.mul_f64(1.0 - factor.formation_share),
-        ControlFlow::Break(()) => unreachable!("nothing interrupts"),
+        ControlFlow::Break(_) => unreachable!("nothing interrupts"),
     }
 }
 

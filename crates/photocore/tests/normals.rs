@@ -8,7 +8,7 @@ use std::ops::{ControlFlow, Range};
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use photocore::normals::{
-    Equations, Factor, GroupRows, Layout, Ordering, Prior, SelectedInverse, System, Tie, TieRows,
+    Equations, Factor, GroupRows, Layout, Ordering, Prior, SelectedInverse, Stopped, System, Tie, TieRows,
 };
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -118,10 +118,10 @@ fn go(_: usize) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn done<T>(flow: ControlFlow<(), T>) -> T {
+fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
     match flow {
         ControlFlow::Continue(value) => value,
-        ControlFlow::Break(()) => panic!("interrupted"),
+        ControlFlow::Break(stopped) => panic!("{stopped:?}"),
     }
 }
 

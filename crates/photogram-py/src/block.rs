@@ -7,12 +7,13 @@ use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Criterion, Event, Options as AdjustmentOptions, Phase};
 use photocore::programs::block::{Block, BlockError as Failure, Image, Options, Photo, Point, UnitVariance};
 use pyo3::create_exception;
-use pyo3::exceptions::{PyException, PyValueError};
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use crate::arrays::{check_lengths, indices, numbers, rows};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
+use crate::memory;
 use crate::options::{named_loss, named_ordering, unknown};
 use crate::solution::{BlockSolution, iteration_row};
 
@@ -132,7 +133,7 @@ fn run(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BlockSolution> {
     let solution = watched(py, threads, progress, |pool, watch| block.adjust(options, pool, watch))?;
-    solution.map(BlockSolution::new).map_err(|error| failure(&error))
+    solution.map(BlockSolution::new).map_err(|error| BlockError::new_err(failure(&error)))
 }
 
 /// Works without the GIL. Signals and the caller's `progress` are looked after now and then, on this thread.
@@ -142,11 +143,13 @@ pub fn watched<T: Send, E: Send>(
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&ThreadPool, &mut dyn FnMut(Event) -> ControlFlow<()>) -> Result<T, E> + Send,
 ) -> PyResult<Result<T, E>> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let pool = pool(threads)?;
     let mut raised = None;
     let mut last = Instant::now();
     let mut watch = |event: Event| {
+        if memory::failed() {
+            return ControlFlow::Break(());
+        }
         let due = matches!(event, Event::Iteration(_)) || last.elapsed() > PATIENCE;
         if !due {
             return ControlFlow::Continue(());
@@ -161,7 +164,22 @@ pub fn watched<T: Send, E: Send>(
         }
     };
     let done = py.detach(|| work(&pool, &mut watch));
-    raised.map_or(Ok(done), Err)
+    match raised {
+        Some(error) => Err(error),
+        None if done.is_err() && memory::failed() => Err(memory::failure()),
+        None => Ok(done),
+    }
+}
+
+/// Threads for each processor at the most: more only wait for each other, and thousands of them take minutes to start.
+const THREADS_EACH: usize = 4;
+
+/// So many threads, and no more than are of use; 0 for all processors.
+pub fn pool(threads: usize) -> PyResult<ThreadPool> {
+    memory::arm()?;
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.min(THREADS_EACH * processors)).build();
+    pool.map_err(|error| memory::exhausted(&format!("threads cannot be started: {error}")))
 }
 
 /// Between two looks at signals and progress.
@@ -189,15 +207,21 @@ fn phase_name(phase: Phase) -> &'static str {
     }
 }
 
-fn failure(error: &Failure) -> PyErr {
+/// Kind, message, and the photos and points concerned.
+pub type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>);
+
+/// A failure as Python sees it.
+pub fn failure(error: &Failure) -> FailureRow {
     let (kind, photos, points) = match error {
         Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
         Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
+        Failure::Coarse { photos, points } => ("coarse", vec![photos.clone()], points.clone()),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
         Failure::Memory { .. } => ("memory", vec![], vec![]),
+        Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
-    BlockError::new_err((kind, error.to_string(), photos, points))
+    (kind, error.to_string(), photos, points)
 }

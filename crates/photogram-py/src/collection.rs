@@ -34,11 +34,16 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 }
 
 #[pyfunction]
-fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> Bound<'py, PyArray1<f64>> {
+fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> (Bound<'py, PyArray1<f64>>, bool) {
     let number =
         |word: &[u8]| str::from_utf8(word).ok()?.parse().ok().filter(|value: &f64| value.is_finite());
-    let words = || text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-    PyArray1::from_vec(py, py.detach(|| words().map_while(number).collect()))
+    let (numbers, whole): (Vec<f64>, bool) = py.detach(|| {
+        let mut words = text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let mut numbers = Vec::new();
+        let bad = words.find(|word| number(word).map(|value| numbers.push(value)).is_none());
+        (numbers, bad.is_none())
+    });
+    (PyArray1::from_vec(py, numbers), whole)
 }
 
 #[pyfunction]
@@ -121,6 +126,7 @@ fn failure(error: &Failure) -> FailureRow {
         Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
+        Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
     (kind, error.to_string(), photos, points)

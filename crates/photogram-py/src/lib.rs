@@ -6,6 +6,7 @@ mod collection;
 mod comparator;
 mod distributions;
 mod geometry;
+mod memory;
 mod options;
 mod resection;
 mod similarity;
@@ -13,6 +14,9 @@ mod solution;
 mod stellar;
 
 use pyo3::prelude::*;
+
+#[global_allocator]
+static ALLOCATOR: memory::Reserved = memory::Reserved;
 
 #[pymodule]
 fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {

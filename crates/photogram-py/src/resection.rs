@@ -133,7 +133,7 @@ fn kind(error: Failure) -> &'static str {
         Failure::Undetermined(why) => degeneracy(why),
         Failure::NoPlacement => "no placement",
         Failure::NotFinite => "not finite",
-        Failure::Interrupted | Failure::TooManyPoints => "input",
+        Failure::Interrupted | Failure::OutOfMemory(_) | Failure::TooManyPoints => "input",
     }
 }
 

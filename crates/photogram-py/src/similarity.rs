@@ -13,6 +13,7 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{check_lengths, rows, squares, table};
+use crate::block::pool;
 use crate::solution::{IterationRow, iteration_row, status_name};
 
 create_exception!(
@@ -102,8 +103,7 @@ fn run(
     options: &Options,
     threads: usize,
 ) -> PyResult<SimilaritySolution> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let pool = pool(threads)?;
     let mut raised = None;
     let solution = py.detach(|| {
         orient(stations, options, &pool, &mut |_| match Python::attach(|py| py.check_signals()) {
@@ -128,7 +128,7 @@ fn failure(error: &Failure) -> PyErr {
         Failure::FirstStations(_) => ("first stations", vec![0, 1]),
         Failure::Scale(_) => ("scale", vec![]),
         Failure::NotFinite => ("not finite", vec![]),
-        Failure::Layout(_) | Failure::Interrupted => ("input", vec![]),
+        Failure::Layout(_) | Failure::Interrupted | Failure::OutOfMemory(_) => ("input", vec![]),
     };
     SimilarityError::new_err((kind, error.to_string(), stations))
 }

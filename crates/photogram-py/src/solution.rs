@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{squares, table};
+use crate::block::{FailureRow, failure};
 
 /// Number, weighted sum of squares, largest change in standard deviations, damping.
 pub type IterationRow = (usize, f64, f64, f64);
@@ -128,6 +129,21 @@ impl BlockSolution {
     #[getter]
     fn image_weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         image_weights(py, &self.solution.images)
+    }
+
+    #[getter]
+    fn images_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_vec(py, self.solution.behind.iter().map(|&image| image as i64).collect())
+    }
+
+    #[getter]
+    fn undetermined(&self) -> Option<FailureRow> {
+        self.solution.undetermined.as_ref().map(failure)
+    }
+
+    #[getter]
+    fn weak(&self) -> Vec<(usize, usize)> {
+        self.solution.weak.clone()
     }
 
     #[getter]

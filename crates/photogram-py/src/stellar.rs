@@ -350,7 +350,9 @@ fn failure(error: &Failure) -> PyErr {
         Failure::Undetermined(_) => ("undetermined", vec![]),
         Failure::Weight(_) => ("weight", vec![]),
         Failure::NotFinite => ("not finite", vec![]),
-        Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![]),
+        Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted | Failure::OutOfMemory(_) => {
+            ("input", vec![])
+        }
     };
     StellarError::new_err((kind, error.to_string(), stars))
 }

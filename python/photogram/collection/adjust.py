@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.adjustment import Ordering, Progress, teller
+from photogram.adjustment import Ordering, Progress, core_threads, teller
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
 from photogram.errors import AdjustmentError, InputError, RankError
@@ -59,7 +59,7 @@ def adjust(
     ordering
         How photos are ordered for elimination; see :func:`photogram.adjust`.
     threads
-        Number of threads; all processors when None. The result does not depend on it, to the last bit.
+        Number of threads; see :func:`photogram.adjust`.
     progress
         Called now and then with what is going on; an exception it raises stops the adjustment.
 
@@ -87,8 +87,6 @@ def adjust(
         tolerance = 1e-8 if loss is None else 1e-6
     if not tolerance > 0:
         raise InputError("the criterion of convergence must be positive")
-    if threads is not None and threads < 1:
-        raise InputError(f"threads must be positive, not {threads}")
     row = loss_row(loss, scale)
     try:
         solution = _photocore.adjust_collection(
@@ -105,7 +103,7 @@ def adjust(
             covariance=covariance,
             loss=row,
             ordering=ordering,
-            threads=threads or 0,
+            threads=core_threads(threads),
             progress=None if progress is None else teller(progress),
         )
     except _photocore.CollectionError as error:

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::options::{Iteration, Status};
 use super::statistics::{Counts, Observed, standardized};
-use crate::normals::{Cofactors, Operations, Ordering};
+use crate::normals::{Cofactors, Operations, Ordering, Stopped};
 
 /// Time spent in each phase, in seconds, over all iterations.
 #[derive(Debug, Clone, Copy, Default)]
@@ -45,6 +45,9 @@ pub struct Adjustment {
     pub cofactors: Option<Cofactors>,
     /// Why the last values give no cofactors although they were asked for.
     pub undetermined: Option<AdjustError>,
+    /// The unknowns, none of them local, that a combination moves which is determined so weakly that the sum of squares stood still
+    /// while no full step along it lowered it; none where the adjustment ended otherwise.
+    pub weak: Vec<usize>,
     /// The unknowns held to give the cofactors a datum (see [`super::Model::datum`]), none where the problem has one.
     pub datum: Vec<usize>,
     /// Redundancy number of each observation, when asked for.
@@ -128,4 +131,16 @@ pub enum AdjustError {
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// An allocation of so many bytes failed.
+    #[error("there is no memory for an array of {0} bytes")]
+    OutOfMemory(usize),
+}
+
+impl From<Stopped> for AdjustError {
+    fn from(stopped: Stopped) -> Self {
+        match stopped {
+            Stopped::Interrupted => Self::Interrupted,
+            Stopped::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
+        }
+    }
 }

@@ -10,7 +10,7 @@ use super::options::{Criterion, Event, Iteration, Options, Phase, Status};
 use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
 use super::trust_region::FIRST_DAMPING;
-use crate::normals::{Cofactors, Factor, Inversion, Prior};
+use crate::normals::{Cofactors, Factor, Inversion, Prior, Stopped};
 
 /// Adjusts a problem by least squares.
 ///
@@ -36,6 +36,7 @@ pub fn adjust<M: Model>(
         last_local_corrections: vec![0.0; problem.layout().all_locals().len()],
         datum: vec![],
         curved: false,
+        weak: vec![],
     };
     let damping = if matches!(options.criterion, Criterion::Decrease(_)) { FIRST_DAMPING } else { 0.0 };
     let start = run.form(problem.initial.clone(), damping)?;
@@ -114,6 +115,8 @@ pub(super) struct Run<'a, 'w, M: Model> {
     pub datum: Vec<usize>,
     /// Whether to take in the second-order term of the loss from now on: once the steps are short.
     pub curved: bool,
+    /// Unknowns that a combination moves which full steps cannot follow (see [`Adjustment::weak`]).
+    pub weak: Vec<usize>,
 }
 
 impl<'a, M: Model> Run<'a, '_, M> {
@@ -130,7 +133,10 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 let basis = Some(Basis { equations, prior, factor });
                 Ok(End { status, unknowns, basis, undetermined: None, last: None })
             }
-            Err(error) => Ok(End::lost(unknowns, Some(error))),
+            Err(error) => {
+                let status = if status == Status::Converged { status } else { Status::Diverged };
+                Ok(End { status, ..End::lost(unknowns, Some(error)) })
+            }
         }
     }
 
@@ -175,7 +181,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let mut between = between(&mut *self.watch, Phase::Form, total);
             self.problem.system.factor(self.pool, &equations, &prior, damping, &mut between)
         };
-        let ControlFlow::Continue(factor) = factored else { return Err(AdjustError::Interrupted) };
+        let factor = unless_stopped(factored)?;
         let seconds = start.elapsed().as_secs_f64();
         self.seconds.form += seconds * factor.formation_share;
         self.seconds.factor += seconds * (1.0 - factor.formation_share);
@@ -202,7 +208,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
         let system = &self.problem.system;
         let solved = system.solve(self.pool, &factor, &equations, &prior, damping, &mut between);
-        let ControlFlow::Continue(step) = solved else { return Err(AdjustError::Interrupted) };
+        let step = unless_stopped(solved)?;
         self.seconds.solve += start.elapsed().as_secs_f64();
         let change = factor.decrease.sqrt();
         Ok(Solved { basis: Basis { equations, prior, factor }, step, change })
@@ -244,6 +250,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             undetermined: end.undetermined,
             counts: problem.counts(self.datum.len()),
             datum: self.datum,
+            weak: self.weak,
             operations: problem.system.symbolic().operations(problem.layout()),
             formations: self.formations,
             seconds: self.seconds,
@@ -259,9 +266,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Invert, self.problem.layout().locals());
         let found = self.problem.system.invert(self.pool, factor, &equations, &prior, &mut between);
-        let ControlFlow::Continue(Inversion { mut cofactors, inversion_share, .. }) = found else {
-            return Err(AdjustError::Interrupted);
-        };
+        let Inversion { mut cofactors, inversion_share, .. } = unless_stopped(found)?;
         let prior_redundancy = self.problem.finish_cofactors(&mut cofactors, &self.datum);
         let seconds = start.elapsed().as_secs_f64();
         self.seconds.invert = seconds * inversion_share;
@@ -284,6 +289,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.history.push(after[locals.end..].to_vec());
         self.iterations.push(iteration);
         stopped((self.watch)(Event::Iteration(iteration)))
+    }
+}
+
+/// What the work has ended with.
+fn unless_stopped<T>(flow: ControlFlow<Stopped, T>) -> Result<T, AdjustError> {
+    match flow {
+        ControlFlow::Continue(found) => Ok(found),
+        ControlFlow::Break(stopped) => Err(stopped.into()),
     }
 }
 

@@ -28,10 +28,15 @@ impl<'a, M: Model> Run<'a, '_, M> {
     pub(super) fn strictly(&mut self, start: State<'a, M>, fraction: f64) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
         let mut best = state.sum_of_squares;
+        let mut refused = None;
         while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
             let (unknowns, damping, curved) = (state.unknowns.clone(), state.damping, state.curved);
             let harder = (10.0 * damping).max(FIRST_DAMPING);
             let Some(solved) = self.solve_unless_lost(state)? else {
+                if damping == 0.0 && self.stands_still(&mut refused, best) {
+                    let state = self.form(unknowns, 0.0)?;
+                    return self.stay(state, Status::Converged);
+                }
                 state = self.form(unknowns, harder)?;
                 continue;
             };
@@ -47,8 +52,10 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 let basis = Some(solved.basis);
                 return Ok(End { status: Status::Converged, unknowns, basis, undetermined: None, last });
             }
+            let step = solved.step;
+            let trial: Vec<f64> = unknowns.iter().zip(&step).map(|(x, dx)| x + dx).collect();
+            let moved = (damping == 0.0).then(|| solved.basis.factor.moved(&self.problem.system, &step));
             solved.basis.factor.recycle(&self.problem.system);
-            let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
             let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
             let far = solved.change > FAR * (unknowns.len() as f64).sqrt();
             let next = self.form(if far { self.relocated(trial) } else { trial }, relaxed)?;
@@ -60,11 +67,24 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 self.accept(Iteration { sum_of_squares: best, ..iteration }, &unknowns, &next.unknowns)?;
                 state = next;
             } else {
+                if damping == 0.0 && self.stands_still(&mut refused, best) {
+                    self.weak = moved.unwrap_or_default();
+                    let state = self.form(unknowns, 0.0)?;
+                    return self.stay(state, Status::Converged);
+                }
                 state = self.form(unknowns, harder)?;
             }
         }
         let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
         self.stay(state, status)
+    }
+
+    /// Whether the sum of squares has stood still between two full steps that failed, `refused` at the first and `sum` at the second:
+    /// what it still falls by, damped, no unknown is determined well enough to show.
+    fn stands_still(&self, refused: &mut Option<f64>, sum: f64) -> bool {
+        let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
+        let least = NEGLIGIBLE * NEGLIGIBLE * (sum / freedom).max(1.0);
+        refused.replace(sum).is_some_and(|before| before - sum <= least)
     }
 
     /// Whether a step is negligible itself and, the steps falling at the rate of the last two, all further ones together would be

@@ -173,6 +173,12 @@ impl Photo {
         [scale * u[0], scale * u[1]]
     }
 
+    /// Distance of a point from the projection centre along the optical axis: negative behind the camera, whatever the sign of the
+    /// principal distance (the camera looks along -z).
+    pub fn depth(&self, point: &Vector3) -> f64 {
+        -dot(&self.to_photo[2], &difference(point, &self.centre))
+    }
+
     /// The image position of a point and its partials; not finite for a point in the plane u3 = 0 of the
     /// projection centre.
     #[inline(always)]

@@ -14,6 +14,7 @@ use super::system::System;
 use super::ties::TieEquations;
 use super::vectorised::{Kernel, run, size};
 use super::watch::Control;
+use super::workspace::zeros;
 
 /// Cofactors: the inverse normal matrix where it is needed. All blocks are square, row by row.
 #[derive(Debug, Clone)]
@@ -32,12 +33,17 @@ pub struct Cofactors {
 }
 
 impl Cofactors {
-    /// Puts together what was found at each supernode, and last for the local blocks without equations.
-    pub(super) fn collect(system: &System, inverse: &SelectedInverse, found: &[AtHome]) -> Self {
+    /// Puts together what was found at each supernode, and last for the local blocks without equations; None without memory.
+    pub(super) fn collect(
+        system: &System,
+        control: &Control,
+        inverse: &SelectedInverse,
+        found: &[AtHome],
+    ) -> Option<Self> {
         let layout = &system.layout;
         let (rows, l) = (layout.rows(), layout.local_dim());
-        let mut local = vec![0.0; layout.locals() * l * l];
-        let mut equations = vec![0.0; layout.equations()];
+        let mut local = control.allocated(zeros(layout.locals() * l * l))?;
+        let mut equations = control.allocated(zeros(layout.equations()))?;
         let (of_groups, of_ties) = equations.split_at_mut(layout.groups() * rows);
         for (index, at_home) in found.iter().enumerate() {
             let mut values = at_home.equations.chunks_exact(rows.max(1));
@@ -64,7 +70,7 @@ impl Cofactors {
             border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
             kept_border = blocks.filter_map(|block| inverse.block(block, layout.kept())).flatten().collect();
         }
-        Self { local, kept, border, kept_border, equations }
+        Some(Self { local, kept, border, kept_border, equations })
     }
 }
 

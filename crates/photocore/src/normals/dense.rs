@@ -158,16 +158,18 @@ impl Kernel for Cholesky<'_> {
 /// `z` of the coupled rows (full square), replaces the panel by that of the inverse:
 ///
 /// Y = L_R L_J^-1, Z_RJ = -Z_RR Y, Z_JJ = (L_J L_J^T)^-1 - Y^T Z_RJ.
+///
+/// None without memory.
 pub(super) fn invert_front(
     mut panel: MatMut<'_, f64>,
     z: MatRef<'_, f64>,
     workspace: &Workspace,
     control: &Control,
-) {
+) -> Option<()> {
     let (height, width) = (panel.nrows(), panel.ncols());
     let below_rows = height - width;
     let (mut own, mut below) = panel.rb_mut().split_at_row_mut(width);
-    let mut y_values = workspace.any(below_rows * width);
+    let mut y_values = control.allocated(workspace.any(below_rows * width))?;
     let mut y = MatMut::from_column_major_slice_mut(&mut y_values, below_rows, width);
     y.copy_from(below.rb());
     let factor = own.rb();
@@ -178,7 +180,7 @@ pub(super) fn invert_front(
         let rows = z.subrows(first, tile.nrows());
         matmul(tile, Accum::Replace, rows, y.rb(), -1.0, Par::Seq);
     });
-    let mut inverse_values = workspace.zeros(width * width);
+    let mut inverse_values = control.allocated(workspace.zeros(width * width))?;
     let mut inverse = MatMut::from_column_major_slice_mut(&mut inverse_values, width, width);
     invert_lower_triangular(inverse.rb_mut(), factor, Par::Seq);
     let (inverse, below) = (inverse.rb(), below.rb());
@@ -192,6 +194,7 @@ pub(super) fn invert_front(
     });
     workspace.put_back(y_values);
     workspace.put_back(inverse_values);
+    Some(())
 }
 
 fn row_tiles(matrix: MatMut<'_, f64>) -> Vec<(usize, MatMut<'_, f64>)> {

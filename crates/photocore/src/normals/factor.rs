@@ -17,7 +17,7 @@ use super::stack::Stack;
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::ties::TieEquations;
-use super::watch::{Between, Control, watched};
+use super::watch::{Between, Control, Stopped, watched};
 
 /// The Cholesky factor L of the reduced normal equations.
 #[derive(Debug)]
@@ -99,19 +99,19 @@ impl System {
         prior: &Prior,
         damping: f64,
         between: Between<'_>,
-    ) -> ControlFlow<(), Factor> {
+    ) -> ControlFlow<Stopped, Factor> {
         watched(pool, between, |control| {
             let formation = Formation { system: self, equations, prior, damping, control };
             let mut given_up = Vec::new();
             loop {
-                let factor = formation.factor(&given_up);
+                let factor = formation.factor(&given_up)?;
                 if control.stopped() {
                     // Supernodes were passed over: there is no factor to look at.
-                    return factor;
+                    return Some(factor);
                 }
                 let lost = factor.lost_after_all();
                 if lost.is_empty() {
-                    return factor;
+                    return Some(factor);
                 }
                 // What the columns after a lost pivot have made of it is worthless.
                 given_up.extend(lost);
@@ -122,17 +122,19 @@ impl System {
 }
 
 impl<E: Equations> Formation<'_, E> {
-    /// Forms and factors; the pivots `given_up`, in the order of elimination, count as lost whatever they are.
-    fn factor(&self, given_up: &[usize]) -> Factor {
+    /// Forms and factors; the pivots `given_up`, in the order of elimination, count as lost whatever they are. None without memory.
+    fn factor(&self, given_up: &[usize]) -> Option<Factor> {
         let symbolic = &self.system.symbolic;
-        let values = self.system.workspace.zeros(symbolic.values());
+        let values = self.control.allocated(self.system.workspace.zeros(symbolic.values()))?;
         let mut panels = Panels { symbolic: Arc::clone(symbolic), values };
         let updates = Handover::new(symbolic.supernode_count());
         let visited = Handover::new(symbolic.supernode_count());
         let divided = panels.divide();
         self.system.tree.upward(|index| {
-            if !self.control.stopped() {
-                visited.put(index, self.visit(index, &mut lock(&divided[index]), &updates, given_up));
+            if !self.control.stopped()
+                && let Some(found) = self.visit(index, &mut lock(&divided[index]), &updates, given_up)
+            {
+                visited.put(index, found);
             }
         });
         drop(divided);
@@ -164,21 +166,21 @@ impl<E: Equations> Formation<'_, E> {
             factor.formation_share = formation / (formation + factorisation);
         }
         factor.deficient_locals.sort_unstable();
-        factor
+        Some(factor)
     }
 
-    /// Assembles and factors one front; what it leaves to its parent goes to `updates[index]`.
+    /// Assembles and factors one front; what it leaves to its parent goes to `updates[index]`. None without memory.
     fn visit(
         &self,
         index: usize,
         panel: &mut [f64],
         updates: &Handover<Update>,
         given_up: &[usize],
-    ) -> Visited {
+    ) -> Option<Visited> {
         let symbolic = &*self.system.symbolic;
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
-        let update = self.system.workspace.zeros(s.below() * s.below());
+        let update = self.control.allocated(self.system.workspace.zeros(s.below() * s.below()))?;
         let mut front = Front::new(s.width, s.height(), panel, update);
         for &child in &s.children {
             if let Some(update) = updates.take(child) {
@@ -198,7 +200,7 @@ impl<E: Equations> Formation<'_, E> {
             let (right, diagonal) = (right.split_off(width), diagonal.split_off(width));
             updates.put(index, Update { matrix: update, right, diagonal });
         }
-        Visited {
+        Some(Visited {
             sums,
             lost: pivots.lost.into_iter().map(|column| first + column).collect(),
             doubtful: pivots.doubtful.into_iter().map(|column| first + column).collect(),
@@ -206,7 +208,7 @@ impl<E: Equations> Formation<'_, E> {
             diagonal,
             formation,
             factorisation: start.elapsed().as_secs_f64() - formation,
-        }
+        })
     }
 
     /// Adds what the local blocks at home in a supernode leave, in their order.
@@ -344,6 +346,29 @@ impl Factor {
         self.deficient_locals.extend(sums.deficient);
     }
 
+    /// The unknowns that are not local and that a solution of the equations moves, ascending: those that take at least a tenth of
+    /// the largest share, each in units of what its equations alone determine.
+    pub fn moved(&self, system: &System, solution: &[f64]) -> Vec<usize> {
+        let symbolic = &*self.panels.symbolic;
+        let all = (0..symbolic.blocks()).flat_map(|position| symbolic.unknowns_at(&system.layout, position));
+        let unknowns: Vec<usize> = all.collect();
+        let mut vector: Vec<f64> = unknowns.iter().map(|&unknown| solution[unknown]).collect();
+        self.scale(&mut vector);
+        let largest = vector.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        let shares = unknowns.into_iter().zip(&vector);
+        let mut moved: Vec<usize> =
+            shares.filter(|(_, value)| value.abs() >= 0.1 * largest).map(|(unknown, _)| unknown).collect();
+        moved.sort_unstable();
+        moved
+    }
+
+    /// Takes each unknown in units of what its equations alone determine.
+    fn scale(&self, vector: &mut [f64]) {
+        for (value, &diagonal) in vector.iter_mut().zip(&self.diagonal) {
+            *value *= if diagonal > 0.0 && diagonal.is_finite() { diagonal.sqrt() } else { 1.0 };
+        }
+    }
+
     /// Gives its memory back to the system that it is of, for the next one.
     pub fn recycle(self, system: &System) {
         system.workspace.put_back(self.panels.values);
@@ -415,9 +440,7 @@ impl Deficiency<'_> {
         let symbolic = &*self.factor.panels.symbolic;
         let vectors = self.factor.lost.iter().map(|&pivot| {
             let mut vector = self.factor.combination(pivot);
-            for (value, &diagonal) in vector.iter_mut().zip(&self.factor.diagonal) {
-                *value *= if diagonal > 0.0 && diagonal.is_finite() { diagonal.sqrt() } else { 1.0 };
-            }
+            self.factor.scale(&mut vector);
             blocks_moved(symbolic, &vector)
         });
         vectors.collect()

@@ -15,7 +15,7 @@ use super::factor::Factor;
 use super::panels::{Handover, Panels, lock};
 use super::symbolic::Symbolic;
 use super::system::System;
-use super::watch::{Between, Control, watched};
+use super::watch::{Between, Control, Stopped, watched};
 
 /// The blocks of N^-1 inside the pattern of the factor: every kept block's own, and those of every two kept blocks that
 /// share a local block.
@@ -72,7 +72,7 @@ impl System {
         equations: &E,
         prior: &Prior,
         between: Between<'_>,
-    ) -> ControlFlow<(), Inversion> {
+    ) -> ControlFlow<Stopped, Inversion> {
         watched(pool, between, |control| {
             let walk = Walk { system: self, equations, prior, control };
             walk.invert(factor.panels)
@@ -91,7 +91,8 @@ struct Walk<'a, E> {
 }
 
 impl<E: Equations> Walk<'_, E> {
-    fn invert(&self, mut panels: Panels) -> Inversion {
+    /// None without memory.
+    fn invert(&self, mut panels: Panels) -> Option<Inversion> {
         let symbolic = &*self.system.symbolic;
         let count = symbolic.supernode_count();
         // The front of its parent for each supernode still to be done; a front lives until the last child has taken it.
@@ -99,8 +100,10 @@ impl<E: Equations> Walk<'_, E> {
         let at_home = Handover::new(count);
         let divided = panels.divide();
         self.system.tree.downward(|index| {
-            if !self.control.stopped() {
-                at_home.put(index, self.visit(index, &mut lock(&divided[index]), &above));
+            if !self.control.stopped()
+                && let Some(found) = self.visit(index, &mut lock(&divided[index]), &above)
+            {
+                at_home.put(index, found);
             }
         });
         drop(divided);
@@ -113,20 +116,20 @@ impl<E: Equations> Walk<'_, E> {
         }
         found.push(self.at_home(count, &[], 0));
         let selected = SelectedInverse { panels };
-        let cofactors = Cofactors::collect(self.system, &selected, &found);
+        let cofactors = Cofactors::collect(self.system, self.control, &selected, &found)?;
         let inversion_share = if inversion > 0.0 { inversion / (inversion + rest) } else { 0.0 };
-        Inversion { cofactors, selected, inversion_share }
+        Some(Inversion { cofactors, selected, inversion_share })
     }
 
     /// Inverts one panel, given the front of its parent, and hands its own front to its children. Returns the cofactors of the local
-    /// blocks at home there, and the seconds that the inversion took.
-    fn visit(&self, index: usize, panel: &mut [f64], above: &Handover<Front>) -> (AtHome, f64) {
+    /// blocks at home there, and the seconds that the inversion took; None without memory.
+    fn visit(&self, index: usize, panel: &mut [f64], above: &Handover<Front>) -> Option<(AtHome, f64)> {
         let symbolic = &*self.system.symbolic;
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
         let (height, width) = (s.height(), s.width);
         let workspace = &self.system.workspace;
-        let mut front = workspace.any(height * height);
+        let mut front = self.control.allocated(workspace.any(height * height))?;
         if let Some(parent) = above.take(index) {
             take_coupled_rows(symbolic, index, &parent, &mut front);
             Arc::into_inner(parent).into_iter().for_each(|last| workspace.put_back(last));
@@ -138,7 +141,7 @@ impl<E: Equations> Walk<'_, E> {
             below,
             workspace,
             self.control,
-        );
+        )?;
         for (j, column) in panel.chunks_exact(height.max(1)).enumerate() {
             front[j * height + j..(j + 1) * height].copy_from_slice(&column[j..]);
             (j..height).for_each(|i| front[i * height + j] = column[i]);
@@ -148,7 +151,7 @@ impl<E: Equations> Walk<'_, E> {
         let at_home = self.at_home(index, &front, height);
         s.children.iter().for_each(|&child| above.put(child, Arc::clone(&front)));
         Arc::into_inner(front).into_iter().for_each(|last| workspace.put_back(last));
-        (at_home, seconds)
+        Some((at_home, seconds))
     }
 
     fn at_home(&self, index: usize, front: &[f64], height: usize) -> AtHome {

@@ -46,4 +46,4 @@ pub use layout::{Layout, LayoutError, Tie};
 pub use ordering::Ordering;
 pub use symbolic::{Operations, Symbolic};
 pub use system::System;
-pub use watch::Between;
+pub use watch::{Between, Stopped};

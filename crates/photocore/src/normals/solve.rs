@@ -10,7 +10,8 @@ use super::factor::Factor;
 use super::incidence::Stacks;
 use super::stack::Stack;
 use super::system::System;
-use super::watch::{Between, watched};
+use super::watch::{Between, Stopped, watched};
+use super::workspace::zeros;
 
 /// Stacks that a thread takes at a time.
 const CHUNK: usize = 64;
@@ -28,7 +29,7 @@ impl System {
         prior: &Prior,
         damping: f64,
         between: Between<'_>,
-    ) -> ControlFlow<(), Vec<f64>> {
+    ) -> ControlFlow<Stopped, Vec<f64>> {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
         watched(pool, between, |control| {
             let mut others = factor.right.clone();
@@ -45,7 +46,7 @@ impl System {
             };
             let parts = self.incidence.stacks().parts(CHUNK);
             let found: Vec<Vec<f64>> = parts.into_par_iter().map(solve).collect();
-            let mut values = vec![0.0; layout.unknowns()];
+            let mut values = control.allocated(zeros(layout.unknowns()))?;
             for position in 0..symbolic.blocks() {
                 let range = symbolic.unknowns_at(layout, position);
                 values[range].copy_from_slice(&others[symbolic.range(position)]);
@@ -54,7 +55,7 @@ impl System {
             for (&local, x) in self.incidence.locals().iter().zip(found) {
                 values[layout.local_range(local as usize)].copy_from_slice(x);
             }
-            values
+            Some(values)
         })
     }
 }

@@ -15,7 +15,8 @@ use super::incidence::Stacks;
 use super::stack::{Stack, dot};
 use super::system::System;
 use super::vectorised::{Kernel, Rows, run};
-use super::watch::{Between, Control, watched};
+use super::watch::{Between, Control, Stopped, watched};
+use super::workspace::reserved;
 
 /// Stacks that a thread takes at a time.
 const CHUNK: usize = 64;
@@ -39,13 +40,14 @@ impl System {
         damping: f64,
         rights: &[f64],
         between: Between<'_>,
-    ) -> ControlFlow<(), Vec<f64>> {
+    ) -> ControlFlow<Stopped, Vec<f64>> {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
         watched(pool, between, |control| {
             let work = Work { system: self, equations, prior, damping, control };
-            let mut solutions = rights.to_vec();
-            let mut others =
-                Vec::with_capacity(symbolic.unknowns() * rights.len() / layout.unknowns().max(1));
+            let count = rights.len() / layout.unknowns().max(1);
+            let mut solutions = control.allocated(reserved(rights.len()))?;
+            solutions.extend_from_slice(rights);
+            let mut others = control.allocated(reserved(symbolic.unknowns() * count))?;
             for right in rights.chunks_exact(layout.unknowns().max(1)) {
                 for position in 0..symbolic.blocks() {
                     others.extend_from_slice(&right[symbolic.unknowns_at(layout, position)]);
@@ -65,7 +67,7 @@ impl System {
                         .copy_from_slice(&others[symbolic.range(position)]);
                 }
             }
-            solutions
+            Some(solutions)
         })
     }
 }

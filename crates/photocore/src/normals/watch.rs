@@ -7,6 +7,15 @@ use std::time::Duration;
 
 use rayon::ThreadPool;
 
+/// Why work has ended before its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stopped {
+    /// Whoever watched it said so.
+    Interrupted,
+    /// An allocation of so many bytes failed.
+    OutOfMemory(usize),
+}
+
 /// Called on the calling thread before the work and every few hundredths of a second during it, with the number of local
 /// blocks done; breaking stops the work.
 pub type Between<'a> = &'a mut dyn FnMut(usize) -> ControlFlow<()>;
@@ -19,6 +28,8 @@ const PERIOD: Duration = Duration::from_millis(40);
 pub(super) struct Control {
     stopped: AtomicBool,
     done: AtomicUsize,
+    /// Bytes of an allocation that failed.
+    failed: AtomicUsize,
 }
 
 impl Control {
@@ -27,23 +38,43 @@ impl Control {
         self.stopped.load(Relaxed)
     }
 
+    /// A buffer; without memory for it the work is to stop.
+    pub fn allocated(&self, buffer: Result<Vec<f64>, usize>) -> Option<Vec<f64>> {
+        let note = |bytes: &usize| {
+            self.failed.store(*bytes, Relaxed);
+            self.stopped.store(true, Relaxed);
+        };
+        buffer.inspect_err(note).ok()
+    }
+
+    /// What the work ended with, or why it did not.
+    fn ended<T>(&self, result: Option<T>) -> ControlFlow<Stopped, T> {
+        match (self.failed.load(Relaxed), result) {
+            (0, Some(result)) => ControlFlow::Continue(result),
+            (0, None) => ControlFlow::Break(Stopped::Interrupted),
+            (bytes, _) => ControlFlow::Break(Stopped::OutOfMemory(bytes)),
+        }
+    }
+
     /// Counts local blocks done.
     pub fn count(&self, locals: usize) {
         self.done.fetch_add(locals, Relaxed);
     }
 }
 
-/// Does work on the threads of a pool while the calling thread watches it.
+/// Does work on the threads of a pool while the calling thread watches it. The work may end with nothing when it was stopped.
 pub(super) fn watched<T: Send>(
     pool: &ThreadPool,
     between: Between<'_>,
-    work: impl FnOnce(&Control) -> T + Send,
-) -> ControlFlow<(), T> {
-    between(0)?;
+    work: impl FnOnce(&Control) -> Option<T> + Send,
+) -> ControlFlow<Stopped, T> {
+    if between(0).is_break() {
+        return ControlFlow::Break(Stopped::Interrupted);
+    }
     let control = Control::default();
     if rayon::current_thread_index().is_some() {
         // A thread at work must not wait for another; whoever put it to work watches.
-        return ControlFlow::Continue(work(&control));
+        return control.ended(work(&control));
     }
     let (sender, receiver) = channel();
     let mut flow = ControlFlow::Continue(());
@@ -53,17 +84,19 @@ pub(super) fn watched<T: Send>(
         scope.spawn(move |_| drop(sender.send(work(control))));
         loop {
             match receiver.recv_timeout(PERIOD) {
-                Ok(result) => return Some(result),
+                Ok(result) => return result,
                 Err(RecvTimeoutError::Disconnected) => return None,
                 Err(RecvTimeoutError::Timeout) if flow.is_continue() => {
                     flow = between(control.done.load(Relaxed));
-                    control.stopped.store(flow.is_break(), Relaxed);
+                    control.stopped.fetch_or(flow.is_break(), Relaxed);
                 }
                 Err(RecvTimeoutError::Timeout) => {}
             }
         }
     });
-    flow?;
+    if flow.is_break() {
+        return ControlFlow::Break(Stopped::Interrupted);
+    }
     // The work sends its result unless it panics, and then the scope has passed the panic on.
-    result.map_or(ControlFlow::Break(()), ControlFlow::Continue)
+    control.ended(result)
 }

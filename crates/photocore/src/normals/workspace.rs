@@ -1,4 +1,4 @@
-//! Memory that is used again.
+//! Memory that is used again, and that may not be there.
 
 use std::sync::Mutex;
 
@@ -12,19 +12,19 @@ pub(super) struct Workspace {
 }
 
 impl Workspace {
-    /// A buffer of zeros.
-    pub fn zeros(&self, length: usize) -> Vec<f64> {
-        let mut buffer = self.take(length);
+    /// A buffer of zeros; the bytes that there are not.
+    pub fn zeros(&self, length: usize) -> Result<Vec<f64>, usize> {
+        let mut buffer = self.take(length)?;
         buffer.clear();
         buffer.resize(length, 0.0);
-        buffer
+        Ok(buffer)
     }
 
-    /// A buffer of anything.
-    pub fn any(&self, length: usize) -> Vec<f64> {
-        let mut buffer = self.take(length);
+    /// A buffer of anything; the bytes that there are not.
+    pub fn any(&self, length: usize) -> Result<Vec<f64>, usize> {
+        let mut buffer = self.take(length)?;
         buffer.resize(length, 0.0);
-        buffer
+        Ok(buffer)
     }
 
     /// Takes a buffer back.
@@ -39,9 +39,25 @@ impl Workspace {
         }
     }
 
-    fn take(&self, length: usize) -> Vec<f64> {
+    fn take(&self, length: usize) -> Result<Vec<f64>, usize> {
         let capacity = length.next_power_of_two();
         let found = lock(&self.spare).get_mut(capacity.ilog2() as usize).and_then(Vec::pop);
-        found.unwrap_or_else(|| Vec::with_capacity(capacity))
+        found.map_or_else(|| reserved(capacity), Ok)
     }
+}
+
+/// An empty vector with room for so many numbers; the bytes that there are not.
+pub(super) fn reserved(capacity: usize) -> Result<Vec<f64>, usize> {
+    let mut buffer = Vec::new();
+    match buffer.try_reserve_exact(capacity) {
+        Ok(()) => Ok(buffer),
+        Err(_) => Err(capacity.saturating_mul(size_of::<f64>())),
+    }
+}
+
+/// So many zeros; the bytes that there are not.
+pub(super) fn zeros(length: usize) -> Result<Vec<f64>, usize> {
+    let mut buffer = reserved(length)?;
+    buffer.resize(length, 0.0);
+    Ok(buffer)
 }

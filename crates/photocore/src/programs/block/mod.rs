@@ -6,6 +6,7 @@
 mod initial;
 mod model;
 mod neighbourhood;
+mod precision;
 mod screening;
 mod solution;
 
@@ -134,6 +135,14 @@ pub enum BlockError {
     /// The initial values put a point into the plane of a projection centre, so that its image is not finite.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
+    /// Coordinates or angles that double precision rounds by more than their standard deviations, or than image coordinates show.
+    #[error("{} photos and {} points have coordinates or angles too large for double precision", .photos.len(), .points.len())]
+    Coarse {
+        /// Photographs that have them.
+        photos: Vec<usize>,
+        /// Points that have them.
+        points: Vec<usize>,
+    },
     /// The adjustment would take more memory than it may.
     #[error("the adjustment takes {:.1} GiB of memory, and {:.1} GiB are free", gib(*.needed), gib(*.available))]
     Memory {
@@ -145,9 +154,29 @@ pub enum BlockError {
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// An allocation of so many bytes failed.
+    #[error("there is no memory for an array of {0} bytes")]
+    OutOfMemory(usize),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),
+}
+
+impl BlockError {
+    /// What stopped the adjustment, in terms of the block; `points` are those that took part.
+    fn new(error: AdjustError, points: &[usize]) -> Self {
+        match error {
+            AdjustError::UndeterminedLocals(locals) => {
+                let mut points: Vec<usize> = locals.into_iter().map(|local| points[local]).collect();
+                points.sort_unstable();
+                Self::UndeterminedPoints(points)
+            }
+            AdjustError::Undetermined(combinations) => Self::UndeterminedPhotos(combinations),
+            AdjustError::NotFinite => Self::NotFinite,
+            AdjustError::Interrupted => Self::Interrupted,
+            AdjustError::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
+        }
+    }
 }
 
 impl Block {
@@ -174,36 +203,31 @@ impl Block {
         if points.is_empty() {
             return Err(BlockError::Empty);
         }
+        self.check_rounding()?;
         let origin = self.origin();
         let problem = pool.install(|| self.problem(options, &points, images, origin))?;
         let needed = problem.system.memory();
         if let Some(available) = options.memory.filter(|&available| needed > available) {
             return Err(BlockError::Memory { needed, available });
         }
-        let adjusted =
-            adjustment::adjust(&problem, &options.adjustment, pool, watch).map_err(|error| match error {
-                AdjustError::UndeterminedLocals(locals) => {
-                    let mut points: Vec<usize> = locals.into_iter().map(|local| points[local]).collect();
-                    points.sort_unstable();
-                    BlockError::UndeterminedPoints(points)
-                }
-                AdjustError::Undetermined(combinations) => BlockError::UndeterminedPhotos(combinations),
-                AdjustError::NotFinite => BlockError::NotFinite,
-                AdjustError::Interrupted => BlockError::Interrupted,
-            })?;
+        let adjusted = adjustment::adjust(&problem, &options.adjustment, pool, watch)
+            .map_err(|error| BlockError::new(error, &points))?;
         Ok(Solution::new(self, options, &problem, adjusted, &points, origin, dropped))
     }
 
     /// A point near the photographs: coordinates are counted from it while the block is adjusted, so that no digits are lost
-    /// in large ones. Geographic coordinates stay as they are; differences are formed in geocentric space.
+    /// in large ones. Medians, so that a single photograph with a wrong position does not move it. Geographic coordinates stay
+    /// as they are; differences are formed in geocentric space.
     fn origin(&self) -> Vector3 {
+        let middle = |k: usize| {
+            let mut values: Vec<f64> = self.photos.iter().map(|photo| photo.position[k]).collect();
+            let middle = values.len() / 2;
+            let median =
+                (middle < values.len()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1);
+            median.map_or(0.0, f64::round)
+        };
         match self.space {
-            ObjectSpace::Rectangular => {
-                let count = self.photos.len().max(1) as f64;
-                std::array::from_fn(|k| {
-                    self.photos.iter().map(|photo| photo.position[k] / count).sum::<f64>().round()
-                })
-            }
+            ObjectSpace::Rectangular => std::array::from_fn(middle),
             ObjectSpace::Geographic(_) => [0.0; 3],
         }
     }
@@ -239,13 +263,15 @@ impl Block {
         let photo_sd = |photo: &Photo| [photo.position_sd, photo.attitude_sd];
         let photos =
             self.photos.iter().map(photo_values).collect::<Vec<_>>().into_flattened().into_flattened();
-        let met = model.intersect(&model.photos(&photos));
+        let stations = model.photos(&photos);
+        let met = model.intersect(&stations);
+        self.check_resolution(model.middle_distance(&stations, met.as_deref().ok()))?;
         let coordinates = met.map_err(|point| BlockError::NoIntersection(points[point]))?;
         let own: Vec<Vector3> = model.points.iter().map(|point| point.coordinates).collect();
         let own_sd = model.points.iter().map(|point| point.sd);
         let sd = own_sd.chain(self.photos.iter().flat_map(photo_sd)).flatten().collect();
         let photo_of = model.images.iter().map(|image| image.photo as u32).collect();
-        let places = model.photos(&photos).iter().map(geometry::Photo::centre).collect();
+        let places = stations.iter().map(geometry::Photo::centre).collect();
         let layout = Layout::new(2, 3, &vec![6; self.photos.len()], model.start.clone(), photo_of)?
             .with_places(places)?;
         Ok(Problem {

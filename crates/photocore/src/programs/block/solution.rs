@@ -1,7 +1,7 @@
 //! The adjusted block.
 
 use super::model::CentralPerspective;
-use super::{Block, Dropped, Options, UnitVariance};
+use super::{Block, BlockError, Dropped, Options, UnitVariance};
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
 use crate::geometry::Vector3;
 
@@ -62,6 +62,13 @@ pub struct Solution {
     pub points: Vec<Option<AdjustedPoint>>,
     /// The images; None for those of points that were left out.
     pub images: Vec<Option<Observed<2>>>,
+    /// The images whose point stands behind the camera, ascending.
+    pub behind: Vec<usize>,
+    /// Why there are no cofactors although they were asked for: what the adjusted values leave undetermined.
+    pub undetermined: Option<BlockError>,
+    /// What a combination of unknowns moves that is determined so weakly that no step could follow it to its end, photograph and
+    /// unknown (0 to 5: position, omega, phi, kappa); none where the adjustment ended otherwise.
+    pub weak: Vec<(usize, usize)>,
     /// The points that were left out.
     pub dropped: Vec<Dropped>,
     /// Weighted sums of squares.
@@ -122,12 +129,20 @@ impl Solution {
         }
         let photos = photos.collect();
         let images = images(block, problem, &adjustment);
+        let behind = behind(problem, &unknowns);
+        let undetermined = adjustment.undetermined.take().map(|error| BlockError::new(error, points));
+        let first = problem.layout().all_kept().start;
+        let of_photo = |unknown: &usize| ((unknown - first) / 6, (unknown - first) % 6);
+        let weak = adjustment.weak.iter().map(of_photo).collect();
         adjustment.release_observations();
         Self {
             photos,
             photo_corrections: adjustment.corrections().map(|all| all.as_chunks().0.to_vec()).collect(),
             points: adjusted_points,
             images,
+            behind,
+            undetermined,
+            weak,
             dropped,
             sums_of_squares,
             degrees_of_freedom,
@@ -177,4 +192,20 @@ fn images(
         images[image] = Some(adjustment.observed(group, block.images[image].sd));
     }
     images
+}
+
+/// The images whose point stands behind the camera, as indices into the block.
+fn behind(problem: &Problem<CentralPerspective>, unknowns: &[f64]) -> Vec<usize> {
+    let (model, layout) = (&problem.model, problem.layout());
+    let (points, photos) = unknowns.split_at(layout.all_locals().end);
+    let photos = model.photos(photos);
+    let mut behind = Vec::new();
+    for (local, coordinates) in points.as_chunks::<3>().0.iter().enumerate() {
+        let position = model.space.cartesian(*coordinates);
+        let groups = layout.groups_of(local);
+        let hidden = groups.filter(|&group| photos[model.images[group].photo].depth(&position) < 0.0);
+        behind.extend(hidden.map(|group| model.order[group]));
+    }
+    behind.sort_unstable();
+    behind
 }

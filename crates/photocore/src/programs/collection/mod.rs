@@ -92,6 +92,9 @@ pub enum CollectionError {
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// An allocation of so many bytes failed.
+    #[error("there is no memory for an array of {0} bytes")]
+    OutOfMemory(usize),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -107,6 +110,7 @@ impl CollectionError {
             AdjustError::Undetermined(combinations) => Self::UndeterminedPhotos(combinations),
             AdjustError::NotFinite => Self::NotFinite,
             AdjustError::Interrupted => Self::Interrupted,
+            AdjustError::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
         }
     }
 }

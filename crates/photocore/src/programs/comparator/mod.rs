@@ -91,6 +91,9 @@ pub enum CalibrationError {
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// An allocation of so many bytes failed.
+    #[error("there is no memory for an array of {0} bytes")]
+    OutOfMemory(usize),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -153,6 +156,7 @@ impl Calibration {
             ),
             AdjustError::NotFinite => CalibrationError::NotFinite,
             AdjustError::Interrupted => CalibrationError::Interrupted,
+            AdjustError::OutOfMemory(bytes) => CalibrationError::OutOfMemory(bytes),
         })?;
         Ok(Solution::new(&problem, adjusted))
     }

@@ -131,6 +131,9 @@ pub enum ResectionError {
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// An allocation of so many bytes failed.
+    #[error("there is no memory for an array of {0} bytes")]
+    OutOfMemory(usize),
     /// More than can be numbered.
     #[error("too many points")]
     TooManyPoints,
@@ -201,7 +204,9 @@ impl Resection {
             match adjusted {
                 Ok(adjusted) if self.start.is_none() && !self.in_front(&adjusted.pose()) => {}
                 Ok(adjusted) => solved.push(adjusted),
-                Err(ResectionError::Interrupted) => return Err(ResectionError::Interrupted),
+                Err(stop @ (ResectionError::Interrupted | ResectionError::OutOfMemory(_))) => {
+                    return Err(stop);
+                }
                 Err(other) => {
                     if let ResectionError::Undetermined(why) = other {
                         undetermined = Some(why);
@@ -228,6 +233,7 @@ impl Resection {
         let adjusted = adjustment::adjust(&problem, options, pool, watch);
         let adjustment = adjusted.map_err(|error| match error {
             AdjustError::Interrupted => ResectionError::Interrupted,
+            AdjustError::OutOfMemory(bytes) => ResectionError::OutOfMemory(bytes),
             AdjustError::NotFinite => ResectionError::NotFinite,
             AdjustError::Undetermined(_) | AdjustError::UndeterminedLocals(_) => {
                 ResectionError::Undetermined(self.degeneracy(&start))

@@ -136,6 +136,9 @@ pub enum SimilarityError {
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// An allocation of so many bytes failed.
+    #[error("there is no memory for an array of {0} bytes")]
+    OutOfMemory(usize),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -192,6 +195,7 @@ fn adjust(
     };
     let mut adjusted = adjustment::adjust(&problem, &engine, pool, watch).map_err(|error| match error {
         AdjustError::Interrupted => SimilarityError::Interrupted,
+        AdjustError::OutOfMemory(bytes) => SimilarityError::OutOfMemory(bytes),
         AdjustError::NotFinite => SimilarityError::NotFinite,
         AdjustError::UndeterminedLocals(stations) => {
             SimilarityError::Undetermined { cause: Cause::Singular, stations }

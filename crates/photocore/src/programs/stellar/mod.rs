@@ -141,6 +141,9 @@ pub enum StellarError {
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// An allocation of so many bytes failed.
+    #[error("there is no memory for an array of {0} bytes")]
+    OutOfMemory(usize),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -167,6 +170,7 @@ impl Calibration {
                 AdjustError::Undetermined(combinations) => StellarError::Undetermined(combinations.len()),
                 AdjustError::NotFinite => StellarError::NotFinite,
                 AdjustError::Interrupted => StellarError::Interrupted,
+                AdjustError::OutOfMemory(bytes) => StellarError::OutOfMemory(bytes),
             })?;
         Ok(Solution::new(self, options, &problem, adjusted))
     }
