@@ -17,8 +17,8 @@ from photogram.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.night_file import attitude_of
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
+from photogram.stellar.pointing import attitude_of
 from photogram.stellar.skies import project_sky
 
 FOLDER = Path(__file__).resolve().parents[1] / "python/photogram/examples/exposures"

@@ -1,35 +1,180 @@
-"""An adjustment that the machine cannot hold is refused."""
+"""Work that the machine cannot hold is refused."""
+
+from __future__ import annotations
+
+import resource
+import sys
 
 import pytest
 
-from photogram import AdjustmentError, adjust
-from photogram.memory import available_memory
+from photogram import AdjustmentError, InputError, OutOfMemoryError, adjust, memory
+from photogram.collection import adjust as adjust_collection
+from photogram.collection import simulate as simulate_collection
 
 MEMINFO = "MemTotal:       16000 kB\nMemFree:         100 kB\nMemAvailable:    8000 kB\n"
+FREE = 8192000
+V2 = "sys/fs/cgroup/"
+V1 = "sys/fs/cgroup/memory/"
+
+
+@pytest.fixture
+def machine(tmp_path):
+    """Write what a system tells; return how much of it is available."""
+
+    def write(files):
+        for name, text in {"proc/meminfo": MEMINFO, **files}.items():
+            path = tmp_path / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        return memory.available_memory(tmp_path)
+
+    return write
 
 
 @pytest.mark.parametrize(
-    ("group", "expected"),
+    ("files", "expected"),
     [
-        ({}, 8192000),
-        ({"memory.max": "max\n", "memory.current": "5\n"}, 8192000),
-        ({"memory.max": "3000000\n", "memory.current": "1000000\n"}, 2000000),
-        ({"memory.max": "3000000\n", "memory.current": "3000001\n"}, 0),
+        ({}, FREE),
+        ({"proc/self/cgroup": "0::/\n", V2 + "memory.max": "max\n", V2 + "memory.current": "5\n"}, FREE),
+        ({"proc/self/cgroup": "0::/\n", V2 + "memory.max": "3000\n", V2 + "memory.current": "1000\n"}, 2000),
+        ({"proc/self/cgroup": "0::/\n", V2 + "memory.max": "3000\n", V2 + "memory.current": "3001\n"}, 0),
+        (
+            # What the kernel keeps of files it gives back.
+            {
+                "proc/self/cgroup": "0::/\n",
+                V2 + "memory.max": "3000\n",
+                V2 + "memory.current": "2900\n",
+                V2 + "memory.stat": "anon 900\ninactive_file 2000\n",
+            },
+            2100,
+        ),
+        (
+            # The group has no limit, one around it has.
+            {
+                "proc/self/cgroup": "0::/user/job\n",
+                V2 + "user/job/memory.max": "max\n",
+                V2 + "user/job/memory.current": "100\n",
+                V2 + "user/memory.max": "5000\n",
+                V2 + "user/memory.current": "600\n",
+            },
+            4400,
+        ),
+        (
+            # In a container the tree begins at the group.
+            {
+                "proc/self/cgroup": "0::/docker/0123abcd\n",
+                V2 + "memory.max": "3000\n",
+                V2 + "memory.current": "1000\n",
+            },
+            2000,
+        ),
+        (
+            {
+                "proc/self/cgroup": "5:cpu,cpuacct:/a\n4:memory:/a/b\n1:name=systemd:/a\n",
+                V1 + "a/b/memory.limit_in_bytes": "9223372036854771712\n",
+                V1 + "a/b/memory.usage_in_bytes": "10\n",
+                V1 + "a/memory.limit_in_bytes": "7000\n",
+                V1 + "a/memory.usage_in_bytes": "4000\n",
+                V1 + "a/memory.stat": "total_inactive_file 500\n",
+            },
+            3500,
+        ),
+        (
+            {
+                "proc/self/cgroup": "0::/../..\n",
+                V2 + "memory.max": "3000\n",
+                V2 + "memory.current": "1000\n",
+            },
+            2000,
+        ),
     ],
 )
-def test_available_memory(tmp_path, group, expected):
-    for name, text in {**group, "meminfo": MEMINFO}.items():
-        (tmp_path / name).write_text(text)
-    assert available_memory(tmp_path / "meminfo", tmp_path) == expected
+def test_available_memory(machine, files, expected):
+    assert machine(files) == expected
+
+
+@pytest.mark.parametrize(("kind", "field"), [(resource.RLIMIT_AS, 0), (resource.RLIMIT_DATA, 5)])
+def test_limits_of_the_process_count(machine, monkeypatch, kind, field):
+    def getrlimit(which):
+        unlimited = resource.RLIM_INFINITY
+        return (5_000_000, unlimited) if which == kind else (unlimited, unlimited)
+
+    monkeypatch.setattr(resource, "getrlimit", getrlimit)
+    pages = ["0"] * 7
+    pages[field] = "100"
+    assert machine({"proc/self/statm": " ".join(pages)}) == 5_000_000 - 100 * resource.getpagesize()
 
 
 def test_a_system_that_does_not_tell(tmp_path):
-    assert available_memory(tmp_path / "meminfo", tmp_path) is None
+    assert memory.available_memory(tmp_path) is None
 
 
 def test_a_block_that_does_not_fit_is_refused(small_block, monkeypatch):
-    monkeypatch.setattr("photogram.adjustment.available_memory", lambda: 1 << 14)
-    with pytest.raises(AdjustmentError, match=r"takes 0\.0 GiB of memory, and 0\.0 GiB are free"):
-        adjust(small_block)
     monkeypatch.setattr("photogram.adjustment.available_memory", lambda: 1 << 20)
+    with pytest.raises(
+        OutOfMemoryError, match=r"takes \d+\.\d MiB of memory, and 1\.0 MiB are free"
+    ) as raised:
+        adjust(small_block)
+    assert isinstance(raised.value, MemoryError)
+    assert isinstance(raised.value, AdjustmentError)
+    monkeypatch.setattr("photogram.adjustment.available_memory", lambda: 1 << 25)
     assert adjust(small_block).converged
+
+
+def test_a_collection_that_does_not_fit_is_refused(monkeypatch):
+    collection = simulate_collection(photos=4, points=20).collection
+    # The function has the name of its module.
+    monkeypatch.setattr(sys.modules["photogram.collection.adjust"], "available_memory", lambda: 1 << 20)
+    with pytest.raises(OutOfMemoryError, match=r"of memory, and 1\.0 MiB are free"):
+        adjust_collection(collection)
+
+
+def test_what_would_not_fit_is_refused(monkeypatch):
+    monkeypatch.setattr(memory, "available_memory", lambda: 2**30)
+    memory.require(2**30, "a table")
+    with pytest.raises(OutOfMemoryError, match="a table would take 2 GiB of memory, and 1 GiB are free"):
+        memory.require(2**31, "a table")
+    monkeypatch.setattr(memory, "available_memory", lambda: None)
+    memory.require(2**60, "a table")
+
+
+def test_an_allocation_of_python_that_fails_is_named():
+    with (
+        pytest.raises(OutOfMemoryError, match="reading: there is not enough memory"),
+        memory.turned("reading"),
+    ):
+        raise MemoryError
+    with pytest.raises(InputError), memory.turned("reading"):
+        raise InputError("something else")
+
+
+def test_absurd_numbers_of_threads(small_block):
+    expected = adjust(small_block, threads=1)
+    for threads in (4000, 2**62):
+        result = adjust(small_block, threads=threads)
+        assert (result.photo_positions == expected.photo_positions).all()
+    for threads in (0, -1):
+        with pytest.raises(InputError, match="threads must be positive"):
+            adjust(small_block, threads=threads)
+    for threads in (2.5, 2**70):
+        with pytest.raises(InputError, match="threads is not a whole number"):
+            adjust(small_block, threads=threads)
+
+
+def test_a_limit_of_addresses_is_divided_among_fewer_threads(machine, monkeypatch, tmp_path):
+    """Products of matrices take twice the cache for each thread, and cannot be refused."""
+    cache = {"sys/devices/system/cpu/cpu0/cache/index3/size": "32768K\n"}
+    own = (64 << 20) + memory.STACK
+    limit = 8 * own
+    monkeypatch.setattr(
+        resource,
+        "getrlimit",
+        lambda kind: (limit if kind == resource.RLIMIT_AS else resource.RLIM_INFINITY, 0),
+    )
+    machine({**cache, "proc/self/statm": "0 0 0 0 0 0 0"})
+    assert memory.addresses_of_a_thread(tmp_path) == own
+    assert memory.threads_that_fit(100, tmp_path) == 3
+    assert memory.threads_that_fit(2, tmp_path) == 2
+    limit = own // 2
+    assert memory.threads_that_fit(4, tmp_path) == 1
+    assert memory.available_memory(tmp_path) == 0

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from photogram import InputError
 from photogram.cli import app
-from photogram.files import spare
+from photogram.writing import check_outputs
 
 EXAMPLES = Path(str(files("photogram") / "examples"))
 
@@ -41,6 +41,6 @@ def test_inputs_are_spared(tmp_path, monkeypatch, command):
 def test_another_name_of_an_input_is_known(tmp_path):
     (tmp_path / "a").write_text("a")
     (tmp_path / "link").symlink_to("a")
-    spare([tmp_path / "new"], [tmp_path / "a", tmp_path / "missing"])
+    check_outputs([tmp_path / "new"], [tmp_path / "a", tmp_path / "missing"])
     with pytest.raises(InputError, match="would be written over the input"):
-        spare([tmp_path / "link"], [tmp_path / "a"])
+        check_outputs([tmp_path / "link"], [tmp_path / "a"])

@@ -98,7 +98,15 @@ def priors(block: Block, result: Result) -> tuple[Floats, Floats]:
     sd = np.concatenate(
         [np.hstack([block.photo_position_sd, block.photo_attitude_sd]).ravel(), block.point_sd.ravel()]
     )
-    observed = np.hstack([block.photo_positions, block.photo_attitudes]).ravel()
+    observed = np.hstack(
+        [
+            initial if observed is None else observed
+            for initial, observed in (
+                (block.photo_positions, block.photo_positions_observed),
+                (block.photo_attitudes, block.photo_attitudes_observed),
+            )
+        ]
+    ).ravel()
     adjusted = np.hstack([result.photo_positions, result.photo_attitudes]).ravel()
     difference = np.concatenate(
         [observed - adjusted, (block.point_positions - result.point_positions).ravel()]

@@ -223,6 +223,18 @@ def test_images_that_no_position_explains():
         ({"position_sd": 1.0}, "position_sd is finite, but position is not given"),
         ({"point_ids": ["A"]}, "point_ids has 1 names"),
         ({"max_iterations": 0}, "one iteration at least"),
+        ({"max_iterations": 2**64}, "max_iterations is not a whole number"),
+        ({"max_iterations": "9"}, "max_iterations is not a whole number"),
+        ({"tolerance": None}, "tolerance is not a number"),
+        ({"tolerance": np.nan}, "positive criterion"),
+        ({"principal_distance": "150"}, "principal_distance is not a number"),
+        ({"principal_distance": 10**400}, "principal_distance is not a number"),
+        ({"attitude": [0.0, np.nan, 0.0]}, "attitude is not finite"),
+        ({"attitude": "north"}, "attitude is not an array of numbers"),
+        ({"image_xy": None}, "image_xy is not an array"),
+        ({"image_xy": np.ma.masked_all((7, 2))}, "image_xy has masked values"),
+        ({"object_sd": 1j}, "object_sd is not an array of numbers"),
+        ({"point_ids": 7}, "point_ids is not a list of names"),
     ],
 )
 def test_wrong_input_is_named(change, message):
@@ -233,3 +245,31 @@ def test_wrong_input_is_named(change, message):
 
 def test_the_example_of_the_docstring():
     assert doctest.testmod(photogram.resection).failed == 0
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [
+        ("object_points", None), ("object_points", "points.csv"), ("object_points", [[1, 2], [3]]),
+        ("image_xy", 1.0), ("image_xy", None), ("image_xy", [["a", "b"]] * 5), ("principal_distance", None),
+        ("principal_distance", "152"), ("principal_distance", 1j), ("image_sd", "0.01"), ("object_sd", None),
+        ("position", "here"), ("position_sd", None), ("attitude", [1, 2]), ("attitude", [np.nan] * 3),
+        ("spheroid", "wgs84"), ("point_ids", [None] * 5), ("point_ids", "12345"), ("max_iterations", 1.5),
+        ("tolerance", "small"),
+    ],
+)  # fmt: skip
+def test_arguments_of_another_type(argument, value):
+    ground = np.array([[0.0, 0, 10], [800, 50, 20], [750, 900, 0], [30, 820, 40], [400, 420, 5]])
+    station, angles = np.array([390.0, 430.0, 1500.0]), np.array([0.02, -0.03, 1.5])
+    xy = project(ground, np.tile(station, (5, 1)), np.tile(angles, (5, 1)), np.full(5, -152.0))
+    arguments = {"object_points": ground, "image_xy": xy, "principal_distance": -152.0}
+    assert resect(**arguments).converged
+    with pytest.raises(InputError, match=argument):
+        resect(**{**arguments, argument: value})
+
+
+def test_masks_of_a_resection_are_not_ignored():
+    ground = np.ma.array(np.arange(15.0).reshape(5, 3))
+    ground[2, 1] = np.ma.masked
+    with pytest.raises(InputError, match="object_points has masked values"):
+        resect(ground, np.ones((5, 2)), -152.0)

@@ -10,14 +10,13 @@ import pytest
 from photogram import _photocore
 from photogram.statistics import externally_studentized, global_test, normal_limit, studentized_limit
 
-SHARED = Path(__file__).parents[2] / "shared" / "data" / "statistics"
+CRITICAL = Path(__file__).parent / "data" / "statistics" / "critical_values.json"
+"""Computed by independent programs; some stand in every table of the distributions."""
 
 
 @pytest.fixture(scope="module")
 def critical():
-    if not SHARED.exists():
-        pytest.skip("the statistics data are not beside the repository")
-    return json.loads((SHARED / "critical_values.json").read_text())
+    return json.loads(CRITICAL.read_text())
 
 
 def test_chi_square_limits(critical):

@@ -244,13 +244,16 @@ class BlockError(Exception):
     """A block that cannot be adjusted.
 
     `args` is (kind, message, photos, points): kind is `undetermined points`, `undetermined photos`, `no
-    intersection`, `not finite`, `empty` or `input`; photos is a list of photo indices for each undetermined
-    combination of unknowns, points a list of point indices.
+    intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or
+    `input`; photos is a list of photo indices for each undetermined combination
+    of unknowns, points a list of point indices.
     """
 
 def adjust_block(
     photo_positions: _Floats,
     photo_attitudes: _Floats,
+    photo_positions_observed: _Floats,
+    photo_attitudes_observed: _Floats,
     photo_position_sd: _Floats,
     photo_attitude_sd: _Floats,
     principal_distances: _Floats,
@@ -282,9 +285,12 @@ def adjust_block(
 
     Parameters
     ----------
-    photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd
-        (P, 3) initial (and, where weighted, observed) values and their standard deviations; omega, phi, kappa
-        in radians.
+    photo_positions, photo_attitudes
+        (P, 3) initial values, at which fixed components stay; omega, phi, kappa in radians.
+    photo_positions_observed, photo_attitudes_observed
+        (P, 3) observed values where weighted; angles may differ from initial ones by whole turns.
+    photo_position_sd, photo_attitude_sd
+        (P, 3) standard deviations of the observed values.
     principal_distances
         (P,) millimetres, signed.
     point_positions, point_sd
@@ -410,7 +416,7 @@ class BlockSolution:
 
     @property
     def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
-        """What the adjusted values leave undetermined, as in a :class:`BlockError`: then there are no cofactors.
+        """What the adjusted values leave undetermined, as in a :class:`BlockError`: there are no cofactors.
 
         None where everything is determined.
         """
@@ -732,6 +738,11 @@ x - c_x = s A (X - c_X) + t."""
 ParametersRow = tuple[float, _Matrix, _Vector]
 """Scale s, rotation A (3 x 3), translation B of the similarity x = s A X + B."""
 
+TraceRow = tuple[_Matrix, tuple[list[tuple[int, int]], _Floats], _Floats, _Floats, list[float], list[float]]
+"""One cycle of the bulletin: rotation A as it began; (station, component) and (m, 8) P-values of equations;
+normal equations C (7, 8); auxiliary table D (7, 8); seven results; corrected omega, phi, kappa, s, b1, b2,
+b3."""
+
 class SimilarityError(Exception):
     """A model that cannot be oriented.
 
@@ -751,6 +762,7 @@ def orient_model(
     max_iterations: int,
     tolerance: float,
     threads: int,
+    trace: bool,
 ) -> SimilaritySolution:
     """Find the similarity x = s A X + B between control X and model x (C&GS Technical Bulletin 19).
 
@@ -760,7 +772,8 @@ def orient_model(
         (n, 3) ground units: coordinates, NaN where unknown, and standard deviations, zero for an exact one,
         infinite for one that takes no part.
     model, model_sd
-        (n, 3) model units: coordinates and their standard deviations, positive.
+        (n, 3) model units: coordinates and their standard deviations; zero where those of the control are
+        positive.
     method
         `rigorous`, `report` or `fill-in`.
     start
@@ -773,6 +786,8 @@ def orient_model(
         Fraction of its standard deviation by which no unknown changes any more (rigorous method).
     threads
         Number of threads; 0 for all processors.
+    trace
+        Whether the report's methods keep what each cycle computed on its way.
 
     Raises
     ------
@@ -813,6 +828,10 @@ class SimilaritySolution:
     @property
     def cycles(self) -> list[float] | None:
         """Largest correction of an angle (rad) in each cycle of the report's methods, else None."""
+
+    @property
+    def traces(self) -> list[TraceRow]:
+        """What each of these cycles computed on its way, where it was asked for."""
 
     @property
     def tangent_cofactors(self) -> _Floats:
@@ -1141,6 +1160,7 @@ def adjust_collection(
     loss: tuple[str, float] | None,
     ordering: str,
     threads: int,
+    memory: int | None,
     progress: Callable[[str, int, int, IterationRow | None], None] | None,
 ) -> CollectionSolution:
     """Adjust a collection of photos by Levenberg-Marquardt steps.
@@ -1167,7 +1187,9 @@ def adjust_collection(
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     threads
-        Number of threads; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 for all processors.
+    memory
+        Bytes that the adjustment may take; None for any number.
     progress
         See :func:`adjust_block`.
 
@@ -1233,6 +1255,10 @@ class CollectionSolution:
     @property
     def point_rays_behind(self) -> _Indices:
         """(n,) number of images that have the point behind the camera."""
+
+    @property
+    def collapsed(self) -> list[int]:
+        """Indices of the points that ran into a station and were left out."""
 
     @property
     def residuals(self) -> _Floats:

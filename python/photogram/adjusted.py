@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from photogram.arrays import standard_deviations
 from photogram.block import Block
 from photogram.messages import Message
+from photogram.reliability import ROUNDING
+from photogram.statistics import GlobalTest, global_test
 
 if TYPE_CHECKING:
     from photogram import _photocore
@@ -74,12 +76,12 @@ class AdjustedBlock:
 
     Positions are X, Y, Z or longitude (rad), latitude (rad), height; angles are radians, image coordinates
     millimetres. What was left out of the adjustment is NaN. Cofactors hold for a priori unit weight;
-    covariances are cofactors times the variance of unit weight.
+    covariances are cofactors times the variance of unit weight. Arrays cannot be written.
 
     Attributes
     ----------
     block
-        What was adjusted.
+        What was adjusted: a copy, which later changes of the caller's lists do not reach.
     status
         `converged`, `not converged` or `diverged`.
     messages
@@ -164,6 +166,12 @@ class AdjustedBlock:
     formations: int
     seconds: Mapping[str, float]
 
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
     @classmethod
     def from_solution(
         cls,
@@ -175,7 +183,7 @@ class AdjustedBlock:
     ) -> Self:
         """Take over what the core found."""
         return cls(
-            block=block,
+            block=block.kept(),
             status=solution.status,
             messages=messages,
             loss=loss,
@@ -239,6 +247,59 @@ class AdjustedBlock:
         return standard_deviations(self.point_covariances)
 
     @property
+    def global_test(self) -> GlobalTest | None:
+        """The test of all residuals together; None without degrees of freedom.
+
+        It takes the observations on which the variance of unit weight is based: with `constrained` cameras
+        all of them, else image coordinates and ground control.
+        """
+        sums = self.sums_of_squares
+        tested = sums.total if self.unit_variance == "constrained" else sums.ground + sums.plates
+        return global_test(tested, self.degrees_of_freedom)
+
+    @property
+    def photo_residuals(self) -> Floats:
+        """(P, 6) observed minus adjusted position and attitude; 0 where fixed, NaN where free.
+
+        Longitudes and attitudes differ by half a turn at the most.
+        """
+        residuals = self._photo_observed - np.hstack([self.photo_positions, self.photo_attitudes])
+        turning = [0, 3, 4, 5] if self.block.geographic else [3, 4, 5]
+        residuals[:, turning] = _least_turns(residuals[:, turning])
+        return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
+
+    @property
+    def photo_standardized(self) -> Floats:
+        """(P, 6) `photo_residuals` / (sd x root of redundancy number); NaN unless weighted."""
+        return _standardized(self.photo_residuals, self.photo_given_sd, self.photo_redundancy)
+
+    @property
+    def _photo_observed(self) -> Floats:
+        block = self.block
+        positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
+        return np.hstack(
+            [
+                block.photo_positions if positions is None else positions,
+                block.photo_attitudes if attitudes is None else attitudes,
+            ]
+        )
+
+    @property
+    def photo_given_sd(self) -> Floats:
+        """(P, 6) standard deviations of observed positions and attitudes: infinite free, zero fixed."""
+        return np.hstack([self.block.photo_position_sd, self.block.photo_attitude_sd])
+
+    @property
+    def point_residuals(self) -> Floats:
+        """(n, 3) observed minus adjusted held components; 0 where fixed, NaN where not held."""
+        return np.where(np.isfinite(self.block.point_sd), -self.point_differences, np.nan)
+
+    @property
+    def point_standardized(self) -> Floats:
+        """(n, 3) `point_residuals` / (sd x root of redundancy number); NaN unless weighted."""
+        return _standardized(self.point_residuals, self.block.point_sd, self.point_redundancy)
+
+    @property
     def point_kinds(self) -> NDArray[np.str_]:
         """(n,) `control` with a component held, `check` with components known but none held, else `pass`."""
         held = np.isfinite(self.block.point_sd).any(axis=1)
@@ -264,5 +325,18 @@ class AdjustedBlock:
         """
         differences = self.point_positions - self.block.point_positions
         if self.block.geographic:
-            differences[:, 0] -= math.tau * np.round(differences[:, 0] / math.tau)
+            differences[:, 0] = _least_turns(differences[:, 0])
         return differences
+
+
+def _least_turns(angles: Floats) -> Floats:
+    """Take away whole turns."""
+    return np.asarray(angles - math.tau * np.round(angles / math.tau))
+
+
+def _standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:
+    """Return Baarda's w; NaN for what is no observation, and where rounding is all there is of redundancy."""
+    tested = np.isfinite(sd) & (sd > 0) & (redundancy > ROUNDING)
+    values = np.full(residuals.shape, np.nan)
+    values[tested] = residuals[tested] / (sd[tested] * np.sqrt(redundancy[tested]))
+    return values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,10 +12,11 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.block import Block
+from photogram.arrays import number, one_of, shown, truth_value, whole_number
+from photogram.block import Block, checked
 from photogram.ends import behind, undetermined
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
-from photogram.memory import available_memory, turned
+from photogram.memory import available_memory, threads_that_fit, turned
 from photogram.messages import Message, listed
 from photogram.refracted import check_cameras, remarks
 from photogram.result import Result
@@ -26,8 +28,6 @@ UnitVariance = Literal["free", "constrained", "unity"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 
 
-MOST_THREADS = 2**16
-"""More are as many: the core takes four for each processor at the most."""
 NOTABLE_RISE = 1e-3
 """Percent; less is rounding."""
 
@@ -147,18 +147,29 @@ def adjust(
     """
     if max_iterations is None:
         max_iterations = 50 if loss is None else 200
-    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads)
+    checked(block)
+    truth_value("covariance", covariance)
+    truth_value("fix_photos", fix_photos)
+    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads, progress)
     row = loss_row(loss, scale)
     if row and as_published:
         raise InputError("the 1987 program has no robust loss: as_published or loss")
     check_cameras(block)
     if fix_photos:
-        block = block.replace(photo_position_sd=np.array(0.0), photo_attitude_sd=np.array(0.0))
+        block = block.replace(
+            photo_position_sd=0.0,
+            photo_attitude_sd=0.0,
+            photo_positions_observed=None,
+            photo_attitudes_observed=None,
+        )
+    positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
 
     try:
         solution = _photocore.adjust_block(
             block.photo_positions,
             block.photo_attitudes,
+            block.photo_positions if positions is None else positions,
+            block.photo_attitudes if attitudes is None else attitudes,
             block.photo_position_sd,
             block.photo_attitude_sd,
             block.principal_distances,
@@ -219,18 +230,19 @@ def _check_options(
     tolerance: float,
     as_published: AsPublished | None,
     threads: int | None,
+    progress: object,
 ) -> None:
-    if unit_variance not in get_args(UnitVariance):
-        raise InputError(
-            f"unit_variance is one of {', '.join(get_args(UnitVariance))}, not {unit_variance!r}"
-        )
-    if ordering not in get_args(Ordering):
-        raise InputError(f"ordering is one of {', '.join(get_args(Ordering))}, not {ordering!r}")
-    if max_iterations < 1 or (as_published and as_published.max_iterations < 1):
+    one_of("unit_variance", unit_variance, get_args(UnitVariance))
+    one_of("ordering", ordering, get_args(Ordering))
+    if as_published is not None and not isinstance(as_published, AsPublished):
+        raise InputError(f"as_published is an AsPublished or None, not {shown(as_published)}")
+    if whole_number("max_iterations", as_published.max_iterations if as_published else max_iterations) < 1:
         raise InputError("there must be one iteration at least")
-    if not tolerance > 0 or (as_published and not as_published.percent > 0):
+    if not number("the criterion", as_published.percent if as_published else tolerance) > 0:
         raise InputError("the criterion of convergence must be positive")
     core_threads(threads)
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress is no function: {shown(progress)}")
 
 
 def core_threads(threads: int | None) -> int:
@@ -239,13 +251,13 @@ def core_threads(threads: int | None) -> int:
     Raises
     ------
     InputError
-        It is not positive.
+        It is no number, or not positive.
     """
     if threads is None:
-        return 0
-    if not isinstance(threads, int) or threads < 1:
-        raise InputError(f"threads must be a positive number, not {threads!r}")
-    return min(threads, MOST_THREADS)
+        return threads_that_fit(os.cpu_count() or 1)
+    if whole_number("threads", threads) < 1:
+        raise InputError(f"threads must be positive, not {threads}")
+    return threads_that_fit(min(threads, 4 * (os.cpu_count() or 1)))
 
 
 def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
@@ -303,9 +315,9 @@ def _coarse(photos: list[str], points: list[str]) -> AdjustmentError:
     """Name photos and points whose values double precision rounds too coarsely."""
     parts = [f"{kind} {listed(names)}" for kind, names in (("photos", photos), ("points", points)) if names]
     return AdjustmentError(
-        f"coordinates or angles of the {' and the '.join(parts)} are so large that double precision rounds them"
-        " by more than their standard deviations, or than image coordinates show: count from an origin nearby"
-        " (a standard deviation of 0 fixes a value)"
+        f"coordinates or angles of the {' and the '.join(parts)} are so large that double precision rounds"
+        " them by more than their standard deviations, or than image coordinates show: count from an origin"
+        " nearby (a standard deviation of 0 fixes a value)"
     )
 
 

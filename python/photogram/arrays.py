@@ -1,50 +1,276 @@
-"""Arrays as arguments: numbers of a given shape, and indices, refused by name when they are not."""
+"""Arrays as arguments: numbers of a given shape, indices and names, refused by name when they are not.
+
+What a caller gives is copied once into an array that cannot be written: later edits of the caller's array
+change nothing. An array that is such a copy already is shared.
+"""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from numbers import Integral, Real
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram.errors import InputError
 
-__all__ = ["indices", "shaped", "standard_deviations"]
+__all__ = [
+    "frozen",
+    "indices",
+    "length",
+    "names",
+    "number",
+    "numbers",
+    "one_of",
+    "shaped",
+    "shown",
+    "standard_deviations",
+    "text",
+    "truth_value",
+    "whole_number",
+]
+
+_Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
-def shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return an array of the given shape; a single number stands for all of them.
+def shaped(
+    name: str, value: ArrayLike, shape: tuple[int, ...], *, missing: bool = False
+) -> NDArray[np.float64]:
+    """Return an array of the given shape, which cannot be written; a single number stands for all of them.
+
+    Parameters
+    ----------
+    name
+        Of the argument, for messages.
+    value
+        Numbers: integers or floating-point numbers. Words, truth values and complex numbers are none, even
+        where NumPy would make numbers of them.
+    shape
+        What the array must have.
+    missing
+        Whether values may be missing: masked ones become NaN.
 
     Raises
     ------
     InputError
-        Another shape, or what is no number; the message names the argument.
+        Another shape, what is no number, or masked values where none may be missing; the message names the
+        argument.
     """
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} is not an array of numbers: {error}") from None
+    array = numbers(name, value, missing=missing)
     if array.ndim == 0:
         array = np.full(shape, array)
     if array.shape != shape:
         raise InputError(f"{name} has the shape {array.shape}, not {shape}")
-    return np.ascontiguousarray(array)
+    return frozen(array)
 
 
-def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.int64]:
-    """Return an array of `length` whole numbers from 0 to `count` - 1.
+def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
+    """Return an array of any shape, perhaps that of the caller; see :func:`shaped`.
 
     Raises
     ------
     InputError
-        Another shape, what is no whole number, or an index outside; the message names the argument.
+        What is no number, or masked values where none may be missing.
     """
-    array = np.asarray(value)
-    if array.shape != (length,) or (length and not np.issubdtype(array.dtype, np.integer)):
+    array = _plain(name, value, "numbers")
+    kind = array.dtype.kind
+    if kind == "O":
+        bad = next((each for each in array.flat if not _is_real(each)), None)
+        if bad is not None:
+            raise InputError(f"{name} is not an array of numbers: {shown(bad)} is none")
+    elif kind not in "fiu":
+        raise InputError(f"{name} is not an array of numbers: its type is {array.dtype}")
+    try:
+        with np.errstate(over="ignore"):  # infinite then, which is for the caller to judge
+            found: NDArray[np.float64] = array.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} is not an array of numbers: {error}") from None
+    if _masked(value):
+        if not missing:
+            raise InputError(f"{name} has masked values")
+        found = np.where(np.ma.getmaskarray(np.ma.asarray(value)), math.nan, found)
+    return found
+
+
+def _is_real(value: object) -> bool:
+    """Whether a value is a number, or None, which counts as one that is missing: NaN."""
+    return value is None or (isinstance(value, Real) and not isinstance(value, bool))
+
+
+def _masked(value: object) -> bool:
+    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.getmaskarray(value).any())
+
+
+def _plain(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
+    """Return what NumPy makes of an argument, whatever its type."""
+    if value is None:
+        raise InputError(f"{name} is not an array of {of}: it is None")
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} is not an array of {of}: {error}") from None
+
+
+def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
+    """Return a contiguous array that nobody can write: the array itself where it is one already."""
+    flags = array.flags
+    if not (flags.owndata and flags.c_contiguous and not flags.writeable):
+        array = np.array(array, order="C", subok=False)
+        array.flags.writeable = False
+    return array
+
+
+def length(name: str, value: ArrayLike) -> int:
+    """Return the number of rows of an array.
+
+    Raises
+    ------
+    InputError
+        It has none: a single value, or no array at all.
+    """
+    array = _plain(name, value, "values")
+    if array.ndim == 0:
+        raise InputError(f"{name} is not an array: {shown(value)}")
+    return len(array)
+
+
+def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.int64]:
+    """Return an array of `length` whole numbers from 0 to `count` - 1, which cannot be written.
+
+    Raises
+    ------
+    InputError
+        Another shape, what is no whole number, masked values, or an index outside; the message names the
+        argument.
+    """
+    array = _plain(name, value, f"{length} whole numbers")
+    if array.shape != (length,) or (length and array.dtype.kind not in "iu"):
         raise InputError(f"{name} is not an array of {length} whole numbers")
-    array = np.ascontiguousarray(array, dtype=np.int64)
+    if _masked(value):
+        raise InputError(f"{name} has masked values")
     bad = np.flatnonzero((array < 0) | (array >= count))
     if bad.size:
         raise InputError(f"{name}[{bad[0]}] is {array[bad[0]]}, outside 0 to {count - 1}")
-    return array
+    return frozen(array.astype(np.int64, copy=False))
+
+
+def names(name: str, values: Iterable[object]) -> list[str]:
+    """Return names as strings; whole numbers are names too.
+
+    Parameters
+    ----------
+    name
+        Of the argument, for messages.
+    values
+        Strings or whole numbers. A name that is missing in a table is None or NaN there; a column of whole
+        numbers with one missing has become one of floating-point numbers, and 1.0 is not the name 1.
+
+    Raises
+    ------
+    InputError
+        A name that is missing, empty, no string, or not printable; the message tells its row.
+    """
+    no_row = isinstance(values, np.ndarray) and values.ndim != 1
+    if no_row or isinstance(values, str | bytes) or not isinstance(values, Iterable):
+        raise InputError(f"{name} is not a list of names: {shown(values)}")
+    found: list[Any] = values.tolist() if isinstance(values, np.ndarray) else list(values)
+    if {str} != set(map(type, found)):
+        found = [_name(name, row, value) for row, value in enumerate(found)]
+    if not ("".join(found).isprintable() and all(map(str.strip, found))):
+        for row, each in enumerate(found):
+            if not each.strip():
+                raise InputError(f"{name}[{row}] is an empty name")
+            text(f"{name}[{row}]", each)
+    return found
+
+
+def _name(name: str, row: int, value: object) -> str:
+    if isinstance(value, str) or (isinstance(value, Integral) and not isinstance(value, bool)):
+        return str(value)
+    if value is None or (isinstance(value, Real) and value != value):
+        raise InputError(f"{name}[{row}] has no name: {shown(value)}")
+    raise InputError(f"{name}[{row}] is not a name: {shown(value)} is neither a string nor a whole number")
+
+
+def text(name: str, value: object) -> str:
+    """Return a line of text.
+
+    Raises
+    ------
+    InputError
+        No string, or characters that do not print: line ends, control characters, halves of surrogate pairs.
+    """
+    if not isinstance(value, str):
+        raise InputError(f"{name} is not a string: {shown(value)}")
+    if not value.isprintable():
+        raise InputError(f"{name} has characters that do not print: {shown(value)}")
+    return value
+
+
+def number(name: str, value: object) -> float:
+    """Return a number, which may be infinite or NaN.
+
+    Raises
+    ------
+    InputError
+        No number, or one that is beyond double precision.
+    """
+    if _is_real(value) and value is not None:
+        try:
+            return float(value)  # type: ignore[arg-type]
+        except OverflowError:
+            pass
+    raise InputError(f"{name} is not a number: {shown(value)}")
+
+
+def whole_number(name: str, value: object) -> int:
+    """Return a whole number of 64 bits.
+
+    Raises
+    ------
+    InputError
+        No such number.
+    """
+    if not isinstance(value, Integral) or isinstance(value, bool) or not -(2**63) <= int(value) < 2**63:
+        raise InputError(f"{name} is not a whole number of 64 bits: {shown(value)}")
+    return int(value)
+
+
+def truth_value(name: str, value: object) -> bool:
+    """Return True or False.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} is True or False, not {shown(value)}")
+    return bool(value)
+
+
+def one_of(name: str, value: object, choices: Sequence[str]) -> None:
+    """Refuse what is not one of some words.
+
+    Raises
+    ------
+    InputError
+        Another word, or no string; the message tells the words.
+    """
+    if not (isinstance(value, str) and value in choices):
+        raise InputError(f"{name} is one of {', '.join(choices)}, not {shown(value)}")
+
+
+def shown(value: object) -> str:
+    """Show what a caller gave, in a line, however long it is."""
+    if isinstance(value, int) and value.bit_length() > 128:
+        return f"a whole number of {value.bit_length()} bits"
+    try:
+        return ascii(value)[:80]
+    except Exception:  # a foreign object may fail at anything, a deep one at its depth
+        return f"a {type(value).__name__}"
 
 
 def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]:

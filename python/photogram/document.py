@@ -9,6 +9,7 @@ import numpy as np
 import orjson
 
 from photogram import _photocore
+from photogram.report import problems_of
 
 if TYPE_CHECKING:
     from photogram.adjusted import AdjustedBlock, Floats
@@ -35,9 +36,11 @@ def _document(result: AdjustedBlock) -> dict[str, Any]:
             "standardized": "residual / (sd x root of redundancy number), a priori unit weight",
             "covariance": "cofactors times covariance_scale",
             "difference": "adjusted minus supplied",
+            "control, stations": "residual: observed minus adjusted; sd 0: fixed, null: free or not held",
         },
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
         "status": result.status,
+        "problems": problems_of(result),
         "messages": [str(message) for message in result.messages],
         "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
@@ -59,10 +62,13 @@ def _document(result: AdjustedBlock) -> dict[str, Any]:
         "degrees_of_freedom": result.degrees_of_freedom,
         "unit_variance": result.unit_variance,
         "variance_of_unit_weight": result.variance_of_unit_weight,
+        "global_test": _global_test(result),
         "covariance_scale": result.covariance_scale,
         "photos": _photos(result),
         "points": _points(result),
         "observations": _observations(result),
+        "control": _control(result),
+        "stations": _stations(result),
         "check_points": _check_points(result),
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
         "ordering": result.ordering,
@@ -85,6 +91,10 @@ def _units(result: AdjustedBlock) -> dict[str, str]:
         "attitude_covariance": "rad^2",
         "covariance": "products of the units of position_covariance and rad",
         "residual_mm": "mm",
+        "position_residual": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "position_sd": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "attitude_residual_rad": "rad",
+        "attitude_sd_rad": "rad",
         "difference": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
         "operations": "multiply-adds, each time the phase is carried out",
         "seconds": "s",
@@ -158,6 +168,70 @@ def _observations(result: AdjustedBlock) -> list[dict[str, Any]]:
             **({"weight_factor": weight} if result.loss else {}),
         }
         for photo, point, residual, redundancy, standardized, weight in columns
+    ]
+
+
+def _global_test(result: AdjustedBlock) -> dict[str, Any] | None:
+    test = result.global_test
+    if test is None:
+        return None
+    return {
+        "variance": test.variance,
+        "limits": test.limits,
+        "level": test.level,
+        "probability": test.probability,
+        "rejected": "high" if test.rejected_high else "low" if test.rejected_low else None,
+    }
+
+
+def _control(result: AdjustedBlock) -> list[dict[str, Any]]:
+    block = result.block
+    rows = np.flatnonzero(result.used_points & np.isfinite(block.point_sd).any(axis=1))
+    columns = zip(
+        rows.tolist(),
+        _outward(result, result.point_residuals[rows]).tolist(),
+        _outward(result, block.point_sd[rows]).tolist(),
+        result.point_redundancy[rows].tolist(),
+        result.point_standardized[rows].tolist(),
+        strict=True,
+    )
+    return [
+        {
+            "id": block.point_ids[row],
+            "position_residual": residual,
+            "position_sd": sd,
+            "redundancy": redundancy,
+            "standardized": standardized,
+        }
+        for row, residual, sd, redundancy, standardized in columns
+    ]
+
+
+def _stations(result: AdjustedBlock) -> list[dict[str, Any]]:
+    block, given_sd = result.block, result.photo_given_sd
+    rows = np.flatnonzero(np.isfinite(given_sd).any(axis=1))
+    residuals = result.photo_residuals[rows]
+    columns = zip(
+        rows.tolist(),
+        _outward(result, residuals[:, :3]).tolist(),
+        _outward(result, given_sd[rows, :3]).tolist(),
+        residuals[:, 3:].tolist(),
+        given_sd[rows, 3:].tolist(),
+        result.photo_redundancy[rows].tolist(),
+        result.photo_standardized[rows].tolist(),
+        strict=True,
+    )
+    return [
+        {
+            "id": block.photo_ids[row],
+            "position_residual": position,
+            "position_sd": position_sd,
+            "attitude_residual_rad": attitude,
+            "attitude_sd_rad": attitude_sd,
+            "redundancy": redundancy,
+            "standardized": standardized,
+        }
+        for row, position, position_sd, attitude, attitude_sd, redundancy, standardized in columns
     ]
 
 

@@ -1,65 +1,21 @@
-"""Reading text files, and writing files whole or not at all."""
+"""Reading text files."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
 from photogram.errors import InputError
 
-__all__ = ["read_bytes", "read_lines", "reading", "spare", "whole", "write_whole"]
-
-
-def spare(paths: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Refuse to write over what is read.
-
-    Parameters
-    ----------
-    paths
-        Where results are to go.
-    inputs
-        The files that are read; those that are not there do not matter.
-
-    Raises
-    ------
-    InputError
-        A path is one of the inputs, by whatever name.
-    """
-    given = [file for file in inputs if file.exists()]
-    for path in paths:
-        if path.exists() and any(path.samefile(file) for file in given):
-            raise InputError("would be written over the input", file=path)
-
-
-def write_whole(files: Mapping[Path, bytes]) -> None:
-    """Write files so that each is there whole or not at all.
-
-    All are written beside their places first, then moved there.
-
-    Raises
-    ------
-    OSError
-        A file cannot be written; no file has changed unless the very moving of one failed.
-    """
-    begun: dict[Path, Path] = {}
-    try:
-        for path, content in files.items():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            begun[path] = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-            begun[path].write_bytes(content)
-        for path, temporary in begun.items():
-            temporary.replace(path)
-    finally:
-        for temporary in begun.values():
-            temporary.unlink(missing_ok=True)
+__all__ = ["read_bytes", "read_lines", "reading"]
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     """Name the file that the system cannot read: an :class:`OSError` becomes an :class:`InputError`."""
+    if "\0" in str(path):
+        raise InputError("a path cannot hold a NUL character", file=path)
     try:
         yield
     except OSError as error:
@@ -95,24 +51,3 @@ def read_lines(path: Path) -> list[str]:
     if lines[-1] == "":
         lines.pop()
     return lines
-
-
-@contextmanager
-def whole(path: Path) -> Iterator[BinaryIO]:
-    """Open a file to be written piece by piece that is there whole or not at all.
-
-    It is written beside its place and moved there at the end, unless an exception comes first.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written; what was there has not changed.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with temporary.open("wb") as file:
-            yield file
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
+from photogram.arguments import check_arguments
+from photogram.arrays import length, shaped
 from photogram.errors import InputError
 from photogram.refraction import Refraction
 
@@ -128,8 +130,15 @@ def lengths_of_units(positions: ArrayLike, spheroid: Spheroid | None) -> Floats:
 
 
 def local_frames(positions: ArrayLike) -> Floats:
-    """Rows east, north, up, (n, 3, 3), of the local frames at (n, 3) longitude, latitude (rad), height."""
-    longitude, latitude = _floats(positions)[:, :2].T
+    """Rows east, north, up, (n, 3, 3), of the local frames at (n, 3) longitude, latitude (rad), height.
+
+    Raises
+    ------
+    InputError
+        Another shape.
+    """
+    values = shaped("positions", positions, (length("positions", positions), 3))
+    longitude, latitude = values[:, :2].T
     sl, cl, sp, cp = np.sin(longitude), np.cos(longitude), np.sin(latitude), np.cos(latitude)
     rows = [[-sl, cl, np.zeros_like(sl)], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]]
     return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
@@ -248,3 +257,20 @@ def refraction_shift(
 
 def _floats(values: ArrayLike) -> Floats:
     return np.asarray(values, dtype=np.float64)
+
+
+check_arguments(
+    globals(),
+    [
+        "Spheroid",
+        "geocentric_to_geographic",
+        "geographic_to_geocentric",
+        "lengths_of_units",
+        "local_frames",
+        "project",
+        "refraction_shift",
+        "rotation_angles",
+        "rotation_matrix",
+        "viewing_directions",
+    ],
+)

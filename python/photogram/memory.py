@@ -25,10 +25,12 @@ GROUPS = (
 )
 """Controllers as `/proc/self/cgroup` names them, where the tree of their groups stands, the files with the
 limit of a group and with what it uses, and what of that the kernel gives back when asked."""
+STACK = 160 << 20
+"""Addresses for the stack of a thread, its share of the heap, and what is kept in reserve."""
 
 
 def available_memory(root: Path = Path("/")) -> int | None:
-    """Return the bytes that this process can still take without swapping; None where the system does not tell.
+    """Return the bytes that this process can still take without swapping; None where nothing tells.
 
     The least of what Linux says is available, of what the control group of the process (a container) and
     the groups around it may still take, and of what the limits of the process (`ulimit -v`, `ulimit -d`)
@@ -97,7 +99,7 @@ def _groups(root: Path) -> Iterator[int]:
         for controller, tree, limit, usage, spare in GROUPS:
             if controller not in controllers.split(","):
                 continue
-            # In a container the tree may begin at the group itself, whose path is that of the host or leads up.
+            # In a container the tree may begin at the group itself, and its path be that of the host.
             group = root / tree / ("" if ".." in path else path.strip("/"))
             for place in (group, *group.parents):
                 yield from _group(place, limit, usage, spare)
@@ -125,7 +127,24 @@ def _limits(root: Path) -> Iterator[int]:
         for kind, used in ((resource.RLIMIT_AS, fields[0]), (resource.RLIMIT_DATA, fields[5])):
             soft = resource.getrlimit(kind)[0]
             if soft != resource.RLIM_INFINITY:
-                yield max(soft - page * int(used), 0)
+                own = addresses_of_a_thread(root) if kind == resource.RLIMIT_AS else 0
+                yield max(soft - page * int(used) - own, 0)
+
+
+def addresses_of_a_thread(root: Path = Path("/")) -> int:
+    """Return the addresses that a thread of the core takes; 0 where the cache is not known.
+
+    The products of matrices have buffers of twice the cache. They cannot be refused: the process ends where
+    a limit of addresses leaves none.
+    """
+    size = _text(root / "sys/devices/system/cpu/cpu0/cache/index3/size").strip()
+    return 2048 * int(size[:-1]) + STACK if size.endswith("K") and size[:-1].isdecimal() else 0
+
+
+def threads_that_fit(threads: int, root: Path = Path("/")) -> int:
+    """Return how many of some threads half of what a limit of addresses leaves suffices for; one at least."""
+    own, left = addresses_of_a_thread(root), min(_limits(root), default=None)
+    return threads if not own or left is None else max(1, min(threads, left // 2 // own))
 
 
 def _text(path: Path) -> str:

@@ -10,20 +10,41 @@ __all__ = ["Message"]
 MOST_NAMES = 12
 """Names that a message lists at most."""
 
+MOST_CHARACTERS = 200
+"""Characters of a record that a message shows at most; the cards of all programs have fewer."""
+
+MOST_QUOTED = 40
+"""Characters of a field that a message quotes at most."""
+
+
+def shortened(text: str, most: int = MOST_CHARACTERS) -> str:
+    """Return the beginning of a long text, and how long it is; a short one as it is."""
+    return text if len(text) <= most else f"{text[:most]}... ({len(text)} characters)"
+
+
+def quoted(text: str) -> str:
+    """Return a field between quotation marks as messages show it: escaped, and shortened where it is long."""
+    rest = "" if len(text) <= MOST_QUOTED else f"... ({len(text)} characters)"
+    return f"{text[:MOST_QUOTED]!r}{rest}"
+
 
 def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
     """Put the place (file, record number, record text) before and after a message.
 
-    Characters that do not print, which could do anything to a terminal, stand there as U+FFFD, one for one.
+    Of a long record the beginning is shown. Characters that do not print stand there as U+FFFD, one for one.
     """
     place = ", ".join(
-        part for part in (str(file) if file else "", f"record {record}" if record else "") if part
+        part for part in (printable(str(file)) if file else "", f"record {record}" if record else "") if part
     )
     head = f"{place}: {message}" if place else message
     if text is None:
         return head
-    shown = "".join(character if character.isprintable() else "\ufffd" for character in text)
-    return f"{head}\n    |{shown}|"
+    return f"{head}\n    |{printable(shortened(text))}|"
+
+
+def printable(text: str) -> str:
+    """Return a text with U+FFFD for each character that does not print: no terminal should get it."""
+    return "".join(character if character.isprintable() else "\ufffd" for character in text)
 
 
 def listed(names: list[str], most: int = MOST_NAMES) -> str:

@@ -11,7 +11,7 @@ from photogram.messages import Message
 __all__ = ["Place"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Place:
     """Where something was read: file, record number (from 1) and record, as far as they are known."""
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from photogram import geometry
 from photogram.adjustment import Ordering, Progress, adjust
-from photogram.block import Block
+from photogram.block import Block, checked
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.result import Result
@@ -61,7 +61,7 @@ def predict(
     AdjustmentError
         There is nothing to adjust, or rays are so nearly parallel that their points cannot be found.
     """
-    _check_positions(block)
+    _check_positions(checked(block))
     images = block.image_photos, block.image_points
     computed = geometry.project(
         block.point_positions[images[1]],
@@ -74,7 +74,7 @@ def predict(
         linear_unit=block.linear_unit,
     )
     result = adjust(
-        block.replace(image_xy=computed),
+        block.replace(image_xy=computed, photo_positions_observed=None, photo_attitudes_observed=None),
         unit_variance="unity",
         ordering=ordering,
         threads=threads,
@@ -102,6 +102,8 @@ def at_adjusted(result: Result) -> Block:
     return block.replace(
         photo_positions=result.photo_positions,
         photo_attitudes=result.photo_attitudes,
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
         point_positions=np.where(
             result.used_points[:, np.newaxis], result.point_positions, block.point_positions
         ),

@@ -14,6 +14,8 @@ from photogram.places import Place
 __all__ = ["Record", "Source"]
 
 WIDTH = 80
+WIDE = 0.25
+"""Zero bytes that no text of one byte a character has, as a part of all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +43,14 @@ class Source:
         Raises
         ------
         InputError
-            The file cannot be read, or a record holds a tab or another control character, which would move
-            its columns.
+            The file cannot be read or is UTF-16 or UTF-32, or a record holds a tab or another control
+            character, which would move its columns.
         """
-        source = cls(path, [line[:WIDTH] for line in read_lines(path)])
+        lines = read_lines(path)
+        if sum(line.count("\0") for line in lines) > WIDE * sum(map(len, lines)):
+            error = "text of two or four bytes a character (UTF-16, UTF-32): save it as UTF-8"
+            raise InputError(error, file=path)
+        source = cls(path, [line[:WIDTH] for line in lines])
         for number, line in enumerate(source.lines, 1):
             if not line.isprintable():
                 what = next(character for character in line if not character.isprintable())

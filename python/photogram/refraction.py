@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
+from photogram.arguments import check_arguments
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
@@ -96,3 +97,6 @@ def metres_per_unit(linear_unit: str) -> float:
         units = " or ".join(METRES_PER_UNIT)
         raise InputError(f"refraction needs a linear unit of known length, {units}, not {linear_unit!r}")
     return METRES_PER_UNIT[linear_unit]
+
+
+check_arguments(globals(), ["Refraction", "metres_per_unit"])

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.errors import InputError
 
-__all__ = ["TESTABLE", "largest_effect", "minimal_detectable_error", "noncentrality"]
+__all__ = ["ROUNDING", "TESTABLE", "largest_effect", "minimal_detectable_error", "noncentrality"]
 
 Floats = NDArray[np.float64]
 
@@ -33,8 +33,7 @@ TESTABLE = 0.01
 """With less redundancy a gross error hides in the unknowns, and the test value repeats that of another
 observation."""
 
-
-_ROUNDING = 1e-10
+ROUNDING = 1e-10
 """Redundancy numbers below this are rounding errors of zero."""
 
 
@@ -106,7 +105,7 @@ def largest_effect(redundancy: ArrayLike, delta0: float | None = None) -> Floats
 
 
 def _without_rounding(redundancy: Floats) -> Floats:
-    return np.where(redundancy < _ROUNDING, 0.0, np.minimum(redundancy, 1.0))
+    return np.where(redundancy < ROUNDING, 0.0, np.minimum(redundancy, 1.0))
 
 
 def _shift(delta0: float | None) -> float:

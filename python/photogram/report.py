@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.angles import ARCSEC, degrees_minutes_seconds
+from photogram.outliers import Observations, outliers
 from photogram.reliability import TESTABLE
 from photogram.sections import Section, composed, headline, problems
+from photogram.statistics import normal_limit
 from photogram.structuring import structure
 
 if TYPE_CHECKING:
     from photogram.adjusted import AdjustedBlock, Floats
 
-__all__ = ["bandwidths", "report", "summary"]
+__all__ = ["bandwidths", "problems_of", "report", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
@@ -29,16 +31,24 @@ _ORDERINGS = {
 }
 
 
+@np.errstate(over="ignore")  # what is too large for its unit is infinite
 def report(result: AdjustedBlock) -> str:
     """Return the report of an adjusted block."""
     sections = [
         *summary(result),
         ("Iterations", _iterations(result)),
         ("Check points: adjusted minus supplied", _difference_table(result, _check_differences(result))),
-        ("Control points: adjusted minus supplied", _difference_table(result, _held_differences(result))),
+        (
+            "Control as observations: observed minus adjusted, redundancy, standardized residual",
+            _control(result),
+        ),
         (
             "Components of control that are not held: adjusted minus supplied",
             _difference_table(result, _unheld_differences(result)),
+        ),
+        (
+            "Stations as observations: observed minus adjusted, redundancy, standardized residual",
+            _stations(result),
         ),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
@@ -47,13 +57,49 @@ def report(result: AdjustedBlock) -> str:
     return composed(headline("block adjustment", result.block.title), sections)
 
 
+@np.errstate(over="ignore")
 def summary(result: AdjustedBlock) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
     return [
-        ("Problems", problems(result.messages, result.status, result.variance_of_unit_weight)),
+        ("Problems", problems_of(result)),
         ("Adjustment", _adjustment(result)),
         ("Residuals", _residuals(result)),
         (f"Image coordinates with |standardized residual| > {_BLUNDER:g}, largest first", _suspects(result)),
+    ]
+
+
+def problems_of(result: AdjustedBlock) -> list[str]:
+    """Return what keeps a reader from using the values: a failed test and outliers before other remarks."""
+    found = outliers(_tested(result), normal_limit, "standardized residuals")
+    messages = [*found, *result.messages]
+    return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
+
+
+def _tested(result: AdjustedBlock) -> list[Observations]:
+    """Return all observations with their standardized residuals, where these say something."""
+    block = result.block
+    axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
+    unknowns = (*axes, "omega", "phi", "kappa")
+
+    def image(index: tuple[int, ...]) -> str:
+        point, photo = block.image_points[index[0]], block.image_photos[index[0]]
+        return f"{'xy'[index[1]]} of point {block.point_ids[point]} on photo {block.photo_ids[photo]}"
+
+    def testable(standardized: Floats, redundancy: Floats) -> Floats:
+        return np.where(redundancy > TESTABLE, standardized, np.nan)
+
+    return [
+        Observations("image coordinates", testable(result.standardized, result.redundancy), image),
+        Observations(
+            "components of control",
+            testable(result.point_standardized, result.point_redundancy),
+            lambda index: f"{axes[index[1]]} of control point {block.point_ids[index[0]]}",
+        ),
+        Observations(
+            "components of stations",
+            testable(result.photo_standardized, result.photo_redundancy),
+            lambda index: f"{unknowns[index[1]]} of photo {block.photo_ids[index[0]]}",
+        ),
     ]
 
 
@@ -179,6 +225,77 @@ def _difference_table(result: AdjustedBlock, differences: Floats) -> list[str]:
     return lines
 
 
+def _control(result: AdjustedBlock) -> list[str]:
+    rows = np.flatnonzero(result.used_points & np.isfinite(result.block.point_sd).any(axis=1))
+    units, outward = _difference_units(result), _outward(result)
+    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+    return _observed_table(
+        "point",
+        [result.block.point_ids[row] for row in rows],
+        [f"{axis} {unit}" for axis, unit in zip(axes, units, strict=True)],
+        result.block.point_sd[rows] * outward,
+        result.point_residuals[rows] * outward,
+        result.point_redundancy[rows],
+        result.point_standardized[rows],
+    )
+
+
+def _stations(result: AdjustedBlock) -> list[str]:
+    given_sd = result.photo_given_sd
+    rows = np.flatnonzero(np.isfinite(given_sd).any(axis=1))
+    units, outward = _difference_units(result), np.append(_outward(result), [1.0 / ARCSEC] * 3)
+    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+    names = [f"{axis} {unit}" for axis, unit in zip(axes, units, strict=True)]
+    return _observed_table(
+        "photo",
+        [result.block.photo_ids[row] for row in rows],
+        [*names, "omega arcsec", "phi arcsec", "kappa arcsec"],
+        given_sd[rows] * outward,
+        result.photo_residuals[rows] * outward,
+        result.photo_redundancy[rows],
+        result.photo_standardized[rows],
+    )
+
+
+def _observed_table(
+    kind: str,
+    names: list[str],
+    columns: list[str],
+    sd: Floats,
+    residuals: Floats,
+    redundancy: Floats,
+    standardized: Floats,
+) -> list[str]:
+    """Four lines for each of some observed positions: what was observed, and how it fits."""
+    if not names:
+        return []
+    lines = [f"{kind:<10}{'':<14}" + "".join(f"{column:>18}" for column in columns)]
+    held = np.isfinite(sd)
+    weighted = held & (sd > 0)
+    for row, name in enumerate(names):
+        deviations = [
+            "free" if math.isinf(each) else "fixed" if each == 0 else f"{each:.5f}" for each in sd[row]
+        ]
+        parts = (
+            ("sd", deviations),
+            ("residual", _cells(residuals[row], held[row], 5)),
+            ("redundancy", _cells(redundancy[row], weighted[row], 3)),
+            ("standardized", _cells(standardized[row], weighted[row], 2)),
+        )
+        lines += [
+            f"{name if part == 'sd' else '':<10}{part:<14}" + "".join(f"{cell:>18}" for cell in cells)
+            for part, cells in parts
+        ]
+    return lines
+
+
+def _cells(values: Floats, there: np.ndarray, decimals: int) -> list[str]:
+    return [
+        f"{value:.{decimals}f}" if use and math.isfinite(value) else "-"
+        for value, use in zip(values, there, strict=True)
+    ]
+
+
 def _photos(result: AdjustedBlock) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [
@@ -226,7 +343,6 @@ def _work(result: AdjustedBlock) -> list[str]:
     ]
     lines += bandwidths(result)
     lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
-    lines += [f"{f'seconds in {name}':<36}{seconds:.3f} s" for name, seconds in result.seconds.items()]
     return lines
 
 

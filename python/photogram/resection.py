@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.adjusted import Iteration
-from photogram.arrays import shaped
+from photogram.arrays import length, names, number, numbers, shaped, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.geometry import Spheroid
 from photogram.messages import Message
@@ -220,11 +220,15 @@ def resect(
     >>> photo.position.round(3).tolist(), photo.attitude.round(6).tolist()
     ([390.0, 430.0, 1500.0], [0.02, -0.03, 1.5])
     """
+    if spheroid is not None and not isinstance(spheroid, Spheroid):
+        raise InputError(f"spheroid is a Spheroid or None, not {shown(spheroid)}")
+    truth_value("photo_to_ground", photo_to_ground)
     given = Observed.checked(object_points, object_sd, image_xy, image_sd, principal_distance, point_ids)
     known = np.concatenate(
         [_known("position", position, position_sd), _known("attitude", attitude, attitude_sd)]
     )
-    if max_iterations < 1 or not tolerance > 0:
+    limit = number("tolerance", tolerance)
+    if whole_number("max_iterations", max_iterations) < 1 or not 0 < limit < math.inf:
         raise InputError("there must be one iteration at least, and a positive criterion of convergence")
     solution = solve(
         given,
@@ -234,7 +238,7 @@ def resect(
         ),
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
-        limit=tolerance,
+        limit=limit,
         max_iterations=max_iterations,
     )
     return Resection(
@@ -278,7 +282,7 @@ class Observed:
         xy: ArrayLike,
         xy_sd: ArrayLike,
         principal_distance: float,
-        names: Sequence[str] | None,
+        point_ids: Sequence[str] | None,
     ) -> Self:
         """Check what a caller gave.
 
@@ -287,8 +291,8 @@ class Observed:
         InputError
             Another shape, a value that is not finite, or a standard deviation that is none.
         """
-        count = len(np.atleast_1d(np.asarray(xy, dtype=object)))
-        ids = [str(name) for name in names] if names is not None else [str(i + 1) for i in range(count)]
+        count = length("image_xy", xy)
+        ids = [str(i + 1) for i in range(count)] if point_ids is None else names("point_ids", point_ids)
         if len(ids) != count:
             raise InputError(f"point_ids has {len(ids)} names, but image_xy has {count} rows")
         made = cls(
@@ -296,7 +300,7 @@ class Observed:
             point_sd=_deviations("object_sd", point_sd, (count, 3)),
             xy=shaped("image_xy", xy, (count, 2)),
             xy_sd=_deviations("image_sd", xy_sd, (count, 2)),
-            principal_distance=float(principal_distance),
+            principal_distance=number("principal_distance", principal_distance),
             names=ids,
         )
         checks = [
@@ -368,7 +372,7 @@ def solve(
 
 def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Return standard deviations; a row of three stands for every point."""
-    array = np.asarray(value)
+    array = numbers(name, value)
     if len(shape) == 2 and array.shape == shape[1:]:
         array = np.broadcast_to(array, shape)
     deviations = shaped(name, array, shape)
@@ -380,7 +384,7 @@ def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
 def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
     """Return known values, NaN where nothing is known."""
     if value is None:
-        if np.isfinite(np.asarray(sd, dtype=np.float64)).any():
+        if np.isfinite(numbers(f"{name}_sd", sd)).any():
             raise InputError(f"{name}_sd is finite, but {name} is not given")
         return np.full(3, np.nan)
     values = shaped(name, value, (3,))

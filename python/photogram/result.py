@@ -41,6 +41,18 @@ class Result(AdjustedBlock):
 
         return tables.check_table(self)
 
+    def control_table(self) -> pd.DataFrame:
+        """Return control as a data frame: residuals of held components, redundancy numbers, test values."""
+        from photogram import tables  # pandas takes long to import
+
+        return tables.control_table(self)
+
+    def station_table(self) -> pd.DataFrame:
+        """Return weighted and fixed stations as a data frame: residuals, redundancy numbers, test values."""
+        from photogram import tables  # pandas takes long to import
+
+        return tables.station_table(self)
+
     def report(self) -> str:
         """Return the adjustment report as text."""
         return report(self)

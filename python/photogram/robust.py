@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arrays import number, one_of
 from photogram.errors import InputError
 from photogram.messages import Message
 
@@ -34,12 +35,11 @@ def loss_row(loss: Loss | None, scale: float | None) -> tuple[str, float] | None
         if scale is not None:
             raise InputError("scale is that of a loss: give loss too")
         return None
-    if loss not in get_args(Loss):
-        raise InputError(f"loss is one of {', '.join(get_args(Loss))}, not {loss!r}")
-    chosen = SCALES[loss] if scale is None else scale
+    one_of("loss", loss, get_args(Loss))
+    chosen = SCALES[loss] if scale is None else number("scale", scale)
     if not 0 < chosen < np.inf:
         raise InputError(f"scale must be positive and finite, not {chosen:g}")
-    return (loss, float(chosen))
+    return (loss, chosen)
 
 
 def remark(row: tuple[str, float] | None, weights: NDArray[np.float64]) -> list[Message]:

@@ -9,6 +9,7 @@ that the points a photograph may see are known beforehand.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import geometry
+from photogram.arrays import number, one_of, shaped, shown, truth_value, whole_number
 from photogram.block import Block
 from photogram.errors import InputError
 from photogram.geometry import Spheroid
+from photogram.memory import available_memory
 from photogram.refraction import Refraction
 
 __all__ = ["Blunders", "Simulation", "simulate"]
@@ -26,8 +29,15 @@ __all__ = ["Blunders", "Simulation", "simulate"]
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_MOST_PHOTOS = 1_000_000
-_MOST_CANDIDATES = 5e6  # pairs of photographs and points that may be seen: some ten seconds
+_HUGE = 1e12
+_TINY = 1e-3
+"""What no length of a block exceeds, and what none falls below."""
+_NARROWEST, _WIDEST = 1e-6, 1.4
+"""Radians from the vertical: what photos show beyond it is too far away to simulate."""
+_FAR_MORE = 10.0
+"""Times as many points as were asked for are too many."""
+_CANDIDATE_BYTES = 300
+"""Memory for a photo and a point that may see each other, at the peak."""
 _JITTER = 0.15  # of a grid cell, either way: small enough to keep the middle of an overlap in the overlap
 
 
@@ -54,8 +64,9 @@ class Simulation:
     Attributes
     ----------
     block
-        What would have been measured: noisy image coordinates and control, coarse initial values of the
-        photos. Check points have their true positions, unheld; pass points have none.
+        What would have been measured: noisy image coordinates, control and, where they are weighted,
+        positions and attitudes of the photos; besides their coarse initial values. Check points have their
+        true positions, unheld; pass points have none.
     truth
         The same block with true positions and attitudes everywhere and image coordinates free of errors.
     blunders
@@ -156,8 +167,8 @@ def simulate(
     position_error, attitude_error
         Standard deviation of the errors in the initial values of the photos, metres and radians.
     position_sd, attitude_sd
-        Standard deviations that the block states for the initial values as observations, metres and radians;
-        infinite: free.
+        Standard deviations of observed positions and attitudes (GNSS, inertial), metres and radians: of their
+        noise and in the block. Infinite: none are observed; 0: they are fixed at the truth.
     blunders, blunder_size
         How many image points get a gross error, and its size in millimetres, in x or y, of either sign.
     spheroid
@@ -186,39 +197,45 @@ def simulate(
     InputError
         Arguments outside their ranges.
     """
+    _check_types(locals())
+    truth_value("photo_to_ground", photo_to_ground)
+    one_of("control", control, ("perimeter", "corners", "none"))
+    centre = shaped("origin", origin, (3,))
     footprint = frame_size / abs(principal_distance or math.nan) * flying_height
     _check(
         {
             "strips": (strips >= 1, "at least 1"),
             "photos_per_strip": (photos_per_strip >= 2, "at least 2"),
-            "strips x photos_per_strip": (strips * photos_per_strip <= _MOST_PHOTOS, f"{_MOST_PHOTOS} at most"),
             "forward_overlap": (0.5 < forward_overlap < 1, "between 0.5 and 1"),
             "side_overlap": (0 < side_overlap < 1, "between 0 and 1"),
             "principal_distance": (math.isfinite(footprint), "finite and not 0"),
             "frame_size": (frame_size > 0, "positive"),
-            "flying_height": (flying_height > 0, "positive"),
+            "flying_height": (flying_height > _TINY, f"above {_TINY:g}"),
             "relief": (0 <= relief < flying_height, "between 0 and the flying height"),
             "points_per_photo": (4 <= points_per_photo < math.inf, "at least 4"),
             "crab": (0 <= crab < math.pi / 4, "between 0 and pi/4"),
             "tilt": (0 <= tilt < 0.1, "between 0 and 0.1"),
-            "control": (control in ("perimeter", "corners", "none"), "perimeter, corners or none"),
             "control_spacing": (control_spacing >= 1, "at least 1"),
             "control_sd": (0 <= control_sd < math.inf, "finite and not negative"),
             "check_points": (check_points >= 0, "not negative"),
             "image_sd": (0 < image_sd < math.inf, "finite and positive"),
             "position_error": (0 <= position_error < math.inf, "finite and not negative"),
             "attitude_error": (0 <= attitude_error < math.inf, "finite and not negative"),
+            "position_sd": (position_sd >= 0, "not negative"),
+            "attitude_sd": (attitude_sd >= 0, "not negative"),
+            "origin": (bool((np.abs(centre) < _HUGE).all()), f"below {_HUGE:g}"),
             "blunders": (blunders >= 0, "not negative"),
             "blunder_size": (0 <= blunder_size < math.inf, "finite and not negative"),
         }
     )
-    streams = np.random.default_rng(seed).spawn(6)
-    terrain_random, flight_random, initial_random, image_random, control_random, blunder_random = streams
+    streams = _generator(seed).spawn(7)
+    terrain_random, flight_random, initial_random, image_random, control_random, blunder_random = streams[:6]
 
     half_angle = math.atan(frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab)))
+    if not _NARROWEST < half_angle < _WIDEST - 2 * tilt:
+        raise InputError("principal_distance and frame_size: the photos see too little, or to the horizon")
     reach = 1.02 * (flying_height + relief) * math.tan(half_angle + 2 * tilt)
     plan = _plan(strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach)
-    _check_size(plan)
     terrain = _terrain(plan, relief, footprint, terrain_random)
     photos, rotations = _flight(plan, flying_height, crab, tilt, flight_random)
     positions, attitudes = _into_object_space(photos, rotations, origin, spheroid, photo_to_ground)
@@ -235,6 +252,8 @@ def simulate(
         photo_to_ground,
         refraction,
     )
+    if not len(image_points):
+        raise InputError("no point is seen on two photos")
     used, image_points = np.unique(image_points, return_inverse=True)
     ground, terrain = ground[used], terrain[used]
 
@@ -270,31 +289,52 @@ def simulate(
     faults = _blunders(len(xy), blunders, blunder_size, blunder_random)
     measured = xy + image_sd * image_random.standard_normal(xy.shape)
     measured[faults.images] += faults.amounts
+    position_draw, attitude_draw = (initial_random.standard_normal(positions.shape) for _ in range(2))
     block = truth.replace(
-        photo_positions=positions + position_error / metres * initial_random.standard_normal(positions.shape),
-        photo_attitudes=attitudes + attitude_error * initial_random.standard_normal(attitudes.shape),
+        photo_positions=positions + (position_error if position_sd else 0.0) / metres * position_draw,
+        photo_attitudes=attitudes + (attitude_error if attitude_sd else 0.0) * attitude_draw,
+        photo_positions_observed=_observed(positions, truth.photo_position_sd, streams[6]),
+        photo_attitudes_observed=_observed(attitudes, truth.photo_attitude_sd, streams[6]),
         point_positions=np.where(known, ground + np.where(held, control_noise, 0.0), np.nan),
         image_xy=measured,
     )
     return Simulation(block, truth, faults)
 
 
+def _observed(truth: Floats, sd: Floats, random: np.random.Generator) -> Floats | None:
+    """Draw observations of the truth; None where nothing is observed."""
+    draw = random.standard_normal(truth.shape)
+    return truth + sd * draw if np.isfinite(sd).all() else None
+
+
+_WHOLE_NUMBERS = ("strips", "photos_per_strip", "control_spacing", "check_points", "blunders")
+_CLASSES = {"spheroid": Spheroid, "refraction": Refraction}
+_OTHERS = ("control", "origin", "photo_to_ground", "seed")
+
+
+def _check_types(arguments: Mapping[str, object]) -> None:
+    """Refuse arguments of another type: all are numbers but for a few."""
+    for name, value in arguments.items():
+        if name in _WHOLE_NUMBERS:
+            whole_number(name, value)
+        elif name in _CLASSES:
+            if value is not None and not isinstance(value, _CLASSES[name]):
+                raise InputError(f"{name} is a {_CLASSES[name].__name__} or None, not {shown(value)}")
+        elif name not in _OTHERS and _HUGE < abs(number(name, value)) < math.inf:
+            raise InputError(f"{name} must be below {_HUGE:g}")
+
+
+def _generator(seed: int | np.random.Generator) -> np.random.Generator:
+    try:
+        return np.random.default_rng(seed)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"seed: {error}") from None
+
+
 def _check(ranges: dict[str, tuple[bool, str]]) -> None:
     for name, (fine, expected) in ranges.items():
         if not fine:
             raise InputError(f"{name} must be {expected}")
-
-
-def _check_size(plan: _Plan) -> None:
-    """Refuse what could not be computed in reasonable time: so many grid points in the reach of so many photos."""
-    columns, rows = (2 * plan.reach / side for side in plan.cell)
-    photos = plan.strips * plan.photos_per_strip
-    if not photos * columns * rows <= _MOST_CANDIDATES:
-        raise InputError(
-            f"{photos} photos with {columns * rows:.3g} grid points in the reach of each are more than can be"
-            f" simulated ({_MOST_CANDIDATES:.0e} together): photographs so near each other, so many of them, or"
-            " so many points"
-        )
 
 
 def _plan(
@@ -313,17 +353,32 @@ def _plan(
     density = points_per_photo * photos / (photos * footprint**2 - lost)
     columns = max(1, round(base * math.sqrt(density)))
     rows = max(1, round(density * base * separation / columns))
-    return _Plan(strips, photos_per_strip, base, separation, columns, rows, reach)
+    plan = _Plan(strips, photos_per_strip, base, separation, columns, rows, reach)
+    _check_size(plan, footprint, points_per_photo)
+    return plan
+
+
+def _check_size(plan: _Plan, footprint: float, points_per_photo: float) -> None:
+    """Refuse a plan with far more image points than were asked for, or than there is memory for."""
+    dx, dy = plan.cell
+    fewest = footprint**2 / (dx * dy)
+    if fewest > _FAR_MORE * points_per_photo:
+        raise InputError(
+            "forward_overlap and side_overlap: with a column of points under every photo and a row in every"
+            f" side overlap a photo shows about {fewest:.0f} points, not {points_per_photo:g}"
+        )
+    photos, (columns, rows) = plan.strips * plan.photos_per_strip, _window(plan)
+    needed, available = _CANDIDATE_BYTES * photos * len(columns) * len(rows), available_memory()
+    if available is not None and needed > available:
+        gib = [f"{size / 2**30:.1f} GiB" for size in (needed, available)]
+        raise InputError(f"the simulation takes {gib[0]} of memory, and {gib[1]} are free")
 
 
 def _covered_once(count: int, step: float, length: float) -> float:
-    """How much of a line only one of `count` intervals covers, their starts a step apart."""
-    starts = step * np.arange(count)
-    edges = np.sort(np.concatenate([starts, starts + length]))
-    middles = (edges[1:] + edges[:-1]) / 2
-    begun, ended = (np.searchsorted(at, middles, side="right") for at in (starts, starts + length))
-    covers = begun - ended
-    return float(np.diff(edges)[covers == 1].sum())
+    """How much of a line only one of `count` overlapping intervals covers, their starts a step apart."""
+    if count == 1:
+        return length
+    return 2 * step + (count - 2) * max(0.0, 2 * step - length)
 
 
 def _window(plan: _Plan) -> tuple[Indices, Indices]:

@@ -17,7 +17,7 @@ from photogram.block import ATTITUDE_COLUMNS, position_columns
 if TYPE_CHECKING:
     from photogram.adjusted import AdjustedBlock, Floats
 
-__all__ = ["check_table", "image_table", "photo_table", "point_table"]
+__all__ = ["check_table", "control_table", "image_table", "photo_table", "point_table", "station_table"]
 
 
 def photo_table(result: AdjustedBlock) -> pd.DataFrame:
@@ -75,9 +75,53 @@ def check_table(result: AdjustedBlock) -> pd.DataFrame:
     )
 
 
+def control_table(result: AdjustedBlock) -> pd.DataFrame:
+    """Return control as observations: `residual_`, `sd_`, `redundancy_`, `standardized_` of each component.
+
+    Residuals are observed minus adjusted. Where `sd_` is 0 a component is fixed, where it is infinite it is
+    not held.
+    """
+    held = result.used_points & np.isfinite(result.block.point_sd).any(axis=1)
+    names = position_columns(result.block)
+    return pd.DataFrame(
+        {
+            "point": np.array(result.block.point_ids, dtype=object)[held],
+            **_columns(names, result.point_residuals[held], "residual_"),
+            **_columns(names, result.block.point_sd[held], "sd_"),
+            **_numbers(names, result.point_redundancy[held], "redundancy_"),
+            **_numbers(names, result.point_standardized[held], "standardized_"),
+        }
+    )
+
+
+def station_table(result: AdjustedBlock) -> pd.DataFrame:
+    """Return photos as observations of their own positions and attitudes, columns as in `control_table`.
+
+    Those with a component that is weighted or fixed (`sd_` 0); free ones have an infinite `sd_`.
+    """
+    given_sd = result.photo_given_sd
+    known = np.isfinite(given_sd).any(axis=1)
+    names = [*position_columns(result.block), *ATTITUDE_COLUMNS]
+    return pd.DataFrame(
+        {
+            "photo": np.array(result.block.photo_ids, dtype=object)[known],
+            **_columns(names, result.photo_residuals[known], "residual_"),
+            **_columns(names, given_sd[known], "sd_"),
+            **_numbers(names, result.photo_redundancy[known], "redundancy_"),
+            **_numbers(names, result.photo_standardized[known], "standardized_"),
+        }
+    )
+
+
+def _numbers(names: tuple[str, ...] | list[str], values: Floats, prefix: str) -> dict[str, Any]:
+    """Name the columns of an array of plain numbers."""
+    return _columns([name.removesuffix("_deg") for name in names], values, prefix)
+
+
 def _columns(names: tuple[str, ...] | list[str], values: Floats, prefix: str = "") -> dict[str, Any]:
     """Name the columns of an array, in degrees where the name says so."""
-    return {
-        prefix + name: np.degrees(column) if name.endswith("_deg") else column
-        for name, column in zip(names, values.T, strict=True)
-    }
+    with np.errstate(over="ignore"):  # infinite then
+        return {
+            prefix + name: np.degrees(column) if name.endswith("_deg") else column
+            for name, column in zip(names, values.T, strict=True)
+        }

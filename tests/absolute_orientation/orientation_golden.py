@@ -11,21 +11,17 @@ import pytest
 
 from photogram.absolute_orientation import Stations
 
-DATA = Path(__file__).parents[3] / "shared" / "data" / "absolute_orientation"
+DATA = Path(__file__).parents[1] / "data" / "absolute_orientation"
 
 
 def load(name: str) -> Any:
-    """Read a file of the golden data; None where they are absent."""
-    path = DATA / name
-    return json.loads(path.read_text()) if path.is_file() else None
+    """Read a file of the golden data."""
+    return json.loads((DATA / name).read_text())
 
 
 def cases(*names: str) -> list[Any]:
-    """Return the cases, or those of some names, as parameters; one that is skipped where they are absent."""
-    document = load("cases.json")
-    if document is None:
-        return [pytest.param(None, marks=pytest.mark.skip(reason=f"{DATA} is not there"))]
-    chosen = [case for case in document["cases"] if not names or case["id"] in names]
+    """Return the cases, or those of some names, as parameters."""
+    chosen = [case for case in load("cases.json")["cases"] if not names or case["id"] in names]
     return [pytest.param(case, id=case["id"]) for case in chosen]
 
 

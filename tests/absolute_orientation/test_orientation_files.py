@@ -52,7 +52,7 @@ def test_zeros_are_values_unless_told(case, tmp_path):
         )
     else:
         assert read_cards(path).stations.given.all()
-        with pytest.raises(InputError, match="come as a pair"):
+        with pytest.raises(InputError, match="record 2: N is"):
             read_cards(path, zero_missing=True)
 
 
@@ -73,20 +73,21 @@ def test_csv_columns(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "holds no stations"),
+        ("", "holds no table"),
         (HEADER, "holds no stations"),
-        ("id,X,Y,x,y,z\n", "record 1: the header lacks the column 'Z'"),
+        ("id,X,Y,x,y,z\n", "record 1: the column Z is missing"),
         ("id,X,Y,Z,x,y,z,w\n", "record 1: the header does not know the column 'w'"),
-        ("id,X,Y,Z,x,y,z,x\n", "record 1: the header repeats the column 'x'"),
+        ("id,X,Y,Z,x,y,z,x\n", "record 1: the column 'x' is there twice"),
         ("id,X,Y,Z,x,y,z,sd_x\nA,1,2,3,4,5,6,7\n", "sd_x, sd_y and sd_z come together"),
-        (HEADER + "A,1,2,3,4,5\n", "record 2: has 6 fields, but the header has 7"),
-        (HEADER + "A,1,2,3,4,5,six\n", "record 2: column z: 'six' is not a number"),
-        (HEADER + "A,1,2,3,4,5,\n", "record 2: column z: is empty"),
-        (HEADER + "A,1,2,nan,4,5,6\n", "record 2: column Z: 'nan' is not a number"),
-        (HEADER + "A,1,2,inf,4,5,6\n", "record 2: column Z: 'inf' is not a number"),
+        (HEADER + "A,1,2,3,4,5\n", "record 2: there are 6 cells under 7 columns"),
+        (HEADER + "A,1,2,3,4,5,six\n", "record 2: z 'six' is not a number"),
+        (HEADER + "A,1,2,3,4,5,\n", "record 2: z is blank"),
+        (HEADER + "A,1,2,nan,4,5,6\n", "record 2: Z 'nan' is not a number"),
+        (HEADER + "A,1,2,inf,4,5,6\n", "record 2: Z 'inf' is not a number"),
         (HEADER + "A,1,2,3,4,5,6\n\nA,1,2,3,4,5,6\n", "record 4: station A occurs in record 2 already"),
         (HEADER + ",1,2,3,4,5,6\n", "record 2: the id is empty"),
-        (HEADER + "A,1,,3,4,5,6\n", "station A has one horizontal coordinate; they come as a pair"),
+        (HEADER + "9" * 140_000 + ",1,2,3,4,5,6\n", "record 2: a record of 140012 characters"),
+        (HEADER[:-1] + "," * 420_000 + "\n1,2,3,4,5,6,7\n", "record 1: a record of 420014 characters"),
     ],
 )
 def test_faults_of_a_csv_file(text, message, tmp_path):
@@ -112,7 +113,10 @@ def test_faults_of_a_csv_file(text, message, tmp_path):
         ("0 0 0 0 0 0 0 9", "0 0 2 1 0 0 0 9", "record 1: a sine is beyond 1"),
         ("0 0 0 0 0 0 0 9", "0 0 0.1 0 1 0 0 9", "record 1: s is not positive"),
         ("0 0 0 0 0 0 0 9", "0 0 0", "record 1: parameters"),
-        ("500 500 -", "500 - -", "come as a pair"),
+        ("500 500 -", "500 - -", "N is 3 and MN 2, but 3 elevations and 1 horizontal pairs"),
+        ("5 3 2 9", "² 3 2 9", "record 2: M: '²' is not a count"),
+        ("5 3 2 9", "9" * 5000 + " 3 2 9", "record 2: M: '999"),
+        ("500 500 -", "9" * 5000 + " 500 -", "record 3: X1: '999"),
     ],
 )
 def test_faults_of_cards(old, new, message, tmp_path):
@@ -185,10 +189,16 @@ def full(count=6):
         ({"ids": ["1", "1", "2", "3", "4", "5"]}, "station 1 occurs more than once"),
         ({"model": np.zeros((5, 3))}, "model has the shape (5, 3), not (6, 3)"),
         ({"model_sd": np.zeros(2)}, "does not broadcast"),
-        ({"model_sd": 0.0}, "standard deviation of the model that is not positive"),
+        ({"model_sd": 0.0}, "a coordinate whose standard deviation is zero in both systems"),
         ({"control_sd": -1.0, "model_sd": 1.0}, "standard deviation of control"),
         ({"control_sd": 0.1}, "the control has standard deviations but the model has none"),
-        ({"control_sd": (0, np.inf, 0), "model_sd": 1.0}, "one held horizontal coordinate"),
+        ({"model_sd": -1.0}, "standard deviation of the model that is not finite, zero or positive"),
+        ({"model": "text"}, "model is not an array of numbers"),
+        ({"control": None}, "control is not an array"),
+        ({"ids": 6}, "ids is not a list of names"),
+        ({"ids": ["\ud800", *"bcdef"]}, "characters that do not print"),
+        ({"model": np.ma.masked_less(np.arange(18.0).reshape(6, 3), 2)}, "model has masked values"),
+        ({"model": 10**400}, "model"),
         ({"control": np.inf}, "control coordinate that is not a finite number"),
         ({"model": np.nan}, "model coordinate that is not a finite number"),
     ],
@@ -208,6 +218,13 @@ def test_arrays_that_cannot_be(change, message):
         ({"start": "best"}, "start is one of"),
         ({"reject": ["nobody"]}, "station nobody cannot be rejected"),
         ({"max_iterations": 0}, "one iteration"),
+        ({"max_iterations": 2**64}, "max_iterations is not a whole number"),
+        ({"max_iterations": None}, "max_iterations is not a whole number"),
+        ({"reject": 5}, "reject is not a list of names"),
+        ({"former": "first.json"}, "a former result is"),
+        ({"tolerance": np.nan}, "criterion"),
+        ({"tolerance": "1"}, "tolerance is not a number"),
+        ({"trace": True}, "cycles to trace"),
         ({"tolerance": 0.0}, "criterion"),
         ({"unit_variance": "unity"}, "needs standard deviations"),
     ],
@@ -215,6 +232,18 @@ def test_arrays_that_cannot_be(change, message):
 def test_options_that_cannot_be(options, message):
     with pytest.raises(InputError, match=message):
         orient(full(), **options)
+
+
+def test_later_edits_change_no_result():
+    control, model = np.array(full().control), np.array(full().model)
+    given = Stations(range(6), control, model)
+    result = orient(given)
+    before = result.report()
+    control[0] += 100
+    model[0] += 100
+    assert result.report() == before
+    with pytest.raises(ValueError, match="read-only"):
+        given.control[0] = 0
 
 
 def test_the_methods_of_the_report_take_no_weights():
@@ -229,7 +258,9 @@ def test_the_methods_of_the_report_take_no_weights():
 
 def test_too_few_components_after_a_rejection():
     given = full(3)
-    with pytest.raises(RankError, match=r"insufficient control: 3 known coordinates \(7 needed\), 1 horiz"):
+    with pytest.raises(
+        RankError, match=r"insufficient control: 3 known coordinates \(7 needed\), 2 of them h"
+    ):
         orient(given, reject=["0", "1"])
 
 

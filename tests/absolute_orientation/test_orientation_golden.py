@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from orientation_golden import DATA, array, cases, load, stations
+from orientation_golden import array, cases, load, stations
 
 from photogram import _photocore, orient
 from photogram.absolute_orientation import Similarity
 from photogram.errors import RankError
-
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"{DATA} is not there")
 
 
 def check_parameters(similarity, expected):
@@ -100,7 +98,6 @@ def test_filling_in_ends_beside_the_minimum_with_partial_control_only(case):
         assert difference > 1e-7
 
 
-@needs_data
 def test_a_restart_after_a_rejection():
     document = load("cases.json")
     rerun = document["reruns"][0]
@@ -123,7 +120,6 @@ def test_a_restart_after_a_rejection():
     assert abs(len(cycles) - rerun["reference_iteration"]["cycles_from_restart"]) <= 1
 
 
-@needs_data
 def test_degenerate_control_is_refused_by_name():
     messages = {}
     for case in load("degenerate_cases.json"):
@@ -132,11 +128,10 @@ def test_degenerate_control_is_refused_by_name():
                 orient(stations(case["stations"]), method=method)
             messages[case["id"]] = str(caught.value)
             assert caught.value.points == [str(row["id"]) for row in case["stations"]]
-    assert "5 known coordinates (7 needed), 1 horizontal pairs" in messages["one_horizontal"]
+    assert "5 known coordinates (7 needed), 2 of them horizontal" in messages["one_horizontal"]
     assert "in a straight line" in messages["collinear_vertical"]
 
 
-@needs_data
 def test_gauss_crout():
     golden = load("gauss_crout.json")
     rows = array(golden["P"])

@@ -125,6 +125,12 @@ def test_the_document_gets_the_points_too(oriented, small_chunks, tmp_path):
             "record 2: column sd_z: '-1' is not a finite number, zero",
         ),
         ("1 2 3 A\n4 5 B\n", "record 2: has 3 fields, not 4"),
+        ("id,x,y,z\nA,1,2," + "9" * 140_000 + "\n", "record 2: a record of 140006 characters"),
+        ("id,x,y,z" + "," * 420_000 + "\nA,1,2,3\n", "record 1: a record of 10000"),
+        ("id,x,y,z,,\nA,1,2,3,,\n", "record 1: the column '' is there twice"),
+        ("id,x,y,z,x\nA,1,2,3,4\n", "record 1: the column 'x' is there twice"),
+        ('id,x,y,z\n"A\nB",1,2,3\n', "record 2: has "),
+        ("id,x,y,z\nA,1e308,1e308,3\n", "point A is beyond double precision once transformed"),
         ("1 2 3 A\n4 5 x B\n", "record 2: column z: 'x' is not a finite number"),
     ],
 )
@@ -169,10 +175,68 @@ def test_files_that_cannot_be_read(oriented, tmp_path):
             read_similarity(tmp_path / "bad.json")
 
 
+def test_a_deviation_that_is_none(oriented, tmp_path):
+    source = write_csv(tmp_path / "points.csv", points(3))
+    for value in (-1.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="point_sd is not a standard deviation"):
+            transform_file(oriented.similarity, source, tmp_path / "out.csv", point_sd=value)
+
+
+DAMAGE = (None, "x", True, -1, 0, 1e308, -1e308, 10**15, [], {}, [[]], [None] * 3, [1e308] * 3, "\u2028")
+
+
+def test_damaged_documents_are_refused_or_give_finite_points(oriented, tmp_path):
+    """Every value of a document in turn, and its text cut anywhere."""
+    path = tmp_path / "result.json"
+    text = oriented.to_json().decode()
+    whole = json.loads(text)
+    places = [(name,) for name in ("scale", "rotation", "translation", "covariance", "centres", "status")]
+    places += [
+        ("messages",),
+        ("usable",),
+        ("deviation_factor",),
+        ("centres", "control"),
+        ("centres", "model"),
+    ]
+    places += [
+        ("rotation", 1),
+        ("rotation", 1, 2),
+        ("translation", 0),
+        ("covariance", 3),
+        ("covariance", 3, 3),
+    ]
+    damaged = []
+    for place in places:
+        for value in DAMAGE:
+            document = json.loads(text)
+            inner = document
+            for key in place[:-1]:
+                inner = inner[key]
+            inner[place[-1]] = value
+            damaged.append(json.dumps(document))
+        del inner[place[-1]]
+        damaged.append(json.dumps(document))
+    generator = np.random.default_rng(5)
+    damaged += [text[:cut] for cut in generator.integers(0, len(text), 60).tolist()]
+    damaged += ["[" * 3000, "null", "7", '"x"', json.dumps([whole])]
+    source = write_csv(tmp_path / "points.csv", points(2))
+    refusals = []
+    for each in damaged:
+        path.write_text(each)
+        try:
+            transform_file(read_similarity(path, usable=True), source, tmp_path / "out.csv")
+        except InputError as error:
+            refusals.append(str(error))
+    assert len(refusals) > 0.6 * len(damaged)
+    for refusal in refusals:
+        assert refusal.startswith(str(path)) or "beyond double precision" in refusal
+
+
 def test_decimals_follow_the_deviation():
     assert [stream.decimals_for(value) for value in (30, 0.05, 1e-4, 0.0, 1e-30)] == [2, 5, 7, 6, 15]
 
 
+@pytest.mark.speed
 def test_a_hundred_thousand_points_are_quick(oriented, tmp_path):
     """A million takes seconds; a tenth of it here, with a limit that only another order breaks."""
     source = write_csv(tmp_path / "points.csv", points(100_000))

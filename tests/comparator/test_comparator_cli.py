@@ -5,6 +5,7 @@ import json
 import runpy
 import subprocess
 import sys
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 import numpy as np
@@ -127,6 +128,13 @@ def test_bad_input_writes_nothing(run, tables, tmp_path):
     assert names(tmp_path) == before
 
 
+def test_as_published_cuts_the_sigmas_after_the_linear_fit_only(run):
+    lines = run("--example", "--as-published", "--no-pictures", "--out", "out").output.splitlines()
+    sigmas = {line[:40].strip(): line.split()[-3:] for line in lines if line.startswith("  AFTER LINEAR")}
+    assert sigmas["AFTER LINEAR CORRECTIONS"] == ["1.448", "0.923", "1.214"]
+    assert sigmas["AFTER LINEAR AND NONLINEAR CORRECTIONS"] == ["0.897", "0.897", "0.897"]
+
+
 def test_usage(run):
     for arguments in ([], ["a.csv", "--example"], ["--example", "--hand", "up"]):
         assert run(*arguments).exit_code == 2
@@ -143,10 +151,94 @@ def test_strict_turns_remarks_into_errors(run, tables):
     tables[0].write_text("\n".join(line for line in lines if not line.startswith("1,1,1,0,25,")) + "\n")
     lenient = run(*tables, "--no-pictures")
     assert lenient.exit_code == 0
-    assert "remark: case 1: 1 of 25 points of plate 1 are missing" in lenient.output
+    assert "  case 1: 1 of 25 points of plate 1 are missing" in lenient.output
     strict = run(*tables, "--no-pictures", "--strict", "--out", "strict")
     assert strict.exit_code == 1
     assert not Path("strict").exists()
+
+
+def test_the_date_of_the_run_stands_on_the_title_page_only(run, tables, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "94435200")
+    for out, said in (("a", []), ("b", ["--date", "12/29/72"])):
+        assert run(*tables, "--no-pictures", "--out", out, "--json", f"{out}.json", *said).exit_code == 0
+    first, second = (Path(out, "listing.txt").read_text().splitlines() for out in ("a", "b"))
+    different = [pair for pair in zip(first, second, strict=True) if pair[0] != pair[1]]
+    assert [[line.split() for line in pair] for pair in different] == [
+        [["DATE", "OF", "RUN", "1972-12-29"], ["DATE", "OF", "RUN", "12/29/72"]]
+    ]
+    for name in ("correction.json", "correction-joint.json", "grid-1.csv"):
+        assert Path("a", name).read_bytes() == Path("b", name).read_bytes()
+    assert Path("a.json").read_bytes() == Path("b.json").read_bytes()
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "²")
+    refused = run(*tables, "--no-pictures", "--out", "c")
+    assert refused.exit_code == 1
+    assert "SOURCE_DATE_EPOCH is '²': no seconds since 1970" in refused.stderr
+    assert not Path("c").exists()
+
+
+def test_the_date_of_the_run_is_today_where_nothing_is_said(run, tables, monkeypatch):
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    before = datetime.now(UTC).date()
+    assert run(*tables, "--no-pictures", "--out", "a").exit_code == 0
+    (line,) = [line for line in Path("a/listing.txt").read_text().splitlines() if "DATE OF RUN" in line]
+    assert before <= date.fromisoformat(line.split()[-1]) <= datetime.now(UTC).date()
+
+
+def test_tables_and_pictures_of_every_case(run, tables):
+    assert run(*tables, "--no-pictures", "--out", "a").exit_code == 0
+    assert run(*tables, "--no-pictures", "--out", "b", "--each-case").exit_code == 0
+    pages = [Path(out, "listing.txt").read_text().count("NONLINEAR CORRECTIONS, CASE") for out in ("a", "b")]
+    assert pages == [0, 4]
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("comparator = ²", "comparator = '²' is not a whole number"),
+        (f"comparator = {'9' * 5000}", "(5000 characters) is not a whole number"),
+        ("range_centre_um = 1e300", "range_centre_um = 1e+300 is beyond every comparator"),
+        ("range_centre_um = nan", "range_centre_um = 'nan' is not a number"),
+        ("left_handed = perhaps", "left_handed = 'perhaps' is neither yes nor no"),
+    ],
+)
+def test_settings_that_cannot_be_name_their_record(run, tables, setting, words):
+    kept = [line for line in tables[0].read_text().splitlines() if not line.startswith("#")]
+    tables[0].write_text("\n".join([f"# {setting}", *kept]) + "\n")
+    result = run(*tables, "--no-pictures")
+    assert result.exit_code == 1
+    assert isinstance(result.exception, SystemExit)
+    assert f"{tables[0]}, record 1: " in result.stderr
+    assert words in result.stderr
+
+
+@pytest.mark.parametrize("grid", ["²", "9" * 30, "9" * 5000, "a\0b"])
+def test_names_of_plates_that_cannot_be(run, tables, grid):
+    result = run(*tables[:2], "--grid", grid, "--no-pictures")
+    assert result.exit_code == 1
+    assert isinstance(result.exception, SystemExit)
+
+
+def test_no_result_goes_over_a_plate_that_was_read(run, tables, tmp_path):
+    """The corrected plate would have the name of the given one."""
+    given = tmp_path / "grid-1.csv"
+    tables[3].rename(given)
+    before = given.read_bytes()
+    for named in (["--grid", given], []):
+        if not named:
+            first = tables[0].read_text()
+            tables[0].write_text(f"# grid = grid-1.csv\n{first}")
+        result = run(*tables[:2], *named, "--no-pictures", "--out", tmp_path)
+        assert result.exit_code == 1
+        assert isinstance(result.exception, SystemExit)
+        assert str(given) in result.stderr
+        assert given.read_bytes() == before
+
+
+def test_the_middle_of_the_range_comes_from_the_table(run, tables):
+    tables[0].write_text("# range_centre_um = 130000\n" + tables[0].read_text())
+    session = read(tables[:2], [read_grid(tables[3])])[0]
+    assert session.centre_um == 130_000.0
+    assert b"# range_centre_um = 130000" in to_csv(session)
 
 
 def test_correct_applies_and_inverts(run, tables, tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from plates import case_2, document, printed_correction, printed_polynomial, table
 
 from photogram.comparator import built_in_grid
-from photogram.comparator.averages import PlateAverages
+from photogram.comparator.averages import LocationAverages, PlateAverages
 from photogram.comparator.correction_table import table_nodes
 from photogram.comparator.gridsigma import listed_grid_sigma
 from photogram.comparator.orientation import exchanged
@@ -81,9 +81,9 @@ def figure_29():
     within = np.array([summary["random_errors_sigma"][axis] ** 2 for axis in "xy"]) * 25 * 4 * 3
     squares = within + 4 * (values[:, 2:] ** 2).sum(axis=0)
     xy = np.array([[float(row["x_adj_um"]), float(row["y_adj_um"])] for row in rows])
-    averages = PlateAverages(
-        1320, True, (1, 2, 3, 4), points, np.full(25, 4), values[:, 2:], squares, points, values[:, :2], xy
-    )
+    cases = (1, 2, 3, 4)
+    place = LocationAverages(cases, points, xy, values[:, :2])
+    averages = PlateAverages(1320, True, cases, points, np.full(25, 4), values[:, 2:], squares, (place,), xy)
     return averages, summary
 
 
@@ -158,7 +158,7 @@ def test_figure_30_variances_have_the_structure_of_ours():
 
 
 def test_feature_18_correction_table_of_figure_23():
-    nodes = np.vstack(table_nodes((125_000.0, 125_000.0)))
+    nodes = np.vstack(table_nodes(125_000.0))
     expected = document("derived_reference.json")["plot_table_fig30_um"]
     assert nodes / 1e6 == pytest.approx(np.array([[row["x"], row["y"]] for row in expected]), abs=1e-9)
     values = printed_polynomial().evaluate(nodes)

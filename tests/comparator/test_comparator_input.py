@@ -372,6 +372,15 @@ def test_zero_and_zero_is_missing_on_cards(tmp_path):
     assert "point 3 is missing" in str(session.messages[0])
 
 
+def test_the_middle_of_the_range_stands_on_cards_of_comparator_15(tmp_path):
+    """Format 143: TRANS in columns 61-69, metres with six decimals."""
+    cards = [header(15), *circuit(lambda p, x, y: standard(1, p, x, y)), ""]
+    session = read_cards(deck(tmp_path, *cards))[0]
+    assert session.centre_um == 125_000.0
+    cards[1:-1] = [f"{card:60}{300_000:9d}" for card in cards[1:-1]]
+    assert read_cards(deck(tmp_path, *cards))[0].centre_um == 300_000.0
+
+
 TABLE = "# grid = 1320\ncase,point,x_um,y_um\n"
 
 
@@ -393,6 +402,17 @@ TABLE = "# grid = 1320\ncase,point,x_um,y_um\n"
         ("# grid = 1320\n# left_handed = perhaps\ncase,point,x_um,y_um\n1,1,2,3\n", "neither yes nor no"),
         ("# grid = 1320\nplate,case,point,x_um,y_um\n778,1,1,2,3\n", "case 1 is on plate 778"),
         ("# nothing\n", "holds no table"),
+        (
+            f"{TABLE}1,{'9' * 5000},2,3\n",
+            r"record 3: point '9+'... \(5000 characters\) is not a whole number",
+        ),
+        (f"{TABLE}1,9223372036854775808,2,3\n", "record 3: point '9223372036854775808' is not from 0 to"),
+        (f"{TABLE}1,²,2,3\n", "record 3: point '²' is not a whole number"),
+        (f"{TABLE}1,1,{'9' * 140_000},3\n", "record 3: a record of 1400"),
+        (f"# grid = 1320\ncase,point,x_um,y_um{',' * 420_000}\n1,1,2,3\n", "record 2: a record of 4200"),
+        (f"{TABLE}1,1,1_0,3\n", "record 3: x_um '1_0' is not a number"),
+        (f"{TABLE}1,1,1e300,3\n", "record 3: case 1, point 1: a coordinate of 1e\\+300 um is beyond every"),
+        ("# grid = 1320\ncase,point,x_um,y_um,point\n1,1,2,3,4\n", "the column 'point' is there twice"),
         (TABLE, "there are no measurements"),
     ],
 )

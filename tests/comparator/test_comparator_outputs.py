@@ -21,6 +21,7 @@ from photogram.comparator.correction_table import table_nodes, table_values
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.gridsigma import listed_grid_sigma, text_grid_sigma
 from photogram.comparator.joint import Weights, adjust_jointly
+from photogram.comparator.listing.correction import correction_table
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.significance import _f_max_tail, compare_case_variances
 from photogram.comparator.variance import AxisSigma, difference
@@ -40,12 +41,106 @@ def full():
 
 
 def test_feature_18_the_table_of_the_listing():
-    rows = table_nodes((125_000.0, 130_000.0), 100_000.0)
+    rows = table_nodes(125_000.0)
     assert [len(row) for row in rows] == [9, 5, 9, 5, 9, 5, 9, 5, 9]
-    assert rows[0][0].tolist() == [225_000.0, 230_000.0]
-    assert rows[-1][-1].tolist() == [25_000.0, 30_000.0]
+    assert rows[0][0].tolist() == [225_000.0, 225_000.0]
+    assert rows[-1][-1].tolist() == [25_000.0, 25_000.0]
     values = table_values(printed_correction().polynomial, rows)
     assert values[1][0] == pytest.approx(printed_correction().polynomial.evaluate(rows[1][:1])[0])
+
+
+def test_feature_18_nodes_belong_to_the_comparator_not_to_the_measurement(full):
+    """Two calibrations of one comparator, years apart, have the same nodes, wherever the plate lay."""
+    session = noisy(31, correction=bent(), centre_um=(119_000.0, 131_000.0))
+    pages = [correction_table(calibration) for calibration in (full, calibrate(session, QUICK))]
+    heads = [[line[:11] for line in page if line.startswith(("X=", "Y="))] for page in pages]
+    assert heads[0] == heads[1]
+    assert heads[0][0] == "X= 0.2250 M"
+    assert pages[0][-1] == "UPPER NUMBER IN X, LOWER NUMBER IN Y"
+
+
+@pytest.mark.parametrize(
+    ("fields", "centre_um"),
+    [
+        ({"comparator": 3}, 125_000.0),
+        ({"comparator": 10}, 1_000_000.0),
+        ({"comparator": 11}, 1_000_000.0),
+        ({"comparator": 11, "least_count_one_micrometre": False}, 1_500_000.0),
+        ({"comparator": 12}, 300_000.0),
+        ({"comparator": 5, "secondary": True}, 1_000_000.0),
+        ({"comparator": 99}, 125_000.0),
+        ({"comparator": 3, "range_centre_um": 80_000.0}, 80_000.0),
+    ],
+)
+def test_feature_18_the_middle_of_the_range(fields, centre_um):
+    assert replace(noisy(1), **fields).centre_um == centre_um
+
+
+def test_feature_18_nodes_beyond_the_measurement_are_marked():
+    calibration = calibrate(replace(noisy(31, correction=bent()), range_centre_um=160_000.0), QUICK)
+    page = correction_table(calibration)
+    assert page[-1] == "* OUTSIDE THE RANGE MEASURED"
+    first = next(line for line in page if line.startswith("X= 0.2600"))
+    assert first.count("*") == 9
+    low = next(line for line in page if line.startswith("X= 0.0600"))
+    assert "*" in low[:30]
+    assert "*" not in low[30:]
+
+
+def test_feature_18_the_net_is_drawn_at_fixed_nodes_and_10_000_times():
+    pytest.importorskip("matplotlib")
+    from photogram.comparator.pictures.correction import distorted_grid
+
+    calibration = calibrate(noisy(30, correction=bent()), QUICK)
+    polynomial = calibration.nonlinear.polynomial
+    axes = distorted_grid(calibration, polynomial).axes[0]
+    *lines, nodes = [line for line in axes.lines if len(line.get_xdata()) > 2]
+    assert len(lines) == 10
+    steps = np.array([75.0, 125.0, 175.0, 225.0, 25.0])
+    assert set(np.round(nodes.get_xdata(), 9)) == set(steps)
+    corner = polynomial.evaluate(np.array([[25_000.0, 25_000.0]]))[0]
+    drawn = np.array([lines[0].get_xdata()[0], lines[0].get_ydata()[0]])
+    assert drawn == pytest.approx(25.0 + 10.0 * corner, abs=1e-9)
+
+
+def test_feature_18_every_case_has_its_table_and_pictures_where_they_are_wanted(full):
+    pytest.importorskip("matplotlib")
+    from photogram.comparator.pictures import figures
+
+    session = replace(noisy(30, correction=bent()), plot_each_case=True)
+    calibration = calibrate(session, QUICK)
+    names = [name for name, _ in figures(calibration)]
+    for case in range(1, 5):
+        assert {f"correction-case-{case}", f"distorted-grid-case-{case}"} <= set(names)
+        assert f"NONLINEAR CORRECTIONS, CASE NUMBER {case} (MICRONS)" in listing(calibration)
+    assert "NONLINEAR CORRECTIONS, CASE" not in listing(full)
+
+
+def test_feature_09_ellipses_of_operators_and_of_all_at_four_levels(full):
+    pytest.importorskip("matplotlib")
+    from photogram.comparator.pictures import figures
+    from photogram.comparator.pictures.ellipses import total_ellipses
+
+    made = dict(figures(full))
+    operators = list(full.pointing.operators)
+    assert len(operators) == 2
+    assert all(f"pointing-ellipses-operator-{operator}" in made for operator in operators)
+    levels = [1.00, 1.18, 2.45, 3.03]
+    collections = total_ellipses(full).axes[0].collections
+    widths = [2 * np.array(own._widths) for own in collections]
+    assert [own[0] / widths[0][0] for own in widths] == pytest.approx(levels)
+    points = list(full.pointing.points)
+    expected = [full.pointing.points[point].ellipse.major_um for point in points]
+    assert widths[0] / widths[0][0] == pytest.approx(np.array(expected) / expected[0])
+    panels = made["pooled-ellipses"].axes[: len(full.cases) + len(operators) + 1]
+    assert [panel.get_title(loc="left").split(":")[0] for panel in panels] == [
+        *(f"case {case.number}" for case in full.cases),
+        *(f"operator {operator}" for operator in operators),
+        "all",
+    ]
+    for panel in panels:
+        sizes = [float(own._widths[0]) for own in panel.collections]
+        assert [size / sizes[0] for size in sizes] == pytest.approx(levels)
 
 
 def test_feature_18_pictures(full):
@@ -62,6 +157,10 @@ def test_feature_18_pictures(full):
         "correction",
         "distorted-grid",
         "pointing-ellipses",
+        "pointing-ellipses-operator-18",
+        "pointing-ellipses-operator-21",
+        "pointing-ellipses-total",
+        "pooled-ellipses",
         "residual-histogram",
     } == set(made)
     arrows = made["comparator-residuals"].axes[0].collections[0]
@@ -113,6 +212,43 @@ def test_feature_19_locations_show_what_belongs_to_the_comparator():
     averages = calibration.plates[1].averages
     assert np.abs(averages.location_um).max() > 2.0
     assert np.abs(averages.location_um).max() > 2.5 * np.abs(averages.grid_um).max()
+
+
+def test_feature_19_places_far_apart_are_not_one_location():
+    """Two sets in the two halves of a long comparator: location 1 of one is 195 mm from that of the other."""
+    session = noisy(3)
+    far = noisy(4, centre_um=(320_000.0, 130_000.0), grid=session.grids[1])
+    cases = (*session.cases, *(replace(case, number=case.number + 4) for case in far.cases))
+    calibration = calibrate(replace(session, cases=cases), Options(joint=False, polynomial=False))
+    near, away = calibration.plates[1].averages.by_location
+    assert (near.cases, away.cases) == ((1, 2, 3, 4), (5, 6, 7, 8))
+    assert away.xy_um - near.xy_um == pytest.approx(np.tile([195_000.0, 0.0], (25, 1)), abs=20.0)
+    for place, own in ((near, calibration.last_fits[:4]), (away, calibration.last_fits[4:])):
+        corner = [
+            fit.residuals.comparator_um[
+                case.placed.points.tolist().index(case.placed.orientation.nearest_point)
+            ]
+            for case, fit in zip(
+                [case for case in calibration.cases if case.number in place.cases], own, strict=True
+            )
+        ]
+        assert place.residuals_um[0] == pytest.approx(np.mean(corner, axis=0))
+    page = listing(calibration)
+    assert "THE PLATE LAY AT ANOTHER PLACE IN CASES 5 6 7 8: THEIR LOCATIONS ARE AVERAGED APART" in page
+    assert "  N = 50 LOCATIONS, 25 POINTS" in page
+    assert calibration.plates[1].listed.mean_comparator_um == pytest.approx(
+        math.sqrt(float((calibration.plates[1].averages.location_um ** 2).sum()) / 99)
+    )
+
+
+def test_feature_19_a_plate_turned_by_another_angle_lies_elsewhere():
+    session, turned = noisy(3), noisy(4, rotation_rad=0.6)
+    cases = (*session.cases, *(replace(case, number=case.number + 4) for case in turned.cases))
+    calibration = calibrate(replace(session, cases=cases), Options(joint=False, polynomial=False))
+    assert [place.cases for place in calibration.plates[1].averages.by_location] == [
+        (1, 2, 3, 4),
+        (5, 6, 7, 8),
+    ]
 
 
 # 20: grid calibration
@@ -170,7 +306,12 @@ def test_feature_21_nanometres_of_the_listing():
         calibrate(session, Options(joint=False, nanometres=way)).variance for way in ("exact", "truncated")
     )
     assert cut.after_linear.x == math.floor(1000 * exact.after_linear.x) / 1000
+    assert cut.after_linear.y == math.floor(1000 * exact.after_linear.y) / 1000
+    # The listing still has the sigmas after the nonlinear fit: only SIGX and SIGY come back from its cards.
+    assert cut.after_nonlinear == exact.after_nonlinear
+    assert cut.random == exact.random
     assert cut.nonlinear == pytest.approx(exact.nonlinear, abs=2e-3)
+    assert cut.nonlinear != exact.nonlinear
 
 
 def test_feature_21_a_grid_without_known_accuracy_is_computed():

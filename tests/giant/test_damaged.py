@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 
 from photogram import Spheroid, simulate
 from photogram.cli import app
-from photogram.files import write_whole
 from photogram.giant import Common, Project
 from photogram.giant.files import NAMES, to_bytes
+from photogram.writing import write_whole
 
 PROJECTS = 840
 RUNS = 8

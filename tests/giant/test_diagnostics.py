@@ -231,6 +231,36 @@ def test_section_11_a_read_error_shows_the_record(tmp_path):
     assert (error.file, error.record, error.text) == (tmp_path / "CAMERAS", 1, "F1982        -15x740")
 
 
+@pytest.mark.giant("2.1", "2A4: names are compared exactly")
+def test_section_2_1_names_that_differ_by_case_or_blanks_are_remarked_on(tmp_path):
+    from photogram import simulate
+    from photogram.giant import Project, read_project, write_project
+
+    project = Project.from_block(simulate(strips=1, photos_per_strip=3, points_per_photo=10, seed=1).block)
+    first = project.images[0].points[:2]
+    for frame in project.images:
+        frame.points = [{first[0]: "pt 1", first[1]: "PT1"}.get(name, name) for name in frame.points]
+    control = next(point for point in project.ground if point.name not in first)
+    # As the point is measured, and as somebody typed it.
+    for frame in project.images:
+        frame.points = ["Cp 7" if name == control.name else name for name in frame.points]
+    control.name = "CP7"
+    write_project(project, tmp_path / "p")
+    project = read_project(tmp_path / "p")
+    block = project.to_block()
+    texts = [str(message) for message in project.messages]
+    assert any(
+        "points whose names differ by case or blanks only are different points: 'pt 1' and 'PT1'" in text
+        for text in texts
+    )
+    assert any(
+        "control point CP7 is not photographed: ignored (the point 'Cp 7' is, but names are compared exactly)"
+        in text
+        for text in texts
+    )
+    assert {"pt 1", "PT1", "Cp 7"} <= {*block.point_ids}
+
+
 def test_of_control_that_stands_there_twice_by_hand_the_first_counts(tmp_path):
     project = read_project(write_files(tmp_path))
     project.ground.append(dataclasses.replace(project.ground[0], position=(1.0, 2.0, 3.0)))

@@ -32,6 +32,22 @@ def at(column, text, name="A"):
     return f"{name:{column - 1}}{text}" if column > 1 else text
 
 
+@pytest.mark.giant("14", "1 columns 16 and 17: 1 applies refraction")
+@pytest.mark.parametrize(
+    ("columns", "media"), [("00", []), ("10", ["air"]), ("01", ["water"]), ("11", ["air", "water"])]
+)
+def test_section_14_refraction_that_columns_16_and_17_ask_for_is_remarked_on(columns, media):
+    records = source("T", f"{'':15}{columns}{'':13}{'-2.5':>10}")
+    parse_common(records)
+    assert [
+        f"refraction in {medium}" in str(message)
+        for message, medium in zip(records.messages, media, strict=True)
+    ] == [True] * len(media)
+    for message in records.messages:
+        assert "FILE, record 2: column 1" in str(message)
+        assert ("below -2.5 m" in str(message)) == ("water" in str(message))
+
+
 # Fields
 
 

@@ -5,6 +5,7 @@ import math
 from decimal import Decimal
 from pathlib import Path
 
+import fortranformat
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -86,12 +87,80 @@ def test_section_2_1_real(field, value):
         ".",
         "-",
         "E5",
-        "1e999",
+        "1.5E",
+        "1.5+",
+        "1.5E+-2",
+        "1.5EE2",
+        "1.5E2.",
+        "1.5+2+3",
+        "1.5E2D3",
+        "+-1",
+        "²",
+        "1.5E²",
         "٣",
     ],
 )
 def test_illegal_numbers(field):
     with pytest.raises(ValueError, match="is not a number"):
+        parse_real(field, 3)
+
+
+# ANSI X3.9-1978, 13.5.9.2.1, with BLANK='NULL': field, d, value. A decimal point in the field overrides d;
+# the exponent is a signed integer, or E or D, blanks, and an integer with or without a sign.
+FORTRAN_77 = [
+    ("-1.5274+2", 3, "-152.74"),
+    ("-1.5274-2", 3, "-0.015274"),
+    ("1.5+02", 3, "150"),
+    ("-152740-1", 3, "-15.274"),
+    ("15274+2", 3, "1527.4"),
+    ("15274E2", 3, "1527.4"),
+    ("15274D+2", 2, "15274"),
+    ("15274d-2", 0, "152.74"),
+    ("15274e0", 5, "0.15274"),
+    ("+.5D1", 3, "5"),
+    ("5.E1", 3, "50"),
+    ("5.+1", 3, "50"),
+    ("-.5-1", 3, "-0.05"),
+    ("1.5E 2", 3, "150"),
+    ("1.5 D + 2", 3, "150"),
+    (" - 1 . 5 + 2 ", 3, "-150"),
+    ("1.5E+002", 3, "150"),
+    ("1.5+002", 3, "150"),
+    ("1", 3, "0.001"),
+    ("-1", 5, "-0.00001"),
+    ("0+99999", 3, "0"),
+    ("1.7E308", 3, "1.7E308"),
+    ("1.0-300", 3, "1E-300"),
+]
+
+
+@pytest.mark.giant("2.1", "Fw.d with an exponent: E, D, or a sign without letter")
+@pytest.mark.parametrize(("field", "decimals", "value"), FORTRAN_77)
+def test_section_2_1_every_form_of_fortran_77(field, decimals, value):
+    assert parse_real(field, decimals) == Decimal(value)
+
+
+@pytest.mark.giant("2.1", "Fw.d with an exponent: E, D, or a sign without letter")
+@given(
+    sign=st.sampled_from(["", "+", "-"]),
+    whole=st.text("0123456789", max_size=5),
+    point=st.booleans(),
+    fraction=st.text("0123456789", max_size=4),
+    exponent=st.sampled_from(["", "+1", "-2", "E3", "e-4", "D+5", "d0", "E+06", "-07"]),
+    decimals=st.integers(0, 5),
+)
+def test_section_2_1_the_package_fortranformat_reads_the_same(
+    sign, whole, point, fraction, exponent, decimals
+):
+    assume(whole or (point and fraction))
+    field = sign + whole + ("." + fraction if point else "") + exponent
+    (other,) = fortranformat.FortranRecordReader(f"(BN,F{len(field)}.{decimals})").read(field)
+    assert float(parse_real(field, decimals)) == pytest.approx(other, rel=1e-14)
+
+
+@pytest.mark.parametrize("field", ["1E999", "-1.D309", "1.5+400", "1E-400", "1.-999", "1E99999999"])
+def test_numbers_that_double_precision_does_not_have_are_refused(field):
+    with pytest.raises(ValueError, match="beyond the range of numbers"):
         parse_real(field, 3)
 
 

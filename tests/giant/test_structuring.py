@@ -124,6 +124,7 @@ def test_nothing_has_no_bandwidth():
     assert structured.overflow(1) is None
 
 
+@pytest.mark.speed
 def test_a_million_images_are_structured_in_two_seconds():
     rng = np.random.default_rng(4)
     photos = np.repeat(np.arange(5000), 200)

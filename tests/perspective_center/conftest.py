@@ -13,14 +13,12 @@ import pytest
 from photogram.geometry import rotation_matrix
 from photogram.perspective_center import Grid
 
-DATA = Path(__file__).parents[3] / "shared" / "data" / "perspective_center"
+DATA = Path(__file__).parents[1] / "data" / "perspective_center"
 
 
 @pytest.fixture(scope="session")
 def golden() -> Path:
-    """Directory of the golden data; the test is skipped where it is absent."""
-    if not DATA.is_dir():
-        pytest.skip("the golden data are not there (../shared/data/perspective_center)")
+    """Directory of the golden data."""
     return DATA
 
 

@@ -20,8 +20,18 @@ EXAMPLE = files("photogram") / "examples" / "perspective_center" / "grid.deck"
 SET = {
     "title", "data_set", "perspective_center", "attitude_minutes", "standard_errors", "sigma0_plate",
     "sigma0_model", "covariance", "converged", "iterations", "points",
+    "test",
 }  # fmt: skip
-POINT = {"id", "readings", "mean", "residual", "radial_distortion", "redundancy", "standardized"}
+POINT = {
+    "id",
+    "readings",
+    "mean",
+    "residual",
+    "radial_distortion",
+    "redundancy",
+    "standardized",
+    "studentized",
+}
 
 
 @pytest.fixture

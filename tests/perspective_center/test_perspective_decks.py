@@ -67,6 +67,10 @@ def test_blanks_in_a_field_count_as_zeros():
         ("(2F10.0,I4)", "does not give"),
         ("(I4,F10.0)", "does not give"),
         ("(I4,70X,2F10.0)", "beyond column 80"),
+        ("(I4,2F999999999.0)", "beyond the 80 columns"),
+        ("(I4,2F10.99999999999)", "beyond the 80 columns"),
+        ("(999999999I4,2F10.0)", "beyond the 80 columns"),
+        ("(I4,80(80(80(80(80(F1.0))))))", "beyond the 80 columns"),
     ],
 )
 def test_formats_that_do_not_serve(text, why):

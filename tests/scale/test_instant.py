@@ -1,10 +1,14 @@
-"""Small things feel instant."""
+"""Small things feel instant: pytest -m speed."""
 
 import subprocess
 import sys
 import time
 
+import pytest
+
 from photogram import adjust, simulate
+
+pytestmark = pytest.mark.speed
 
 IMPORT = "import time, photogram; print(time.process_time())"
 

@@ -15,15 +15,16 @@ from typer.testing import CliRunner
 from photogram import AdjustmentError, InputError, _photocore
 from photogram.angles import ARCSEC
 from photogram.cli import app
+from photogram.neighbours import mutually_nearest
 from photogram.stellar import Air, Site
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.matching import mutually_nearest
 from photogram.stellar.night import calibrate_night
-from photogram.stellar.night_document import axis_of, to_json
-from photogram.stellar.night_file import attitude_of, inputs, read_night
+from photogram.stellar.night_document import to_json
+from photogram.stellar.night_file import inputs, read_night
 from photogram.stellar.night_report import report
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
+from photogram.stellar.pointing import attitude_of, axis_of
 from photogram.stellar.skies import calibrate_exposures, project_sky, stars_near
 from photogram.stellar.transformation import pole_matrix, terrestrial
 
@@ -364,18 +365,18 @@ def test_results_do_not_replace_the_input(folder, monkeypatch):
     ("old", "new", "message"),
     [
         ("[station]", "[sation]", "there is no table sation"),
-        ("latitude_deg", "lattitude_deg", "a station has no lattitude_deg"),
+        ("latitude_deg", "lattitude_deg", r"\[station\] has no lattitude_deg"),
         ("latitude_deg = 47.05", "latitude_deg = 147.05", "not between -90 and 90"),
         ("field_of_view_deg = 36.9", "field_of_view_deg = 236.9", "the field of view is 236.9 degrees"),
         ("field_of_view_deg", "fov", r"\[camera\] has no fov"),
         ('utc = "2024-03-05T20:10:00.00"', 'utc = "yesterday"', "is not a UTC time"),
         ('utc = "2024-03-05T20:10:00.00"', 'utc = "2024-13-05T20:10:00.00"', "bad month"),
-        ('name = "2"', 'name = "1"', "two exposures have the same name"),
+        ('name = "2"', 'name = "1"', r"\[exposures 1\] name is '1': two exposures have the same name"),
         ('name = "2"', 'name = "6"', "there is no exposure 2"),
         ('file = "images.csv"', 'file = "nothing.csv"', "cannot be read"),
         ('file = "images.csv"', 'files = "images.csv"', "has no files"),
         ("sd_px = 0.1", "sd_px = 0.0", "must be positive"),
-        ("sd_px = 0.1", 'sd_px = "small"', "could not convert"),
+        ("sd_px = 0.1", 'sd_px = "small"', r"\[images\] sd_px is 'small', not a number"),
         ("[labels]", "[labels", "Expected"),
     ],
 )

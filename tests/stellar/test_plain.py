@@ -147,15 +147,19 @@ def test_every_option_can_be_given(folder):
     [
         ("[axis]", "[axle]", "there is no table axle"),
         ("curves = true", "curfes = true", "there is no option curfes"),
-        ("curves = true", 'curves = "no"', "option curves: 'no' is neither true nor false"),
-        ("max_iterations = 8", 'max_iterations = "many"', "option max_iterations"),
+        ("curves = true", 'curves = "no"', r"\[options\] curves is 'no', neither true nor false"),
+        (
+            "max_iterations = 8",
+            'max_iterations = "many"',
+            r"\[options\] max_iterations is 'many', not a whole number",
+        ),
         ("max_iterations = 8", "max_iterations = -1", "cannot be negative"),
         ("interval = 0.01", "interval = 0.0", "must be positive"),
         ('minimum_stars = [1, "2"]', "minimum_stars = []", "option 7 .pre-run. needs option 6"),
         ("first_post", "post", r"\[images\] has no post"),
         ("latitude_deg = 30.0", "", "latitude_deg is missing"),
         ("latitude_deg = 30.0", "latitude_deg = 95.0", "not between -90 and 90"),
-        ('fixed = ["K3"]', 'fixed = ["K9"]', "there is no parameter 'K9'"),
+        ('fixed = ["K3"]', 'fixed = ["K9"]', r"\[camera\] there is no parameter 'K9'"),
         (
             "weight = [1.0, 2.0, 0.5]",
             "weight = [1.0, 2.0, 1.5]",

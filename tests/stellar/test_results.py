@@ -122,17 +122,17 @@ def test_unknown_directions_in_listing_and_document(unknown):
 def test_the_combined_solution_is_that_of_one_attitude(still):
     combined = calibrate(still).combined
     assert combined is not None
-    # All images with one attitude, iterated: what the method of modification comes to without iterating.
+    # All images with one attitude: the combined solution is iterated to the same.
     options = replace(still.options, movement_factor=0.0)
     one = calibrate(replace(still, image_groups=np.full_like(still.image_groups, 2), options=options))
     errors = np.array([one.mean_errors[name] for name in NAMES[6:22]])
     off = (combined.solved.parameters - one.solved.parameters)[6:22]
-    assert np.abs(off / errors).max() < 0.05
+    assert np.abs(off / errors).max() < 1e-4
     again = np.array([combined.mean_errors[name] for name in NAMES[6:22]])
-    assert again == pytest.approx(errors, rel=0.02)
+    assert again == pytest.approx(errors, rel=1e-5)
     assert combined.degrees_of_freedom == one.degrees_of_freedom == 734
-    assert combined.mean_error == pytest.approx(one.mean_error, rel=1e-4)
-    assert combined.solved.residuals == pytest.approx(one.solved.residuals, abs=2e-7)
+    assert combined.mean_error == pytest.approx(one.mean_error, rel=1e-8)
+    assert combined.solved.residuals == pytest.approx(one.solved.residuals, abs=1e-11)
 
 
 def test_the_combined_solution_has_all_tables(still):

@@ -60,9 +60,13 @@ fn strips(strips: usize, photos_per_strip: usize) -> Block {
     let mut block = Block { space, sense, refraction: None, photos: vec![], points: vec![], images: vec![] };
     for (photo, (position, attitude)) in true_photos.iter().enumerate() {
         let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();
+        let position = std::array::from_fn(|k| position[k] + 15.0 * off(k));
+        let attitude = std::array::from_fn(|k| attitude[k] + 0.005 * off(3 + k));
         block.photos.push(Photo {
-            position: std::array::from_fn(|k| position[k] + 15.0 * off(k)),
-            attitude: std::array::from_fn(|k| attitude[k] + 0.005 * off(3 + k)),
+            position,
+            attitude,
+            observed_position: position,
+            observed_attitude: attitude,
             position_sd: [f64::INFINITY; 3],
             attitude_sd: [f64::INFINITY; 3],
             principal_distance: PRINCIPAL_DISTANCE,

@@ -137,7 +137,7 @@ fn adjusted(collection: &Collection, loss: Option<Loss>, threads: usize) -> Solu
         covariance: true,
         loss,
     };
-    let options = Options { adjustment, ordering: Ordering::Auto };
+    let options = Options { adjustment, ordering: Ordering::Auto, memory: None };
     collection.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 

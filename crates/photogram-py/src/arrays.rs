@@ -1,8 +1,11 @@
 //! Rows of NumPy arrays: shapes are checked here, and what is wrong is said with the name of the argument.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
+use pyo3::import_exception;
 use pyo3::prelude::*;
+
+// A ValueError of the package: what catches its errors catches this one, too.
+import_exception!(photogram.errors, InputError);
 
 /// The rows of an (n, N) array.
 pub fn rows<const N: usize>(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<[f64; N]>> {
@@ -33,7 +36,7 @@ pub fn numbers(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<
 
 /// The indices, not negative, of an (n,) array.
 pub fn indices(name: &str, array: &PyReadonlyArrayDyn<'_, i64>) -> PyResult<Vec<usize>> {
-    let negative = |index: i64| PyValueError::new_err(format!("{name} holds the negative index {index}"));
+    let negative = |index: i64| InputError::new_err(format!("{name} holds the negative index {index}"));
     match array.shape() {
         [_] => array.as_array().iter().map(|&i| usize::try_from(i).map_err(|_| negative(i))).collect(),
         shape => Err(wrong_shape(name, "(n,)", shape)),
@@ -60,7 +63,7 @@ pub fn check_lengths(first: (&str, usize), others: &[(&str, usize)]) -> PyResult
     match others.iter().find(|(_, length)| *length != first.1) {
         None => Ok(()),
         Some((name, length)) => {
-            Err(PyValueError::new_err(format!("{name} has {length} rows, but {} has {}", first.0, first.1)))
+            Err(InputError::new_err(format!("{name} has {length} rows, but {} has {}", first.0, first.1)))
         }
     }
 }
@@ -75,5 +78,5 @@ fn chunks<T: Copy, const N: usize>(values: Vec<T>) -> Vec<[T; N]> {
 
 fn wrong_shape(name: &str, expected: &str, shape: &[usize]) -> PyErr {
     let shape = shape.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
-    PyValueError::new_err(format!("{name} has the shape ({shape}), not {expected}"))
+    InputError::new_err(format!("{name} has the shape ({shape}), not {expected}"))
 }

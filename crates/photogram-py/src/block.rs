@@ -33,14 +33,16 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 #[pyfunction]
 #[pyo3(signature = (
-    photo_positions, photo_attitudes, photo_position_sd, photo_attitude_sd, principal_distances, point_positions, point_sd,
-    image_photos, image_points, image_xy, image_sd, *, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
+    photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
+    principal_distances, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
     covariance, loss, ordering, unit_variance, threads, memory, progress
 ))]
 fn adjust_block(
     py: Python<'_>,
     photo_positions: PyReadonlyArrayDyn<'_, f64>,
     photo_attitudes: PyReadonlyArrayDyn<'_, f64>,
+    photo_positions_observed: PyReadonlyArrayDyn<'_, f64>,
+    photo_attitudes_observed: PyReadonlyArrayDyn<'_, f64>,
     photo_position_sd: PyReadonlyArrayDyn<'_, f64>,
     photo_attitude_sd: PyReadonlyArrayDyn<'_, f64>,
     principal_distances: PyReadonlyArrayDyn<'_, f64>,
@@ -66,6 +68,8 @@ fn adjust_block(
 ) -> PyResult<BlockSolution> {
     let positions = rows("photo_positions", &photo_positions)?;
     let attitudes = rows("photo_attitudes", &photo_attitudes)?;
+    let positions_observed = rows("photo_positions_observed", &photo_positions_observed)?;
+    let attitudes_observed = rows("photo_attitudes_observed", &photo_attitudes_observed)?;
     let position_sd = rows("photo_position_sd", &photo_position_sd)?;
     let attitude_sd = rows("photo_attitude_sd", &photo_attitude_sd)?;
     let distances = numbers("principal_distances", &principal_distances)?;
@@ -73,6 +77,8 @@ fn adjust_block(
         ("photo_positions", positions.len()),
         &[
             ("photo_attitudes", attitudes.len()),
+            ("photo_positions_observed", positions_observed.len()),
+            ("photo_attitudes_observed", attitudes_observed.len()),
             ("photo_position_sd", position_sd.len()),
             ("photo_attitude_sd", attitude_sd.len()),
             ("principal_distances", distances.len()),
@@ -92,6 +98,8 @@ fn adjust_block(
     let photo = |i: usize| Photo {
         position: positions[i],
         attitude: attitudes[i],
+        observed_position: positions_observed[i],
+        observed_attitude: attitudes_observed[i],
         position_sd: position_sd[i],
         attitude_sd: attitude_sd[i],
         principal_distance: distances[i],
@@ -167,7 +175,11 @@ pub fn watched<T: Send, E: Send>(
     match raised {
         Some(error) => Err(error),
         None if done.is_err() && memory::failed() => Err(memory::failure()),
-        None => Ok(done),
+        None => {
+            // What is made of the result needs a reserve again.
+            memory::arm()?;
+            Ok(done)
+        }
     }
 }
 
@@ -219,8 +231,7 @@ pub fn failure(error: &Failure) -> FailureRow {
         Failure::Coarse { photos, points } => ("coarse", vec![photos.clone()], points.clone()),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
-        Failure::Memory { .. } => ("memory", vec![], vec![]),
-        Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
+        Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
     (kind, error.to_string(), photos, points)

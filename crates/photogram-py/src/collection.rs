@@ -63,7 +63,7 @@ fn bundler_images<'py>(
 #[pyfunction]
 #[pyo3(signature = (
     photo_parameters, photo_sd, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, decrease,
-    max_iterations, covariance, loss, ordering, threads, progress
+    max_iterations, covariance, loss, ordering, threads, memory, progress
 ))]
 fn adjust_collection(
     py: Python<'_>,
@@ -81,6 +81,7 @@ fn adjust_collection(
     loss: Option<(&str, f64)>,
     ordering: &str,
     threads: usize,
+    memory: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<CollectionSolution> {
     let parameters = rows("photo_parameters", &photo_parameters)?;
@@ -109,6 +110,7 @@ fn adjust_collection(
             loss: named_loss(loss)?,
         },
         ordering: named_ordering(ordering)?,
+        memory,
     };
     let solution = watched(py, threads, progress, |pool, watch| collection.adjust(&options, pool, watch))?;
     solution.map(|solution| CollectionSolution { solution }).map_err(|error| match error {
@@ -126,7 +128,7 @@ fn failure(error: &Failure) -> FailureRow {
         Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
-        Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
+        Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
     };
     (kind, error.to_string(), photos, points)
@@ -202,6 +204,11 @@ impl CollectionSolution {
     fn point_rays_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         let behind = self.solution.points.iter().map(|p| p.map_or(0, |p| p.behind as i64));
         PyArray1::from_vec(py, behind.collect())
+    }
+
+    #[getter]
+    fn collapsed(&self) -> Vec<usize> {
+        self.solution.collapsed.clone()
     }
 
     #[getter]

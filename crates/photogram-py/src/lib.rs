@@ -20,6 +20,7 @@ static ALLOCATOR: memory::Reserved = memory::Reserved;
 
 #[pymodule]
 fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    memory::arm()?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     distributions::register(module)?;
     geometry::register(module)?;

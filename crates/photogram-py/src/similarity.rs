@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
 use photocore::geometry::{Matrix3, Vector3};
 use photocore::programs::similarity::{
     AdjustedStation, Matrix7, Method, Options, Parameters, Similarity, SimilarityError as Failure, Solution,
-    Start, Started, Station, gauss_crout as crout, orient,
+    Start, Started, Station, Trace, gauss_crout as crout, orient,
 };
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
@@ -46,7 +46,7 @@ fn from_row((scale, rotation, shift, control_centre, model_centre): CentredRow) 
 }
 
 #[pyfunction]
-#[pyo3(signature = (control, control_sd, model, model_sd, *, method, start, former, max_iterations, tolerance, threads))]
+#[pyo3(signature = (control, control_sd, model, model_sd, *, method, start, former, max_iterations, tolerance, threads, trace))]
 fn orient_model(
     py: Python<'_>,
     control: PyReadonlyArrayDyn<'_, f64>,
@@ -59,6 +59,7 @@ fn orient_model(
     max_iterations: usize,
     tolerance: f64,
     threads: usize,
+    trace: bool,
 ) -> PyResult<SimilaritySolution> {
     let control: Vec<Vector3> = rows("control", &control)?;
     let (control_sd, model) = (rows("control_sd", &control_sd)?, rows("model", &model)?);
@@ -92,6 +93,7 @@ fn orient_model(
         },
         max_iterations,
         tolerance,
+        trace,
     };
     run(py, &stations, &options, threads)
 }
@@ -131,6 +133,23 @@ fn failure(error: &Failure) -> PyErr {
         Failure::Layout(_) | Failure::Interrupted | Failure::OutOfMemory(_) => ("input", vec![]),
     };
     SimilarityError::new_err((kind, error.to_string(), stations))
+}
+
+/// Rotation; stations, components and rows of the equations; normal equations; auxiliary table; results; parameters.
+type TraceRow<'py> = (
+    Matrix3,
+    (Vec<(usize, usize)>, Bound<'py, PyArray2<f64>>),
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    [f64; 7],
+    [f64; 7],
+);
+
+fn trace_row<'py>(py: Python<'py>, trace: &Trace) -> PyResult<TraceRow<'py>> {
+    let places = trace.equations.iter().map(|&(station, component, _)| (station, component)).collect();
+    let rows = table(py, trace.equations.iter().map(|(_, _, row)| *row).collect())?;
+    let [normal, auxiliary] = [trace.normal, trace.auxiliary].map(|matrix| table(py, matrix.to_vec()));
+    Ok((trace.rotation, (places, rows), normal?, auxiliary?, trace.results, trace.parameters))
 }
 
 /// An oriented model.
@@ -188,6 +207,11 @@ impl SimilaritySolution {
     #[getter]
     fn cycles(&self) -> Option<Vec<f64>> {
         self.solution.cycles.clone()
+    }
+
+    #[getter]
+    fn traces<'py>(&self, py: Python<'py>) -> PyResult<Vec<TraceRow<'py>>> {
+        self.solution.traces.iter().map(|trace| trace_row(py, trace)).collect()
     }
 
     #[getter]

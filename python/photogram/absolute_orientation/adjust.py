@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Literal, get_args
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.absolute_orientation.hints import Fit, find, undecided
 from photogram.absolute_orientation.orientation import Orientation
+from photogram.absolute_orientation.oriented import Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.adjusted import Iteration
+from photogram.arrays import names as names_of
+from photogram.arrays import number, one_of, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
+from photogram.statistics import externally_studentized, global_test
 
 __all__ = ["Method", "Start", "UnitVariance", "orient"]
 
@@ -24,6 +31,9 @@ UnitVariance = Literal["estimated", "unity"]
 
 Floats = NDArray[np.float64]
 
+MOST_ITERATIONS = 50
+TRIAL_ITERATIONS = 15
+"""Control that fits needs four or five; one that needs more explains nothing."""
 WEAK = 1e3
 """Condition number from which control is called weak."""
 WEAKNESS = {
@@ -31,6 +41,15 @@ WEAKNESS = {
     "elevations in line": "the stations with elevations are almost in a straight line in plan",
     "stations in line": "the stations are almost in a straight line",
 }
+SUSPICIOUS = 1e-4
+"""Root mean square residual, in sizes of the model, from which a cause is looked for; a good one is a few
+parts in a hundred thousand."""
+NO_FIT = 0.1
+"""And from which it is no orientation."""
+IN_A_PLANE = 3.0
+"""Points are in a plane as far as can be told when they are off it by less than this many rms residuals."""
+ROUNDING = 1e-9
+"""Residuals below this fraction of the size of the model are rounding."""
 SHARED = 10_000
 """Stations from which more than one thread is worth its start."""
 
@@ -43,8 +62,9 @@ def orient(
     former: Similarity | Orientation | None = None,
     reject: Iterable[object] = (),
     unit_variance: UnitVariance = "estimated",
-    max_iterations: int = 50,
+    max_iterations: int = MOST_ITERATIONS,
     tolerance: float = 1e-5,
+    trace: bool = False,
 ) -> Orientation:
     """Orient a model absolutely: find s, A and B of x = s A X + B from any mix of control.
 
@@ -77,16 +97,18 @@ def orient(
         Iterations at the most.
     tolerance
         Fraction of its standard deviation by which no unknown changes any more.
+    trace
+        Whether the cycles of the report's methods keep what they computed on their way (`traces`).
 
     Returns
     -------
-    The orientation; its `status` says whether it converged.
+    The orientation; its `status` says whether it converged, `usable` whether it is one at all.
 
     Raises
     ------
     RankError
-        Control that does not determine the seven parameters: fewer than seven components, two horizontal
-        pairs or three elevations; stations or elevations in a straight line; horizontal stations that
+        Control that does not determine the seven parameters: fewer than seven components, four horizontal
+        ones or three elevations; stations or elevations in a straight line; horizontal stations that
         coincide. Its `points` names the stations.
     AdjustmentError
         The scale became zero or negative (the model is a mirror image), or nothing finite.
@@ -96,33 +118,110 @@ def orient(
     KeyboardInterrupt
         Ctrl-C.
     """
-    start = start or ("auto" if method == "rigorous" else "report")
-    rejected = tuple(str(name) for name in reject)
-    _check_options(stations, method, start, rejected, unit_variance, max_iterations, tolerance)
+    one_of("method", method, get_args(Method))
+    start = ("auto" if method == "rigorous" else "report") if start is None else start
+    rejected = tuple(names_of("reject", reject))
+    _check_options(stations, method, start, rejected, unit_variance, max_iterations, tolerance, trace)
     used = stations.held & ~np.isin(np.array(stations.ids, dtype=object), rejected)[:, np.newaxis]
     rows = np.flatnonzero(used.any(axis=1))
-    try:
-        solution = _photocore.orient_model(
-            stations.control[rows],
+    control = np.where(used, stations.control, np.nan)[rows]
+
+    def solve(control: Floats, **options: Any) -> _photocore.SimilaritySolution:
+        return _photocore.orient_model(
+            control,
             np.where(used, stations.control_sd, np.inf)[rows],
             stations.model[rows],
             np.ones((len(rows), 3)) if stations.model_sd is None else stations.model_sd[rows],
-            method=method,
-            start=start,
-            former=_parameters(former),
-            max_iterations=max_iterations,
-            tolerance=tolerance,
+            **{
+                "former": None,
+                "max_iterations": max_iterations,
+                "tolerance": tolerance,
+                "trace": False,
+                **options,
+            },
             threads=1 if len(rows) < SHARED else 0,
         )
+
+    try:
+        solution = solve(control, method=method, start=start, former=_parameters(former), trace=trace)
     except _photocore.SimilarityError as error:
         raise _named(stations, used, rows, *error.args) from None
-    return _orientation(stations, used, rejected, method, unit_variance, rows, solution)
+    if not np.isfinite(solution.sum_of_squares):
+        raise AdjustmentError(
+            "the weighted sum of squares is beyond double precision: standard deviations are too small"
+        )
+    result = _orientation(stations, used, rejected, method, unit_variance, rows, solution)
+
+    def fit(changed: Floats) -> Fit | None:
+        try:
+            found = solve(changed, method="rigorous", start="auto", max_iterations=TRIAL_ITERATIONS)
+        except _photocore.SimilarityError:
+            return None
+        usable = found.status == "converged" and np.isfinite(found.sum_of_squares)
+        return Fit(found.sum_of_squares, found.similarity[1][2][2]) if usable else None
+
+    messages, grave = _doubts(result, rows, control, solution, fit)
+    return replace(result, messages=messages, grave=grave)
+
+
+def _doubts(
+    result: Orientation,
+    rows: NDArray[np.intp],
+    control: Floats,
+    solution: _photocore.SimilaritySolution,
+    fit: Callable[[Floats], Fit | None],
+) -> tuple[list[Message], list[Message]]:
+    """Look for what may be wrong where the model fits badly, and what a good fit leaves open.
+
+    Returns
+    -------
+    Remarks, those of the result among them, and why it is not to be used.
+    """
+    model = result.stations.model[rows]
+    size = math.sqrt(float(((model - model.mean(axis=0)) ** 2).sum() / len(rows)))
+    # What rounding leaves of a perfect fit, in the unit of the sum of squares.
+    unit = result.weighted_sum_of_squares / result.rms**2 if result.rms > 0 else result.known
+    rounding = unit * (ROUNDING * size) ** 2
+    failed = result.test is not None and result.test.problem() is not None
+    messages, grave = list(result.messages), list[Message]()
+    if not result.converged or failed or result.rms > SUSPICIOUS * size or result.outliers:
+        hints = find(
+            [result.stations.ids[row] for row in rows.tolist()],
+            control,
+            solution.misclosures,
+            sum_of_squares=solution.sum_of_squares,
+            rounding=rounding,
+            degrees_of_freedom=result.degrees_of_freedom,
+            orient=fit,
+        )
+        grave = [Message(hint.text) for hint in hints if hint.accepted]
+        messages[:0] = [Message(hint.text) for hint in hints if not hint.accepted]
+    if not grave and result.rms > NO_FIT * size and (result.test is None or result.test.rejected_high):
+        grave.append(
+            Message(
+                "the model does not fit its control: the residuals are"
+                f" {100 * result.rms / size:.2g} percent of its size"
+            )
+        )
+    elif not grave and _in_a_plane(model[np.isfinite(control[:, 2])], result.rms, size):
+        here = Fit(solution.sum_of_squares, float(result.similarity.rotation[2, 2]))
+        if open_question := undecided(control, here, rounding, fit):
+            messages.append(Message(open_question))
+    return messages, grave
+
+
+def _in_a_plane(model: Floats, rms: float, size: float) -> bool:
+    """Whether points are as near to a plane as the orientation fits."""
+    off_plane = float(np.linalg.svd(model - model.mean(axis=0), compute_uv=False)[-1]) / math.sqrt(len(model))
+    return len(model) <= 3 or off_plane <= IN_A_PLANE * rms + ROUNDING * size
 
 
 def _parameters(former: Similarity | Orientation | None) -> _photocore.ParametersRow | None:
     if former is None:
         return None
     similarity = former.similarity if isinstance(former, Orientation) else former
+    if not isinstance(similarity, Similarity):
+        raise InputError(f"a former result is an Orientation or a Similarity, not {type(former).__name__}")
     return similarity.scale, similarity.rotation.tolist(), similarity.translation.tolist()
 
 
@@ -134,18 +233,19 @@ def _check_options(
     unit_variance: str,
     max_iterations: int,
     tolerance: float,
+    trace: bool,
 ) -> None:
-    for name, value, choices in (
-        ("method", method, get_args(Method)),
-        ("start", start, get_args(Start)),
-        ("unit_variance", unit_variance, get_args(UnitVariance)),
-    ):
-        if value not in choices:
-            raise InputError(f"{name} is one of {', '.join(choices)}, not {value!r}")
-    if max_iterations < 1:
+    if not isinstance(stations, Stations):
+        raise InputError(f"stations are given as Stations, not as {type(stations).__name__}")
+    one_of("start", start, get_args(Start))
+    one_of("unit_variance", unit_variance, get_args(UnitVariance))
+    if whole_number("max_iterations", max_iterations) < 1:
         raise InputError("there must be one iteration at least")
-    if not tolerance > 0:
-        raise InputError("the criterion of convergence must be positive")
+    if not 0 < number("tolerance", tolerance) < math.inf:
+        raise InputError(f"the criterion of convergence must be positive, not {tolerance!r}")
+    truth_value("trace", trace)
+    if trace and method == "rigorous":
+        raise InputError("only the report's methods, 'report' and 'fill-in', have cycles to trace")
     unknown = [name for name in rejected if name not in stations.ids]
     if unknown:
         raise InputError(f"station {unknown[0]} cannot be rejected: it is not there")
@@ -177,11 +277,11 @@ def _orientation(
         full[rows] = values
         return full
 
-    # Without standard deviations the test values are in units of sigma0; without either there are none.
-    unit = 1.0 if weighted else (variance or np.nan) ** 0.5
     known = np.nan if scale is None else scale
     similarity = Similarity.from_core(
-        solution.similarity, None if scale is None else scale * solution.tangent_cofactors
+        solution.similarity,
+        None if scale is None else scale * solution.tangent_cofactors,
+        math.sqrt(scale) if weighted and scale else 1.0,
     )
     return Orientation(
         stations=stations,
@@ -200,7 +300,12 @@ def _orientation(
         adjusted_control=spread(solution.adjusted_control),
         control_covariances=spread(known * solution.control_cofactors),
         redundancy=spread(solution.redundancy),
-        standardized=spread(solution.standardized / unit),
+        standardized=spread(solution.standardized / (1.0 if weighted else (variance or np.nan) ** 0.5)),
+        studentized=spread(externally_studentized(solution.standardized, squares, freedom)),
+        test=global_test(squares, freedom) if weighted else None,
+        unit_variance=unit_variance,
+        traces=[Trace(*row) for row in solution.traces],
+        grave=[],
         weighted_sum_of_squares=squares,
         covariance_scale=scale,
         condition=solution.condition,
@@ -246,10 +351,10 @@ def _named(
     """Put names to the stations of a failure of the core."""
     names = [stations.ids[rows[i]] for i in concerned if i < len(rows)]
     if kind == "insufficient":
-        pairs, elevations = int(used[:, 0].sum()), int(used[:, 2].sum())
+        x, y, z = (int(count) for count in used.sum(axis=0))
         text = (
-            f"insufficient control: {2 * pairs + elevations} known coordinates (7 needed),"
-            f" {pairs} horizontal pairs (2 needed), {elevations} elevations (3 needed)"
+            f"insufficient control: {x + y + z} known coordinates (7 needed), {x + y} of them horizontal"
+            f" (4 needed; {x} X and {y} Y, 1 of each needed), {z} elevations (3 needed)"
         )
         return RankError(text, [], [stations.ids[row] for row in rows])
     if kind == "undetermined":

@@ -18,7 +18,8 @@ from photogram.absolute_orientation.stations import Stations
 from photogram.errors import InputError
 from photogram.files import read_lines
 from photogram.geometry import rotation_matrix
-from photogram.messages import Message
+from photogram.messages import Message, quoted
+from photogram.numbers import finite_number, whole_number
 from photogram.places import Place
 
 __all__ = [
@@ -69,17 +70,15 @@ class _Record(Place):
     def number_of(self, word: str, what: str) -> float:
         """Read a number; D marks an exponent as E does."""
         try:
-            value = float(word.upper().replace("D", "E"))
+            return finite_number(word.upper().replace("D", "E"))
         except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise self.error(f"{what}: {word!r} is not a number")
-        return value
+            raise self.error(f"{what}: {quoted(word)} is not a number") from None
 
     def count_of(self, word: str, what: str) -> int:
-        if not word.isdigit():
-            raise self.error(f"{what}: {word!r} is not a count")
-        return int(word)
+        try:
+            return whole_number(word)
+        except ValueError:
+            raise self.error(f"{what}: {quoted(word)} is not a count") from None
 
 
 def read_cards(
@@ -117,7 +116,7 @@ def read_cards(
     if len(records) - 2 != m:
         raise records[1].error(f"M is {m}, but there are {len(records) - 2} station records")
     stations = _stations(path, records[2:], zero_missing, ground_unit, model_unit)
-    pairs, elevations = int(stations.given[:, 0].sum()), int(stations.given[:, 2].sum())
+    pairs, elevations = int(stations.given[:, :2].all(axis=1).sum()), int(stations.given[:, 2].sum())
     if (elevations, pairs) != (n, mn):
         raise records[1].error(
             f"N is {n} and MN {mn}, but {elevations} elevations and {pairs} horizontal pairs are given"
@@ -137,7 +136,8 @@ def _records(path: Path) -> list[_Record]:
 def _stations(
     path: Path, records: list[_Record], zero_missing: bool, ground_unit: str, model_unit: str
 ) -> Stations:
-    ids, control, model = [], [], []
+    control, model = [], []
+    ids: dict[str, None] = {}
     for record in records:
         words = record.words(7, 7, "station X1 X2 X3 x1 x2 x3 number")
         row = [
@@ -148,7 +148,7 @@ def _stations(
         model.append([record.number_of(word, f"x{k}") for k, word in enumerate(words[3:6], 1)])
         if words[6] in ids:
             raise record.error(f"station {words[6]} occurs twice")
-        ids.append(words[6])
+        ids[words[6]] = None
     try:
         return Stations(
             ids,
@@ -183,7 +183,7 @@ def _former(record: _Record, stations: Stations, messages: list[Message]) -> Sim
 
 def _kappa(stations: Stations) -> float | None:
     """Kappa = theta_X - theta_x of the first two stations, for its quadrant; None where they have no plan."""
-    if len(stations.ids) < 2 or not stations.given[:2, 0].all():
+    if len(stations.ids) < 2 or not stations.given[:2, :2].all():
         return None
     ground, model = (array[1, :2] - array[0, :2] for array in (stations.control, stations.model))
     return math.atan2(ground[1] * model[0] - ground[0] * model[1], float(ground @ model))

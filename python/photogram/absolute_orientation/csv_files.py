@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
+import math
 from pathlib import Path
-
-import numpy as np
 
 from photogram.absolute_orientation.stations import (
     CONTROL_COLUMNS,
@@ -16,27 +14,46 @@ from photogram.absolute_orientation.stations import (
 )
 from photogram.errors import InputError
 from photogram.files import read_lines
+from photogram.places import Place
+from photogram.rows import Row, Table, cells
 
-__all__ = ["is_csv", "read_csv"]
+__all__ = ["header", "is_csv", "read_csv", "spelling"]
 
 REQUIRED = ("id", *CONTROL_COLUMNS, *MODEL_COLUMNS)
 OPTIONAL = (*CONTROL_SD_COLUMNS, *MODEL_SD_COLUMNS)
 SPELLINGS = {f"{letter}{k + 1}": "xyz"[k] if letter == "x" else "XYZ"[k] for letter in "xX" for k in range(3)}
 """X1, X2, X3, x1, x2, x3 of the bulletin for X, Y, Z, x, y, z."""
 
-Rows = list[tuple[int, dict[str, str]]]
-
 
 def is_csv(path: Path) -> bool:
-    """Whether the first line that says anything is the header of a CSV file and not a record of numbers."""
-    first = next((line for line in read_lines(path) if line.strip() and not line.startswith("#")), "")
-    return "x" in header(first.split(","))
+    """Whether the first line that says anything is the header of a CSV file and not a record of numbers.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or that line is too long to be either.
+    """
+    lines = enumerate(read_lines(path), 1)
+    first = next(
+        (Place(path, n, line) for n, line in lines if line.strip() and not line.startswith("#")), None
+    )
+    return first is not None and "x" in header(first)
 
 
-def header(cells: list[str]) -> list[str]:
-    """Return the names of columns, in the spelling X, Y, Z, x, y, z."""
-    names = [cell.strip().strip('"') for cell in cells]
-    return [SPELLINGS.get(name, name) for name in names]
+def header(place: Place) -> list[str]:
+    """Return the names of columns in a record, in the spelling X, Y, Z, x, y, z.
+
+    Raises
+    ------
+    InputError
+        The record is too long to be one, or cannot be split.
+    """
+    return [spelling(cell) for cell in cells(place)]
+
+
+def spelling(name: str) -> str:
+    """Return the name of a column from what the bulletin or a file calls it."""
+    return SPELLINGS.get(name, name)
 
 
 def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = "model unit") -> Stations:
@@ -52,29 +69,25 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
         The file cannot be read, a column is missing or unknown, a field is no number; names file, record and
         text.
     """
-    lines = read_lines(path)
-    names, rows = _rows(path, lines)
-    weighted = [name for name in MODEL_SD_COLUMNS if name in names]
+    table = Table.read(path, comment="#", spelling=spelling)
+    _check_header(table)
+    rows = list(table.rows())
+    if not rows:
+        raise InputError("holds no stations", file=path)
+    _check_ids(rows)
+    weighted = [name for name in MODEL_SD_COLUMNS if name in table.columns]
     if weighted and len(weighted) < 3:
         raise InputError(f"has {', '.join(weighted)} only; sd_x, sd_y and sd_z come together", file=path)
 
-    def table(columns: tuple[str, ...], empty: float | None) -> list[list[float]]:
-        return [
-            [_number(path, number, lines, row.get(name, ""), name, empty) for name in columns]
-            for number, row in rows
-        ]
+    def numbers(columns: tuple[str, ...], blank: float | None) -> list[list[float]]:
+        return [[_number(row, name, blank) for name in columns] for row in rows]
 
-    known: dict[str, int] = {}
-    for number, row in rows:
-        if known.setdefault(row["id"], number) != number:
-            text = f"station {row['id']} occurs in record {known[row['id']]} already"
-            raise InputError(text, file=path, record=number, text=lines[number - 1])
-    control, model = table(CONTROL_COLUMNS, np.nan), table(MODEL_COLUMNS, None)
-    control_sd = table(CONTROL_SD_COLUMNS, 0.0)
-    model_sd = table(MODEL_SD_COLUMNS, None) if weighted else None
+    control, model = numbers(CONTROL_COLUMNS, math.nan), numbers(MODEL_COLUMNS, None)
+    control_sd = numbers(CONTROL_SD_COLUMNS, 0.0)
+    model_sd = numbers(MODEL_SD_COLUMNS, None) if weighted else None
     try:
         return Stations(
-            [row["id"] for _, row in rows],
+            [row.cells["id"] for row in rows],
             control,
             model,
             control_sd=control_sd,
@@ -86,50 +99,31 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
         raise InputError(error.message, file=path) from None
 
 
-def _rows(path: Path, lines: list[str]) -> tuple[list[str], Rows]:
-    """Read the header and the rows with their record numbers."""
-    names: list[str] = []
-    rows: Rows = []
-    for number, line in enumerate(lines, 1):
-        if not line.strip(" ,") or line.startswith("#"):
-            continue
-        cells = [cell.strip() for cell in next(csv.reader([line]))]
-        if not names:
-            names = header(cells)
-            _check_header(path, names, number, line)
-            continue
-        if len(cells) != len(names):
-            text = f"has {len(cells)} fields, but the header has {len(names)}"
-            raise InputError(text, file=path, record=number, text=line)
-        rows.append((number, dict(zip(names, cells, strict=True))))
-        if not rows[-1][1]["id"]:
-            raise InputError("the id is empty", file=path, record=number, text=line)
-    if not rows:
-        raise InputError("holds no stations", file=path)
-    return names, rows
+def _check_header(table: Table) -> None:
+    allowed = (*REQUIRED, *OPTIONAL)
+    table.require(*REQUIRED)
+    if unknown := [name for name in table.columns if name not in allowed]:
+        raise table.head.error(
+            f"the header does not know the column {unknown[0]!r} (columns: {', '.join(allowed)})"
+        )
 
 
-def _check_header(path: Path, names: list[str], number: int, line: str) -> None:
-    missing = [name for name in REQUIRED if name not in names]
-    unknown = [name for name in names if name not in (*REQUIRED, *OPTIONAL)]
-    repeated = [name for name in names if names.count(name) > 1]
-    for faulty, what in ((missing, "lacks"), (unknown, "does not know"), (repeated, "repeats")):
-        if faulty:
-            text = (
-                f"the header {what} the column {faulty[0]!r} (columns: {', '.join((*REQUIRED, *OPTIONAL))})"
-            )
-            raise InputError(text, file=path, record=number, text=line)
+def _check_ids(rows: list[Row]) -> None:
+    known: dict[str, Place] = {}
+    for row in rows:
+        name = row.cells["id"]
+        if not name:
+            raise row.place.error("the id is empty")
+        first = known.setdefault(name, row.place)
+        if first is not row.place:
+            raise row.place.error(f"station {name} occurs in record {first.record} already")
 
 
-def _number(path: Path, number: int, lines: list[str], text: str, column: str, empty: float | None) -> float:
-    """Read a number; NaN is refused, and so is infinity but for a standard deviation of control."""
-    if not text and empty is not None:
-        return empty
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if np.isnan(value) or (np.isinf(value) and column not in CONTROL_SD_COLUMNS):
-        what = f"{text!r} is not a number" if text else "is empty"
-        raise InputError(f"column {column}: {what}", file=path, record=number, text=lines[number - 1])
-    return value
+def _number(row: Row, column: str, blank: float | None) -> float:
+    """Read a number; infinity only for a standard deviation of control."""
+    text = row.cells.get(column, "")
+    if column in CONTROL_SD_COLUMNS and text.lower() in ("inf", "+inf", "infinity"):
+        return math.inf
+    if not text and blank is not None:
+        return blank
+    return row.required(column)

@@ -15,6 +15,7 @@ from photogram.absolute_orientation.oriented import OrientedModel
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.errors import InputError
 from photogram.files import read_bytes
+from photogram.statistics import GlobalTest
 
 __all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
 
@@ -55,11 +56,14 @@ def _head(result: OrientedModel) -> dict[str, Any]:
             "residual_ground": "u / s: given minus transformed, ground units",
             "residual_model": "v = s A X + B - x with the adjusted X: model axes, model units",
             "standardized": "residual / its standard deviation: a priori if any were given, else by sigma0",
+            "studentized": "residual / its standard deviation by sigma0 of all others: Student",
+            "deviation_factor": "what standard deviations of points to be transformed are multiplied by",
         },
         "method": result.method,
         "start": result.started,
         "status": result.status,
-        "messages": [str(message) for message in result.messages],
+        "usable": result.usable,
+        "messages": result.problems,
         "iterations": len(result.iterations) if result.cycles is None else len(result.cycles),
         "initial": {
             "scale": result.initial.scale,
@@ -72,15 +76,34 @@ def _head(result: OrientedModel) -> dict[str, Any]:
         "translation": similarity.translation,
         "covariance": similarity.covariance,
         "covariance_scale": result.covariance_scale,
+        "deviation_factor": similarity.deviation_factor,
         "rms": result.rms,
         "sigma0": result.sigma0,
         "degrees_of_freedom": result.degrees_of_freedom,
         "known_coordinates": result.known,
         "weighted_sum_of_squares": result.weighted_sum_of_squares,
+        "global_test": _global_test(result.test),
+        "test": {
+            "of": "standardized" if result.decided_by_w else "studentized",
+            "limit": result.limit if np.isfinite(result.limit) else None,
+            "outliers": [[result.stations.ids[row], "XYZ"[axis]] for row, axis in result.outliers],
+        },
         "condition": result.condition,
         "centres": {"control": similarity.control_centre, "model": similarity.model_centre},
         "control": list(_control(result)),
         "rejected": list(_rejected(result)),
+    }
+
+
+def _global_test(test: GlobalTest | None) -> dict[str, Any] | None:
+    if test is None:
+        return None
+    return {
+        "variance_of_unit_weight": test.variance,
+        "limits": test.limits,
+        "probability": test.probability,
+        "rejected_high": test.rejected_high,
+        "rejected_low": test.rejected_low,
     }
 
 
@@ -111,6 +134,7 @@ def _control(result: OrientedModel) -> Iterator[dict[str, Any]]:
             "residual_model": result.model_residuals[row],
             "redundancy": result.redundancy[row],
             "standardized": result.standardized[row],
+            "studentized": result.studentized[row],
             "adjusted": result.adjusted_control[row],
             "covariance": result.control_covariances[row],
         }
@@ -123,36 +147,47 @@ def _rejected(result: OrientedModel) -> Iterator[dict[str, Any]]:
         yield {"id": result.stations.ids[row], "residual_ground": differences[row]}
 
 
-def read_similarity(path: Path) -> Similarity:
+def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     """Read the parameters, with their covariance, out of a JSON document.
+
+    Parameters
+    ----------
+    path
+        The document.
+    usable
+        Whether to refuse an orientation that has not converged, or in which something grave was found.
 
     Raises
     ------
     InputError
-        The file cannot be read or is no such document.
+        The file cannot be read, is no such document, or holds an orientation that is not to be used.
     """
     try:
         found = orjson.loads(read_bytes(path))
     except orjson.JSONDecodeError as error:
         raise InputError(f"is no JSON document: {error}", file=path) from None
     try:
+        if usable and not found.get("usable", found["status"] == "converged"):
+            reasons = "; ".join(map(str, found["messages"])) or found["status"]
+            raise InputError(f"holds an orientation that is not to be used: {reasons}")
         centres = found["centres"]
         return Similarity.from_parameters(
             found["scale"],
             found["rotation"],
             found["translation"],
-            _numbers(found["covariance"]),
+            _known(found["covariance"]),
             control_centre=centres["control"],
             model_centre=centres["model"],
+            deviation_factor=found.get("deviation_factor", 1.0),
         )
     except InputError as error:
         raise InputError(error.message, file=path) from None
-    except (KeyError, TypeError, ValueError):
+    except (AttributeError, KeyError, TypeError, ValueError):
         raise InputError("is no result of an absolute orientation", file=path) from None
 
 
-def _numbers(covariance: list[list[float | None]] | None) -> Floats | None:
-    """Read a covariance; None when it, or an element of it, is unknown."""
+def _known(covariance: list[list[Any]] | None) -> list[list[Any]] | None:
+    """Return a covariance; None when it, or an element of it, is unknown."""
     if covariance is None or any(value is None for row in covariance for value in row):
         return None
-    return np.array(covariance, dtype=np.float64)
+    return covariance

@@ -29,6 +29,7 @@ class Orientation(OrientedModel):
             "residual_ground_": self.residuals_ground,
             "redundancy_": self.redundancy,
             "standardized_": self.standardized,
+            "studentized_": self.studentized,
         }
         columns = {
             prefix + axis: values[self.took_part, k]

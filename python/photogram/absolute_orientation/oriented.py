@@ -11,11 +11,42 @@ from numpy.typing import NDArray
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.adjusted import Iteration
-from photogram.messages import Message
+from photogram.messages import Message, listed
+from photogram.reliability import TESTABLE
+from photogram.statistics import GlobalTest, normal_limit, studentized_limit
 
-__all__ = ["OrientedModel"]
+__all__ = ["OrientedModel", "Trace"]
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """What one cycle of the bulletin computed on its way: its prints under sense switches.
+
+    Coordinates are counted from the centres of both systems.
+
+    Attributes
+    ----------
+    rotation
+        (3, 3) A as the cycle began, after statement 8.
+    equations
+        The m equations, after 27: station (among those that took part) and component of each, and (m, 8)
+        P-values: omega, phi, kappa, s, three translations, constant.
+    normal, auxiliary
+        (7, 8) C after 29 and D after 33.
+    results
+        Seven results of the back solution, after 35.
+    parameters
+        Seven corrected parameters, after 36: omega, phi, kappa in radians, s, b1, b2, b3.
+    """
+
+    rotation: list[list[float]]
+    equations: tuple[list[tuple[int, int]], Floats]
+    normal: Floats
+    auxiliary: Floats
+    results: list[float]
+    parameters: list[float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +88,15 @@ class OrientedModel:
         (n, 3) redundancy numbers of the residuals; they sum to the degrees of freedom.
     standardized
         (n, 3) residuals divided by their own standard deviations: by the a priori ones with standard
-        deviations given (Baarda's w), else by sigma0's; NaN where no other component checks them.
+        deviations given (Baarda's w), else by sigma0's; NaN where no other component checks them. The latter
+        never exceed the root of the degrees of freedom.
+    studentized
+        (n, 3) residuals divided by their own standard deviations, sigma0 being that of all others: Student
+        with one degree of freedom less than the orientation has, and without a bound. NaN with less than two.
+    test
+        The global test of the standard deviations, where they were given and there are degrees of freedom.
+    unit_variance
+        `estimated` or `unity`.
     weighted_sum_of_squares
         Of both systems; without standard deviations the sum of the squared residuals.
     covariance_scale
@@ -67,6 +106,10 @@ class OrientedModel:
         sizes of the model.
     messages
         Remarks that did not stop the orientation.
+    grave
+        Why this is no orientation to be used, though it converged.
+    traces
+        What each cycle of the report's methods computed, where it was asked for.
     """
 
     stations: Stations
@@ -86,15 +129,78 @@ class OrientedModel:
     control_covariances: Floats
     redundancy: Floats
     standardized: Floats
+    studentized: Floats
+    test: GlobalTest | None
+    unit_variance: str
     weighted_sum_of_squares: float
     covariance_scale: float | None
     condition: float
     messages: list[Message]
+    grave: list[Message]
+    traces: list[Trace]
 
     @property
     def converged(self) -> bool:
-        """Whether the values can be used."""
+        """Whether the criterion of convergence was met."""
         return self.status == "converged"
+
+    @property
+    def usable(self) -> bool:
+        """Whether the values can be used: it converged, and nothing grave was found."""
+        return self.converged and not self.grave
+
+    @property
+    def decided_by_w(self) -> bool:
+        """Whether test values are the standardized residuals: standard deviations were given to be relied on.
+
+        Otherwise unit weight is estimated, and they are the studentized ones.
+        """
+        return self.weighted and self.unit_variance == "unity"
+
+    @property
+    def tested(self) -> Floats:
+        """(n, 3) test values of the residuals; NaN where a redundancy number is too small for a test."""
+        values = self.standardized if self.decided_by_w else self.studentized
+        tested: Floats = np.where(self.redundancy >= TESTABLE, values, np.nan)
+        return tested
+
+    @property
+    def limit(self) -> float:
+        """What test values of good control exceed in one of twenty orientations (Bonferroni)."""
+        tests = int(np.isfinite(self.tested).sum())
+        if self.decided_by_w:
+            return normal_limit(tests)
+        return studentized_limit(self.degrees_of_freedom, tests)
+
+    @property
+    def outliers(self) -> list[tuple[int, int]]:
+        """Row and component of the control whose test values exceed the limit, the largest first."""
+        values = np.abs(np.nan_to_num(self.tested))
+        beyond = np.argwhere(values > self.limit).tolist()
+        return sorted(((row, axis) for row, axis in beyond), key=lambda place: -values[place])
+
+    @property
+    def problems(self) -> list[str]:
+        """What keeps a reader from using the values, or should make them careful: the gravest first."""
+        found = [str(message) for message in self.messages]
+        if not self.grave and (outliers := self._outliers_named()):
+            found.insert(0, outliers)
+        found[:0] = [f"{message}; do not use these values" for message in self.grave]
+        if self.test is not None and (failed := self.test.problem()):
+            found.insert(0, failed)
+        if not self.converged:
+            found.insert(0, f"the orientation has {self.status}: do not use these values")
+        return found
+
+    def _outliers_named(self) -> str:
+        ground, unit = self.residuals_ground, self.stations.ground_unit
+        symbol = "w" if self.decided_by_w else "t"
+        named = [
+            f"{self.stations.ids[row]} {'XYZ'[axis]} ({symbol} {self.tested[row, axis]:.3g},"
+            f" wrong by about {ground[row, axis] / self.redundancy[row, axis]:.3g} {unit})"
+            for row, axis in self.outliers
+        ]
+        return f"control beyond the limit {self.limit:.2f} of its test: {listed(named)}" if named else ""
 
     @property
     def weighted(self) -> bool:

@@ -58,10 +58,11 @@ def plot(result: OrientedModel) -> bytes:
 
 def _stations(axes: Axes, result: OrientedModel, rows: NDArray[np.intp], plan: Floats) -> None:
     used = result.used[rows]
+    full, plan_only = used.all(axis=1), ~used[:, 2]
     kinds = (
-        ("full control", used[:, 0] & used[:, 2], "^"),
-        ("horizontal control", used[:, 0] & ~used[:, 2], "s"),
-        ("height control", ~used[:, 0] & used[:, 2], "o"),
+        ("full control", full, "^"),
+        ("horizontal control", plan_only, "s"),
+        ("height control", ~(full | plan_only), "o"),
     )
     for name, chosen, marker in kinds:
         if chosen.any():
@@ -72,11 +73,11 @@ def _stations(axes: Axes, result: OrientedModel, rows: NDArray[np.intp], plan: F
 
 def _residuals(axes: Axes, plan: Floats, drawn: Floats) -> None:
     """Draw residuals, already in the scale of the plan."""
-    flat = np.isfinite(drawn[:, 0])
+    flat = np.isfinite(drawn[:, :2]).any(axis=1)
     if flat.any():
         axes.quiver(
             *plan[flat].T,
-            *drawn[flat, :2].T,
+            *np.nan_to_num(drawn[flat, :2]).T,
             angles="xy",
             scale_units="xy",
             scale=1,

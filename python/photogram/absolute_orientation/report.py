@@ -18,8 +18,6 @@ __all__ = ["report", "summary"]
 Floats = NDArray[np.float64]
 
 AXES = ("X", "Y", "Z")
-TEST = 3.0
-"""Standardized residuals beyond this are marked."""
 
 
 def report(result: OrientedModel) -> str:
@@ -39,18 +37,11 @@ def report(result: OrientedModel) -> str:
 def summary(result: OrientedModel) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, figures, parameters, control."""
     return [
-        ("Problems", _problems(result)),
+        ("Problems", result.problems or ["none"]),
         ("Orientation", _figures(result)),
         ("Parameters: x = s A X + B", _parameters(result)),
         ("Control: residuals u = s X - A^T (x - B), known components", _control(result)),
     ]
-
-
-def _problems(result: OrientedModel) -> list[str]:
-    problems = [str(message) for message in result.messages]
-    if not result.converged:
-        problems.insert(0, f"the orientation has {result.status}: do not use these values")
-    return problems or ["none"]
 
 
 def _figures(result: OrientedModel) -> list[str]:
@@ -73,8 +64,7 @@ def _figures(result: OrientedModel) -> list[str]:
         ("status", f"{result.status} after {done} iterations ({result.method})"),
         ("initial values", starts[result.started]),
         ("stations", f"{int(result.took_part.sum())} of {len(stations.ids)} took part"),
-        ("horizontal pairs, elevations", f"{given[0]}, {given[2]}"),
-        ("known coordinates", f"{result.known}"),
+        ("known coordinates", f"{result.known}: {given[0]} X, {given[1]} Y, {given[2]} Z"),
         ("degrees of freedom", f"{result.degrees_of_freedom}"),
         (
             "rms of residuals",
@@ -109,19 +99,32 @@ def _row(values: Floats) -> str:
 
 def _control(result: OrientedModel) -> list[str]:
     unit, ground = result.stations.model_unit, result.stations.ground_unit
-    lines = [
-        f"{'station':<12}   {unit:>14} {ground:>14} {'redundancy':>11} {'standardized':>13}",
-    ]
+    columns = {"redundancy": (result.redundancy, 3), "studentized": (result.studentized, 2)}
+    if result.weighted:
+        columns["standardized"] = (result.standardized, 2)
+    lines = [f"{'station':<12}   {unit:>14} {ground:>14}" + "".join(f"{name:>14}" for name in columns)]
+    outliers = set(result.outliers)
     for row in np.flatnonzero(result.took_part).tolist():
         for axis in np.flatnonzero(result.used[row]).tolist():
-            tested = result.standardized[row, axis]
-            mark = "  <--" if abs(tested) > TEST else ""
+            mark = "  <--" if (row, axis) in outliers else ""
+            values = "".join(_number(values[row, axis], 14, places) for values, places in columns.values())
             lines.append(
                 f"{result.stations.ids[row]:<12} {AXES[axis]} {result.residuals[row, axis]:>14.5g}"
-                f" {result.residuals_ground[row, axis]:>14.5g} {result.redundancy[row, axis]:>11.3f}"
-                f"{_number(tested, 14, 2)}{mark}"
+                f" {result.residuals_ground[row, axis]:>14.5g}{values}{mark}"
             )
-    return lines
+    return [*lines, _limit(result)]
+
+
+def _limit(result: OrientedModel) -> str:
+    if not math.isfinite(result.limit):
+        return "no test: it takes two degrees of freedom"
+    tests = int(np.isfinite(result.tested).sum())
+    kind = (
+        "standardized residual, normal distribution"
+        if result.decided_by_w
+        else f"studentized residual, Student with {result.degrees_of_freedom - 1} degrees of freedom"
+    )
+    return f"tested: {kind}; limit {result.limit:.2f} (5 percent for all {tests} tests together)"
 
 
 def _model_residuals(result: OrientedModel) -> list[str]:
@@ -180,7 +183,9 @@ def _deviations(sd: Sequence[float] | Floats) -> str:
 
 
 def _number(value: float, width: int, decimals: int) -> str:
-    return f"{value:>{width}.{decimals}f}" if math.isfinite(value) else f"{'-':>{width}}"
+    if not math.isfinite(value):
+        return f"{'-':>{width}}"
+    return f"{value:>{width}.{decimals}f}" if abs(value) < 1e6 else f"{value:>{width}.4g}"
 
 
 def _general(value: float) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
+from photogram.arrays import number, numbers, shaped
 from photogram.errors import InputError
 from photogram.geometry import rotation_angles
 
@@ -18,6 +20,8 @@ Floats = NDArray[np.float64]
 
 ORTHOGONAL = 1e-6
 """Elements of A A^T - I that a matrix read from a file may have."""
+INDEFINITE = 1e-6
+"""By how much a matrix of correlations may be unsymmetric, or its least eigenvalue negative: rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,10 @@ class Similarity:
     tangent_covariance
         (7, 7) of three small rotations about the model axes (rad), s and shift; it is regular at every
         attitude. None when it is unknown.
+    deviation_factor
+        What the standard deviations of points to be transformed are multiplied by. Where those of the
+        stations were given and the covariance is scaled by sigma0 squared, sigma0: an error of the unit
+        weight is one of the points as well. Else 1.
     """
 
     scale: float
@@ -46,9 +54,15 @@ class Similarity:
     model_centre: Floats
     shift: Floats
     tangent_covariance: Floats | None = None
+    deviation_factor: float = 1.0
 
     @classmethod
-    def from_core(cls, row: _photocore.CentredRow, tangent_covariance: Floats | None = None) -> Self:
+    def from_core(
+        cls,
+        row: _photocore.CentredRow,
+        tangent_covariance: Floats | None = None,
+        deviation_factor: float = 1.0,
+    ) -> Self:
         """Take over what the core returns."""
         scale, rotation, shift, control_centre, model_centre = row
         return cls(
@@ -58,6 +72,7 @@ class Similarity:
             np.array(model_centre),
             np.array(shift),
             tangent_covariance,
+            deviation_factor,
         )
 
     @classmethod
@@ -70,6 +85,7 @@ class Similarity:
         *,
         control_centre: ArrayLike = (0.0, 0.0, 0.0),
         model_centre: ArrayLike = (0.0, 0.0, 0.0),
+        deviation_factor: float = 1.0,
     ) -> Self:
         """Make a similarity from x = s A X + B.
 
@@ -81,36 +97,42 @@ class Similarity:
             (7, 7) of omega, phi, kappa (rad), s, b1, b2, b3, or None.
         control_centre, model_centre
             (3,) where to count from; any points amid the stations.
+        deviation_factor
+            What the standard deviations of points are multiplied by.
 
         Raises
         ------
         InputError
-            A scale that is not positive, a matrix that is no rotation, a covariance of another shape.
+            A scale that is not positive, a matrix that is no rotation, a covariance that is none, what is no
+            number or not finite.
         """
-        a, b = np.array(rotation, dtype=np.float64), np.array(translation, dtype=np.float64)
-        if a.shape != (3, 3) or b.shape != (3,):
-            raise InputError(f"a rotation is (3, 3) and a translation (3,), not {a.shape} and {b.shape}")
-        if not (np.abs(a @ a.T - np.eye(3)).max() < ORTHOGONAL and np.linalg.det(a) > 0):
+        a, b = shaped("rotation", rotation, (3, 3)), shaped("translation", translation, (3,))
+        scale, deviation_factor = number("scale", scale), number("deviation_factor", deviation_factor)
+        if not (
+            np.abs(a).max() < 2 and np.abs(a @ a.T - np.eye(3)).max() < ORTHOGONAL and np.linalg.det(a) > 0
+        ):
             raise InputError("the nine direction cosines do not make a rotation")
-        if not (scale > 0 and np.isfinite(scale) and np.isfinite(b).all()):
-            raise InputError("a similarity needs a positive scale and a finite translation")
-        centre, model = np.array(control_centre, dtype=np.float64), np.array(model_centre, dtype=np.float64)
-        made = cls(float(scale), a, centre, model, b + scale * a @ centre - model)
+        if not (0 < scale < math.inf and 0 < deviation_factor < math.inf):
+            raise InputError("a similarity needs a positive scale and a positive factor of deviations")
+        centre, model = (
+            shaped(name, value, (3,))
+            for name, value in (("control_centre", control_centre), ("model_centre", model_centre))
+        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            shift = b + scale * a @ centre - model
+        if not np.isfinite(shift).all():
+            raise InputError("a similarity needs a finite translation and finite centres")
+        made = cls(scale, a, centre, model, shift, None, deviation_factor)
         return made if covariance is None else made._with_covariance(covariance)
 
     def _with_covariance(self, covariance: ArrayLike) -> Self:
-        given = np.array(covariance, dtype=np.float64)
-        if given.shape != (7, 7):
-            raise InputError(f"the covariance of a similarity is (7, 7), not {given.shape}")
-        back = np.linalg.inv(self.parameter_partials)
-        return type(self)(
-            self.scale,
-            self.rotation,
-            self.control_centre,
-            self.model_centre,
-            self.shift,
-            back @ given @ back.T,
-        )
+        given = shaped("covariance", covariance, (7, 7))
+        with np.errstate(all="ignore"):
+            back = np.linalg.inv(self.parameter_partials)
+            tangent: Floats = back @ given @ back.T
+        if not (_is_covariance(given) and np.isfinite(tangent).all()):
+            raise InputError("the covariance of the similarity is none")
+        return replace(self, tangent_covariance=tangent)
 
     @property
     def translation(self) -> Floats:
@@ -143,7 +165,7 @@ class Similarity:
 
     def to_model(self, control: ArrayLike) -> Floats:
         """Model coordinates x = s A X + B, (n, 3), of (n, 3) control coordinates (TB 19, equation 2.1)."""
-        centred = np.asarray(control, dtype=np.float64) - self.control_centre
+        centred = _rows("control", control) - self.control_centre
         model: Floats = self.scale * centred @ self.rotation.T + self.shift + self.model_centre
         return model
 
@@ -156,7 +178,7 @@ class Similarity:
             (n, 3) model coordinates.
         model_sd
             (n, 3) their own standard deviations in model units, or anything that broadcasts to that; 0 for
-            the covariance that the parameters alone give.
+            the covariance that the parameters alone give. They count times `deviation_factor`.
 
         Returns
         -------
@@ -165,11 +187,14 @@ class Similarity:
 
         Raises
         ------
-        ValueError
-            Another shape.
+        InputError
+            Another shape, or what is no number.
         """
-        points = np.asarray(model, dtype=np.float64)
-        sd = np.broadcast_to(np.asarray(model_sd, dtype=np.float64), points.shape)
+        points = _rows("model", model)
+        try:
+            sd = np.broadcast_to(numbers("model_sd", model_sd), points.shape) * self.deviation_factor
+        except ValueError:
+            raise InputError(f"model_sd does not broadcast to the shape of model, {points.shape}") from None
         covariance = self.tangent_covariance
         known = np.full((7, 7), np.nan) if covariance is None else covariance
         return _photocore.transform_points(self._row(), known, points, sd)
@@ -182,3 +207,24 @@ class Similarity:
             self.control_centre.tolist(),
             self.model_centre.tolist(),
         )
+
+
+def _is_covariance(matrix: Floats) -> bool:
+    """Whether variances are not negative, and no combination's is but for rounding."""
+    variances = np.diag(matrix)
+    if not (np.isfinite(matrix).all() and (variances >= 0).all()):
+        return False
+    unit = np.sqrt(np.where(variances > 0, variances, 1.0))
+    correlations = matrix / unit / unit[:, np.newaxis]
+    return bool(
+        np.abs(correlations - correlations.T).max() < INDEFINITE
+        and np.linalg.eigvalsh(correlations)[0] > -INDEFINITE
+    )
+
+
+def _rows(name: str, values: ArrayLike) -> Floats:
+    """Return an array (n, 3)."""
+    array = numbers(name, values)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"{name} has the shape {array.shape}, not (n, 3)")
+    return array

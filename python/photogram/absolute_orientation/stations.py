@@ -10,12 +10,20 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from photogram.arrays import frozen, names, numbers, text
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["CONTROL_COLUMNS", "CONTROL_SD_COLUMNS", "MODEL_COLUMNS", "MODEL_SD_COLUMNS", "Stations"]
+__all__ = [
+    "CONTROL_COLUMNS",
+    "CONTROL_SD_COLUMNS",
+    "MODEL_COLUMNS",
+    "MODEL_SD_COLUMNS",
+    "Stations",
+    "numbers",
+]
 
 Floats = NDArray[np.float64]
 
@@ -29,14 +37,15 @@ MODEL_SD_COLUMNS = ("sd_x", "sd_y", "sd_z")
 class Stations:
     """The stations of a model, in their order; arrays are copied and checked.
 
-    A station without any control coordinate is a point to be transformed.
+    A station without any control coordinate is a point to be transformed. The arrays cannot be written, so
+    that results made from them stay what they are.
 
     Attributes
     ----------
     ids
         (n,) identifiers, each once.
     control
-        (n, 3) control coordinates X, Y, Z in ground units; NaN where unknown. X and Y come as a pair.
+        (n, 3) control coordinates X, Y, Z in ground units; NaN where unknown. Each counts by itself.
     model
         (n, 3) model coordinates x, y, z in model units.
     control_sd
@@ -44,15 +53,16 @@ class Stations:
         0 exact (the default), infinite for a known coordinate that takes no part.
     model_sd
         (n, 3) standard deviations of the model coordinates in model units, or anything that broadcasts to
-        that; positive. None when only their equality is known: sigma0 then is their standard deviation.
+        that; 0 for exact ones, where the control is not. None when only their equality is known: sigma0 then
+        is their standard deviation.
     ground_unit, model_unit
         Names of the units, for reports.
 
     Raises
     ------
     InputError
-        Shapes that do not fit, an identifier that occurs twice, half a horizontal pair, a model coordinate
-        that is not finite, a standard deviation that cannot be.
+        Shapes that do not fit, what is no number, an identifier that occurs twice, a model coordinate that is
+        not finite, a standard deviation that cannot be, a coordinate that is exact in both systems.
     """
 
     ids: Sequence[str]
@@ -74,15 +84,15 @@ class Stations:
         ground_unit: str = "ground unit",
         model_unit: str = "model unit",
     ) -> None:
-        names = tuple(str(name) for name in ids)
+        found = names("ids", ids)
         put = object.__setattr__  # the dataclass is frozen
-        put(self, "ids", names)
-        put(self, "control", _table("control", control, len(names)))
-        put(self, "model", _table("model", model, len(names)))
-        put(self, "control_sd", _table("control_sd", control_sd, len(names)))
-        put(self, "model_sd", None if model_sd is None else _table("model_sd", model_sd, len(names)))
-        put(self, "ground_unit", ground_unit)
-        put(self, "model_unit", model_unit)
+        put(self, "ids", tuple(found))
+        put(self, "control", _table("control", control, len(found)))
+        put(self, "model", _table("model", model, len(found)))
+        put(self, "control_sd", _table("control_sd", control_sd, len(found)))
+        put(self, "model_sd", None if model_sd is None else _table("model_sd", model_sd, len(found)))
+        put(self, "ground_unit", text("ground_unit", ground_unit))
+        put(self, "model_unit", text("model_unit", model_unit))
         self._check()
 
     @classmethod
@@ -134,15 +144,15 @@ class Stations:
             raise InputError(f"station {repeated[0]} occurs more than once")
         self._refuse(~np.isfinite(self.model), "has a model coordinate that is not a finite number")
         self._refuse(np.isinf(self.control), "has a control coordinate that is not a finite number")
-        pair = self.given[:, :2]
-        self._refuse(pair[:, :1] != pair[:, 1:], "has one horizontal coordinate; they come as a pair")
         sd = np.where(self.given, self.control_sd, 0.0)
         self._refuse(~(sd >= 0), "has a standard deviation of control that is not zero or positive")
-        held = self.held[:, :2]
-        self._refuse(held[:, :1] != held[:, 1:], "has one held horizontal coordinate; they come as a pair")
         if self.model_sd is not None:
-            positive = (self.model_sd > 0) & np.isfinite(self.model_sd)
-            self._refuse(~positive, "has a standard deviation of the model that is not positive and finite")
+            positive = (self.model_sd >= 0) & np.isfinite(self.model_sd)
+            self._refuse(
+                ~positive, "has a standard deviation of the model that is not finite, zero or positive"
+            )
+            exact = self.held & (sd == 0) & (self.model_sd == 0).all(axis=1, keepdims=True)
+            self._refuse(exact, "has a coordinate whose standard deviation is zero in both systems")
         elif (sd[self.held] > 0).any():
             raise InputError(
                 "the control has standard deviations but the model has none:"
@@ -155,11 +165,11 @@ class Stations:
 
 
 def _table(name: str, values: ArrayLike, count: int) -> Floats:
-    array = np.array(values, dtype=np.float64)
+    array = numbers(name, values, missing=name == "control")
     if array.ndim == 2 and array.shape != (count, 3):
         raise InputError(f"{name} has the shape {array.shape}, not ({count}, 3)")
     try:
-        return np.broadcast_to(array, (count, 3)).copy()
+        return frozen(np.broadcast_to(array, (count, 3)))
     except ValueError:
         raise InputError(
             f"{name} has the shape {array.shape}, which does not broadcast to ({count}, 3)"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
+from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import orjson
@@ -18,7 +18,12 @@ from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
 from photogram.errors import InputError
-from photogram.files import reading, whole
+from photogram.files import reading
+from photogram.messages import quoted
+from photogram.numbers import finite_number
+from photogram.places import Place
+from photogram.rows import LONGEST_RECORD, cells
+from photogram.writing import OutputSet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,6 +64,7 @@ def transform_file(
     decimals: int = 6,
     point_sd: float = 0.0,
     document: Document | None = None,
+    outputs: OutputSet | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> int:
     """Transform the points of a file into another file: control coordinates and their standard deviations.
@@ -80,6 +86,8 @@ def transform_file(
         Standard deviation of each coordinate of a point in model units, where the file has none.
     document
         A JSON document to write the points into as well, with their full covariances.
+    outputs
+        The set that the files belong to, which puts them in place; without one they are a set of their own.
     progress
         Called after each chunk with the number of points done; an exception it raises stops the work.
 
@@ -90,21 +98,25 @@ def transform_file(
     Raises
     ------
     InputError
-        The file cannot be read, has other columns, no points, or a field that is no number; names file,
-        record and text.
+        An output is the input, or both are one file; the file cannot be read, has other columns, no points,
+        or a field that is no number; names file, record and text.
     OSError
         A file cannot be written.
     """
+    if not 0 <= point_sd < np.inf:
+        raise InputError(f"point_sd is not a standard deviation: {point_sd}")
+    source, target = Path(source), Path(target)
     done = 0
-    with ExitStack() as files:
-        out = files.enter_context(whole(target))
-        json = files.enter_context(whole(document.path)) if document else None
+    with OutputSet([source]) if outputs is None else nullcontext(outputs) as files:
+        out = files.open(target)
+        json = files.open(document.path) if document else None
         out.write(OUTPUT)
         if document and json:
             json.write(document.head + document.first)
         separator = b"," if document and document.first else b""
         for ids, points, sd in _chunks(source):
             positions, covariances = similarity.transform(points, point_sd if sd is None else sd)
+            _check_finite(ids, positions, source)
             out.write(_lines(ids, positions, covariances, decimals))
             if json:
                 json.write(separator + point_rows(ids, positions, covariances))
@@ -114,13 +126,15 @@ def transform_file(
                 progress(done)
         if not done:
             raise InputError("holds no points", file=source)
-        _close(json)
+        if json:
+            json.write(b"\n  ]\n}")
     return done
 
 
-def _close(json: BinaryIO | None) -> None:
-    if json:
-        json.write(b"\n  ]\n}")
+def _check_finite(ids: list[str], positions: Floats, source: Path) -> None:
+    beyond = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if beyond.size:
+        raise InputError(f"point {ids[beyond[0]]} is beyond double precision once transformed", file=source)
 
 
 def decimals_for(deviation: float) -> int:
@@ -132,7 +146,8 @@ def decimals_for(deviation: float) -> int:
 
 def _lines(ids: list[str], positions: Floats, covariances: Floats, decimals: int) -> bytes:
     """Return the lines of a chunk; orjson writes numbers far faster than pandas."""
-    sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    # Rounding can leave a variance below zero.
+    sd = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
     known = bool(np.isfinite(sd).all())
     values: list[Floats] = [np.round(positions, decimals)]
     if known:
@@ -182,17 +197,22 @@ def _chunks(source: Path) -> Iterator[tuple[list[str], Floats, Floats | None]]:
 def _layout(source: Path) -> tuple[list[str], dict[str, Any]]:
     """Find the columns of a file of points, and how pandas is to read them."""
     with reading(source), source.open(encoding="utf-8-sig", errors="replace") as file:
-        first = next((line for line in file if line.strip()), "")
-    names = header(first.rstrip("\r\n").split(","))
+        # A line that does not end where a record must is not read to its end.
+        lines = iter(lambda: file.readline(LONGEST_RECORD + 1), "")
+        number, first = next(((k, line) for k, line in enumerate(lines, 1) if line.strip()), (0, ""))
+    place = Place(source, number, first.rstrip("\r\n"))
+    names = header(place)
     if "x" not in names:
         if not first:
             raise InputError("holds no points", file=source)
         separator = "," if "," in first else r"\s+"
         return [*MODEL_COLUMNS, "id"], {"names": [*MODEL_COLUMNS, "id"], "header": None, "sep": separator}
+    if repeated := [name for name, count in Counter(names).items() if count > 1]:
+        raise place.error(f"the column {quoted(repeated[0])} is there twice")
     wanted = {"id", *MODEL_COLUMNS, *(MODEL_SD_COLUMNS if set(names) & set(MODEL_SD_COLUMNS) else ())}
     missing = sorted(wanted - set(names))
     if missing:
-        raise InputError(f"the header lacks the column {missing[0]!r}", file=source, text=first.rstrip())
+        raise place.error(f"the header lacks the column {missing[0]!r}")
     return names, {"names": names, "header": 0}
 
 
@@ -204,6 +224,8 @@ def _checked(table: pd.DataFrame, weighted: bool) -> tuple[list[str], Floats, Fl
     # pandas takes the first column for an index where rows have one field more than the header.
     if not isinstance(table.index, pd.RangeIndex):
         raise ValueError("a record has more fields than the header")
+    if any("\n" in name or "\r" in name for name in table["id"]):
+        raise ValueError("an id holds the end of a line")
     if not np.isfinite(points).all() or (sd is not None and not (sd >= 0).all()):
         raise ValueError("a coordinate is not a finite number, or a standard deviation is negative")
     return table["id"].tolist(), points, sd
@@ -215,29 +237,32 @@ def _fault(source: Path, names: list[str]) -> InputError | None:
     with source.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         seen_header = names[-1] == "id" and names[0] == "x"
         for number, raw in enumerate(file, 1):
-            line = raw.rstrip("\r\n")
+            place = Place(source, number, raw.rstrip("\r\n"))
+            line = place.text or ""
             if not line.strip():
                 continue
-            if not seen_header and "x" in header(line.split(",")):
+            if not seen_header:
                 seen_header = True
                 continue
-            cells = next(csv.reader([line])) if "," in line else line.split()
-            if len(cells) != len(names):
-                text = f"has {len(cells)} fields, not {len(names)}"
-                return InputError(text, file=source, record=number, text=line)
-            fields = dict(zip(names, cells, strict=True))
+            try:
+                found = cells(place) if "," in line else line.split()
+            except InputError as error:
+                return error
+            if len(found) != len(names):
+                return place.error(f"has {len(found)} fields, not {len(names)}")
+            fields = dict(zip(names, found, strict=True))
             for name in numeric:
                 if not _readable(fields[name], name):
-                    text = f"column {name}: {fields[name]!r} is not a finite number"
-                    if name in MODEL_SD_COLUMNS:
-                        text += ", zero or positive"
-                    return InputError(text, file=source, record=number, text=line)
+                    positive = ", zero or positive" if name in MODEL_SD_COLUMNS else ""
+                    return place.error(
+                        f"column {name}: {quoted(fields[name])} is not a finite number{positive}"
+                    )
     return None
 
 
 def _readable(text: str, name: str) -> bool:
     try:
-        value = float(text)
+        value = finite_number(text)
     except ValueError:
         return False
-    return bool(np.isfinite(value)) and (name in MODEL_COLUMNS or value >= 0)
+    return name in MODEL_COLUMNS or value >= 0

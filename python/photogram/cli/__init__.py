@@ -1,86 +1,45 @@
-"""The command line: one command for each program, and `plan` and `simulate`.
+"""The command line.
 
-Results go to files and standard output, errors and progress to standard error. Heavy modules are imported by
-the commands that need them, so that `photogram --help` is quick.
+Nothing but what ends it cleanly is imported before that is in place.
 """
 
 from __future__ import annotations
 
-from importlib.metadata import version as version_of
-from typing import Annotated
+import sys
+from typing import TYPE_CHECKING
 
-import typer
+from photogram.cli.ending import end_by_signals, ignore_signals
 
-from photogram.cli import (
-    absolute_orientation,
-    check,
-    collection,
-    comparator,
-    giant,
-    perspective_center,
-    plan,
-    simulate,
-    stellar_camera,
-)
-from photogram.cli.console import output
-from photogram.cli.groups import GroupWithMain
+if TYPE_CHECKING:
+    from photogram.cli.commands import app
 
 __all__ = ["app", "main"]
 
-app = typer.Typer(
-    name="photogram",
-    help="Photogrammetric least-squares adjustment with the covariance of every result.",
-    epilog="Exit codes: 0 converged, 1 input or output at fault, 2 usage, 3 not converged, diverged or"
-    " something grave found.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-giant_app = typer.Typer(name="giant", cls=GroupWithMain, help="Adjust or check a GIANT project.")
-giant_app.command("adjust")(giant.giant)
-giant_app.command("check")(check.check)
-comparator_app = typer.Typer(
-    name="comparator", cls=GroupWithMain, help="Calibrate a comparator, or correct measurements."
-)
-comparator_app.command("calibrate")(comparator.comparator)
-comparator_app.command("correct")(comparator.correct)
-orientation_app = typer.Typer(
-    name="absolute-orientation", cls=GroupWithMain, help="Orient a model absolutely, or transform its points."
-)
-orientation_app.command("orient")(absolute_orientation.absolute_orientation)
-orientation_app.command("transform")(absolute_orientation.transform)
-stellar_app = typer.Typer(
-    name="stellar-camera",
-    cls=GroupWithMain,
-    help="Calibrate a camera by a plate with stars, or by exposures of the sky.",
-)
-stellar_app.command("plate")(stellar_camera.stellar_camera)
-stellar_app.command("exposures")(stellar_camera.exposures)
-app.add_typer(giant_app)
-app.add_typer(orientation_app)
-app.add_typer(comparator_app)
-app.command("collection")(collection.collection)
-app.command("perspective-center")(perspective_center.perspective_center)
-app.add_typer(stellar_app)
-app.command()(plan.plan)
-app.command()(simulate.simulate)
-
 
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line: every end is an exit code, see `docs/command-line.md`."""
+    end_by_signals()
+    from photogram.cli.streams import finish, open_streams, stream_fault
+
+    open_streams()
+    code: int | str | None = 0
+    try:
+        from photogram.cli.commands import app
+
+        app()
+    except SystemExit as end:
+        code = end.code
+    except OSError as error:
+        # Commands name their own files: what is left are the standard streams, to which help goes.
+        code = stream_fault(error)
+    code = finish(code)
+    ignore_signals()
+    sys.exit(code)
 
 
-def _version(asked: bool) -> None:
-    if asked:
-        output.print(f"photogram {version_of('photogram')}")
-        raise typer.Exit
+def __getattr__(name: str) -> object:
+    if name == "app":
+        from photogram.cli.commands import app
 
-
-@app.callback()
-def _photogram(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
-    ] = False,
-) -> None:
-    """Photogrammetric least-squares adjustment with the covariance of every result."""
+        return app
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, errors, failures, output, print_sections, print_written
+from photogram.cli.console import NOT_CONVERGED, errors, output, print_sections, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet
-from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity, Stations
     from photogram.messages import Message
+    from photogram.writing import OutputSet
 
 __all__ = ["absolute_orientation", "transform"]
 
@@ -59,9 +60,12 @@ class UnitVariance(StrEnum):
     UNITY = "unity"
 
 
+@with_job
 def absolute_orientation(
+    job: Job,
     file: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Argument(
             metavar="FILE",
             help="Stations: CSV (id,X,Y,Z,x,y,z; empty where unknown) or the cards of part I.",
@@ -73,6 +77,7 @@ def absolute_orientation(
     ] = False,
     points: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Option(
             metavar="FILE",
             help="Model points to transform as well: CSV (id,x,y,z) or lines x y z number.",
@@ -81,6 +86,7 @@ def absolute_orientation(
     ] = None,
     points_out: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="FILE",
             help="Where they go, as CSV. Default: POINTS-transformed.csv beside them.",
@@ -89,11 +95,24 @@ def absolute_orientation(
     ] = None,
     json: JsonFile = None,
     listing: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the listing as text.", show_default=False)
+        Path | None,
+        Writes.FILE,
+        typer.Option(metavar="FILE", help="Write the listing as text.", show_default=False),
     ] = None,
     plot: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(metavar="FILE", help="Draw the residuals of the control (PNG).", show_default=False),
+    ] = None,
+    trace: Annotated[
+        Path | None,
+        Writes.FILE,
+        typer.Option(
+            metavar="FILE",
+            help="Write the bulletin's eight prints under sense switches, cycle by cycle (--method report or"
+            " fill-in).",
+            show_default=False,
+        ),
     ] = None,
     reject: Annotated[
         list[str] | None,
@@ -103,6 +122,7 @@ def absolute_orientation(
     ] = None,
     restart: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Option(metavar="JSON", help="Start from a former result (its --json).", show_default=False),
     ] = None,
     start: Annotated[
@@ -140,21 +160,29 @@ def absolute_orientation(
     """Orient a model absolutely: s, A, B of x = s A X + B from full, horizontal and height control.
 
     Prints problems, figures, parameters and residuals; writes what is asked for, whole or not at all.
-    Stations without control are transformed too.
+    Stations without control are transformed too. Exit code 3: not converged, or control that does not fit.
     """
     if example == (file is not None):
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
-    with failures(), ExitStack() as resources:
+    if trace and method is Method.RIGOROUS:
+        raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
+    with job, ExitStack() as resources:
         from photogram import orient
         from photogram.absolute_orientation.document import read_similarity
         from photogram.absolute_orientation.report import summary
-        from photogram.files import spare
+        from photogram.messages import Message
 
+        target = points_out
         if file is None:
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
             file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
-            points_out = points_out or (Path("points-transformed.csv") if points is None else None)
-            points = points or directory / "points.csv"
+            if points is None:
+                points, target = directory / "points.csv", target or Path("points-transformed.csv")
+            job.reads(file, points)
+        if points and not target:
+            target = points.with_name(f"{points.stem}-transformed.csv")
+        if target and target is not points_out:
+            job.writes(target)
         stations, former, messages = _read(file, format, zero_missing, ground_unit, model_unit)
         result = orient(
             stations,
@@ -163,33 +191,41 @@ def absolute_orientation(
             former=read_similarity(restart) if restart else former,
             reject=reject or (),
             unit_variance=unit_variance.value,
+            trace=trace is not None,
         )
         result.messages[:0] = messages
-        made = _small_files(result, listing, plot, None if points else json)
+        if points and not result.usable:
+            result.messages.append(Message("no points were transformed: the orientation is not to be used"))
+            points = None
+        made = _small_files(result, listing, plot, trace, None if points else json)
         written = list(made)
-        inputs = [each for each in (file, restart, points) if each]
-        if points:
-            target = points_out or points.with_name(f"{points.stem}-transformed.csv")
-            spare([target, *([json] if json else []), *made], inputs)
-            _stream(result, points, target, json, point_sd, decimals, quiet)
-            written = [target, *([json] if json else []), *written]
-        write_results(made, inputs)
+        with job.outputs() as outputs:
+            if points and target:
+                _stream(outputs, result, points, target, json, point_sd, decimals, quiet)
+                written = [target, *([json] if json else []), *written]
+            for path, content in made.items():
+                outputs.write(path, content)
         if not quiet:
             print_sections(summary(result), "the listing", SHOWN)
             print_written(written)
-    if not result.converged:
+    if not result.usable:
         raise typer.Exit(NOT_CONVERGED)
 
 
+@with_job
 def transform(
+    job: Job,
     result: Annotated[
         Path,
+        Reads.FILE,
         typer.Argument(metavar="RESULT", help="The --json of an orientation, or the two records of part II."),
     ],
     points: Annotated[
-        Path, typer.Argument(metavar="POINTS", help="Model points: CSV (id,x,y,z) or lines x y z number.")
+        Path,
+        Reads.FILE,
+        typer.Argument(metavar="POINTS", help="Model points: CSV (id,x,y,z) or lines x y z number."),
     ],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="CSV: id,X,Y,Z,sd_X,sd_Y,sd_Z.")],
+    out: Annotated[Path, Writes.FILE, typer.Argument(metavar="OUT", help="CSV: id,X,Y,Z,sd_X,sd_Y,sd_Z.")],
     point_sd: Annotated[
         float, typer.Option(min=0.0, help="Standard deviation of the points' own coordinates, model units.")
     ] = 0.0,
@@ -197,13 +233,19 @@ def transform(
     quiet: Quiet = False,
 ) -> None:
     """Transform any number of model points by a former orientation (part II)."""
-    with failures():
+    with job:
         from photogram.absolute_orientation import transform_file
 
         similarity = _former(result)
-        with _progress(points, quiet) as progress:
+        with job.outputs() as outputs, _progress(points, quiet) as progress:
             count = transform_file(
-                similarity, points, out, decimals=decimals, point_sd=point_sd, progress=progress
+                similarity,
+                points,
+                out,
+                decimals=decimals,
+                point_sd=point_sd,
+                outputs=outputs,
+                progress=progress,
             )
         if not quiet:
             output.print(f"{count} points written: {escape(str(out))}")
@@ -216,7 +258,7 @@ def _former(path: Path) -> Similarity:
     from photogram.files import read_lines
 
     document = any(line.lstrip().startswith("{") for line in read_lines(path)[:1])
-    return read_similarity(path) if document else read_transformation(path)
+    return read_similarity(path, usable=True) if document else read_transformation(path)
 
 
 def _read(
@@ -232,7 +274,7 @@ def _read(
 
 
 def _small_files(
-    result: Orientation, listing: Path | None, plot: Path | None, json: Path | None
+    result: Orientation, listing: Path | None, plot: Path | None, trace: Path | None, json: Path | None
 ) -> dict[Path, bytes]:
     """Make everything that is small, before anything is written."""
     made: dict[Path, bytes] = {}
@@ -240,12 +282,17 @@ def _small_files(
         made[listing] = result.report().encode()
     if plot:
         made[plot] = result.plot()
+    if trace:
+        from photogram.absolute_orientation.trace import trace_text
+
+        made[trace] = trace_text(result).encode()
     if json:
         made[json] = result.to_json()
     return made
 
 
 def _stream(
+    outputs: OutputSet,
     result: Orientation,
     points: Path,
     target: Path,
@@ -271,6 +318,7 @@ def _stream(
             decimals=decimals,
             point_sd=point_sd,
             document=document,
+            outputs=outputs,
             progress=progress,
         )
 

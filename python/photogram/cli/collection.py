@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.console import NOT_CONVERGED, errors, failures, print_sections, print_written
+from photogram.cli.console import NOT_CONVERGED, errors, print_sections, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads
 from photogram.cli.progress import shown
 
@@ -34,9 +35,12 @@ class Loss(StrEnum):
 _LOSSES: dict[Loss, robust.Loss | None] = {Loss.SQUARES: None, Loss.HUBER: "huber", Loss.CAUCHY: "cauchy"}
 
 
+@with_job
 def collection(
+    job: Job,
     problem: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Argument(
             metavar="FILE",
             help='Collection in the format of "Bundle Adjustment in the Large", plain, .bz2 or .gz.',
@@ -49,6 +53,7 @@ def collection(
     ] = False,
     out: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="OUT",
             help="Write the adjusted collection in the same format, packed if it ends in .bz2 or .gz.",
@@ -56,7 +61,7 @@ def collection(
         ),
     ] = None,
     report: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the report.", show_default=False)
+        Path | None, Writes.FILE, typer.Option(metavar="FILE", help="Write the report.", show_default=False)
     ] = None,
     json: JsonFile = None,
     loss: Annotated[
@@ -89,14 +94,14 @@ def collection(
     """Adjust photos of unknown cameras by Levenberg-Marquardt steps, however far the start."""
     if example == (problem is not None):
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from photogram.collection import adjust, read, to_bytes
         from photogram.collection.report import summary
-        from photogram.files import write_whole
 
         if problem is None:
             packaged = files("photogram") / "examples" / "collection" / EXAMPLE
             problem = resources.enter_context(as_file(packaged))
+            job.reads(problem)
         photos = read(problem)
         photos = photos.replace(image_sd=sd)
         with errors.status("adjusting", spinner="line") if not quiet else nullcontext() as status:
@@ -118,7 +123,7 @@ def collection(
             written[report] = result.report().encode()
         if json is not None:
             written[json] = result.to_json()
-        write_whole(written)
+        job.write(written)
         if not quiet:
             print_sections((section for section in summary(result) if section[1]), "the report")
             print_written(written)

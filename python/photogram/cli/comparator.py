@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import time
 from contextlib import ExitStack
+from dataclasses import replace
+from datetime import UTC, datetime
 from enum import StrEnum
 from importlib.resources import as_file, files
 from importlib.util import find_spec
@@ -12,12 +16,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import failures, output, print_remark, print_written
+from photogram.cli.console import NOT_CONVERGED, errors, output, print_remark, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import Quiet, default_out
-from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
-    from photogram.comparator import Calibration, Options
+    from photogram.comparator import Calibration
 
 __all__ = ["comparator", "correct"]
 
@@ -33,9 +37,12 @@ class Hand(StrEnum):
     RIGHT = "right"
 
 
+@with_job
 def comparator(
+    job: Job,
     paths: Annotated[
         list[Path] | None,
+        Reads.FILE,
         typer.Argument(
             metavar="FILE...",
             help="Tables (*.csv) of one calibration; or files of decks of cards, one calibration a deck.",
@@ -48,6 +55,7 @@ def comparator(
     ] = False,
     grid: Annotated[
         list[str] | None,
+        Reads.FILE,
         typer.Option(
             metavar="GRID",
             help="Grid plate: 773, 1320, 778 or a file (point, x_um, y_um); again for more plates."
@@ -60,6 +68,7 @@ def comparator(
     ] = Hand.FILE,
     out: Annotated[
         Path | None,
+        Writes.DIRECTORY,
         typer.Option(
             metavar="OUT",
             help="Directory for the results. Default: FILE-calibrated beside the first FILE.",
@@ -68,6 +77,7 @@ def comparator(
     ] = None,
     json: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="FILE",
             help="Write everything as one JSON document (a list of them for several decks).",
@@ -91,27 +101,43 @@ def comparator(
         bool,
         typer.Option("--estimate-grid", help="Estimate the accuracy of the grid in the joint adjustment."),
     ] = False,
+    each_case: Annotated[
+        bool,
+        typer.Option("--each-case", help="Tables and pictures of the polynomials of every case, too."),
+    ] = False,
+    date: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEXT",
+            help="Date of the run for title page and report. Default: that of SOURCE_DATE_EPOCH, or today.",
+            show_default=False,
+        ),
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Remarks on the measurements are errors.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a comparator from measurements of a grid plate.
 
-    Writes listing.txt, report.html (pictures), correction.json and the corrected grid of each plate.
+    Writes listing.txt, report.html (pictures), correction.json and the corrected grid of each plate. Where
+    outliers make the correction unusable, correction and grid are withheld, and the exit code is 3.
     """
     if example == bool(paths):
         raise typer.BadParameter("give files, or --example", param_hint="FILE")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from photogram.comparator import Options, calibrate, find_grid, read
         from photogram.errors import InputError
 
         if example:
             packaged = files("photogram") / "examples" / "comparator" / EXAMPLE
             paths = [resources.enter_context(as_file(packaged))]
+            job.reads(*paths)
             out = out or Path("comparator-calibrated")
         left_handed = None if hand is Hand.FILE else hand is Hand.LEFT
         sessions = read(paths or [], [find_grid(name) for name in grid or []], left_handed=left_handed)
         options = Options.as_published() if as_published else Options()
-        options = _with(options, polynomial, estimate_grid)
+        options = replace(options, polynomial=polynomial, estimate_grid=estimate_grid)
+        if each_case:
+            sessions = [replace(session, plot_each_case=True) for session in sessions]
         calibrations = [calibrate(session, options) for session in sessions]
         if strict:
             for message in (message for one in calibrations for message in one.messages):
@@ -119,28 +145,76 @@ def comparator(
                     message.text, file=message.file, record=message.record, text=message.record_text
                 )
         folder = out or default_out((paths or [])[0], "-calibrated")
-        written = _results(calibrations, folder, pdf=pdf, pictures=pictures, quiet=quiet)
-        if json is not None:
-            written[json] = _documents(calibrations)
-        write_results(written, paths or [])
+        job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))
+        written = _results(calibrations, folder, _run_date(date), pdf=pdf, pictures=pictures, quiet=quiet)
+        documents = {json: _documents(calibrations)} if json is not None else {}
+        job.write(written, documents)
         if not quiet:
             for calibration in calibrations:
                 _summarize(calibration)
-            print_written(written)
+            print_written([*written, *documents])
+        if not all(calibration.usable for calibration in calibrations):
+            _withheld(calibrations, folder)
+            raise typer.Exit(NOT_CONVERGED)
 
 
-def _with(options: Options, polynomial: bool, estimate_grid: bool) -> Options:
-    from dataclasses import replace
+def _withheld(calibrations: list[Calibration], folder: Path) -> None:
+    """Say which corrections outliers spoil, and which files of earlier runs are not of this one."""
+    for number, calibration in enumerate(calibrations, 1):
+        if calibration.usable:
+            continue
+        errors.print(
+            f"[bold red]error:[/] comparator {calibration.session.comparator}:"
+            " the correction is withheld: outliers make it unusable"
+        )
+        for path in _corrections(calibration, _place(folder, number, len(calibrations))):
+            if path.exists():
+                print_remark(f"{path} is from an earlier run")
 
-    return replace(options, polynomial=polynomial, estimate_grid=estimate_grid)
+
+def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:
+    """Make what measurements are corrected by: corrections and corrected grids."""
+    from photogram.comparator.gridfile import corrected_grid
+
+    made = {place / "correction.json": calibration.correction.to_json()}
+    if calibration.joint:
+        made[place / "correction-joint.json"] = calibration.joint.correction.to_json()
+    for plate in calibration.plates:
+        made[place / f"grid-{plate}.csv"] = corrected_grid(calibration, plate).to_csv()
+    return made
+
+
+def _place(folder: Path, number: int, count: int) -> Path:
+    return folder if count == 1 else folder / str(number)
+
+
+def _run_date(date: str | None) -> str:
+    """Return the date of the run: as it is said, as the environment says, or today (UTC)."""
+    from photogram.errors import InputError
+    from photogram.messages import quoted
+    from photogram.numbers import whole_number
+
+    if date is not None:
+        return date if date.isprintable() else repr(date)
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    try:
+        seconds = whole_number(epoch) if epoch else time.time()
+        return datetime.fromtimestamp(seconds, UTC).date().isoformat()
+    except (ValueError, OverflowError, OSError):
+        raise InputError(f"SOURCE_DATE_EPOCH is {quoted(epoch)}: no seconds since 1970") from None
 
 
 def _results(
-    calibrations: list[Calibration], folder: Path, *, pdf: bool, pictures: bool, quiet: bool
+    calibrations: list[Calibration],
+    folder: Path,
+    run_date: str,
+    *,
+    pdf: bool,
+    pictures: bool,
+    quiet: bool,
 ) -> dict[Path, bytes]:
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.comparator import listing
-    from photogram.comparator.gridfile import corrected_grid
 
     if pictures and find_spec("matplotlib") is None:
         pictures = False
@@ -148,18 +222,15 @@ def _results(
             print_remark("no pictures: pip install 'photogram[plots]'")
     written: dict[Path, bytes] = {}
     for number, calibration in enumerate(calibrations, 1):
-        place = folder if len(calibrations) == 1 else folder / str(number)
-        written[place / "listing.txt"] = listing(calibration).encode()
-        written[place / "correction.json"] = calibration.correction.to_json()
-        if calibration.joint:
-            written[place / "correction-joint.json"] = calibration.joint.correction.to_json()
-        for plate in calibration.plates:
-            written[place / f"grid-{plate}.csv"] = corrected_grid(calibration, plate).to_csv()
+        place = _place(folder, number, len(calibrations))
+        written[place / "listing.txt"] = listing(calibration, run_date).encode()
+        if calibration.usable:
+            written |= _corrections(calibration, place)
         if pictures:
             from photogram.comparator.pictures import html_report, pdf_report
 
             name, make = ("report.pdf", pdf_report) if pdf else ("report.html", html_report)
-            written[place / name] = make(calibration)
+            written[place / name] = make(calibration, run_date)
     return written
 
 
@@ -171,13 +242,14 @@ def _documents(calibrations: list[Calibration]) -> bytes:
 
 
 def _summarize(calibration: Calibration) -> None:
-    """Print remarks, the analysis of variance and the linear parameters."""
+    """Print problems, the analysis of variance and the linear parameters."""
     from photogram.comparator.listing.summary import summary_page
 
     session = calibration.session
     output.print(f"[bold]Comparator {session.comparator}, {len(calibration.cases)} cases[/]")
-    for message in calibration.messages:
-        output.print(f"  [yellow]remark:[/] {escape(message.text)}")
+    output.print("[bold]Problems[/]")
+    for text in [message.text for message in calibration.messages] or ["none"]:
+        output.print(f"  {escape(text)}")
     for line in summary_page(calibration)[4:]:
         output.print(escape(line))
     if calibration.joint:
@@ -188,16 +260,22 @@ def _summarize(calibration: Calibration) -> None:
         )
 
 
+@with_job
 def correct(
+    job: Job,
     correction: Annotated[
         Path,
+        Reads.FILE,
         typer.Argument(metavar="CORRECTION", help="correction.json, or the JSON document of a calibration."),
     ],
     measurements: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Table with columns x_um, y_um (or x_mm, y_mm).")
+        Path,
+        Reads.FILE,
+        typer.Argument(metavar="FILE", help="Table with columns x_um, y_um (or x_mm, y_mm)."),
     ],
     out: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(metavar="OUT", help="Table to write. Default: standard output.", show_default=False),
     ] = None,
     invert: Annotated[
@@ -208,7 +286,7 @@ def correct(
 
     Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (what the calibration contributes).
     """
-    with failures():
+    with job:
         from photogram.comparator.apply import correct_table
         from photogram.comparator.correction import Correction
         from photogram.comparator.csvfile import read_table
@@ -217,4 +295,4 @@ def correct(
         if out is None:
             typer.echo(made.decode(), nl=False)
         else:
-            write_results({out: made}, [correction, measurements])
+            job.write({out: made})

@@ -11,6 +11,9 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from photogram.cli.streams import stream_fault
+from photogram.messages import printable
+
 if TYPE_CHECKING:
     from photogram.sections import Section
 
@@ -50,7 +53,7 @@ def print_sections(summary: Iterable[Section], whole: str, most: int = SHOWN) ->
 def print_written(paths: Iterable[Path], to: Console = output) -> None:
     """Say which files were written, if any."""
     if names := ", ".join(str(path) for path in paths):
-        to.print(f"written: {escape(names)}")
+        to.print(f"written: {escape(printable(names))}")
 
 
 def print_remark(text: object) -> None:
@@ -65,6 +68,8 @@ def failures() -> Iterator[None]:
 
     try:
         yield
+    except MemoryError as error:
+        _fail(str(error) or "there is not enough memory", INPUT_ERROR)
     except AdjustmentError as error:
         _fail(str(error), NOT_CONVERGED)
     except PhotogramError as error:
@@ -75,7 +80,10 @@ def failures() -> Iterator[None]:
             raise
         _fail(f"{package} is needed: pip install 'photogram[{EXTRAS[package]}]'", INPUT_ERROR)
     except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}", INPUT_ERROR)
+        # Files are named where they are read and written; what is left are the standard streams.
+        if error.filename is None:
+            raise typer.Exit(stream_fault(error)) from None
+        _fail(f"{printable(str(error.filename))}: {error.strerror or error}", INPUT_ERROR)
 
 
 def _fail(text: str, code: int) -> NoReturn:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, SHOWN, errors, failures, print_sections, print_written
+from photogram.cli.console import NOT_CONVERGED, SHOWN, errors, print_sections, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, default_out
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
@@ -29,9 +30,12 @@ EXAMPLE = "galveston"
 """The packaged example, a directory of photogram.examples."""
 
 
+@with_job
 def giant(
+    job: Job,
     directory: Annotated[
         Path | None,
+        Reads.PROJECT,
         typer.Argument(
             metavar="DIR",
             help="Directory of COMMON, CAMERAS, IMAGES, FRAMES, GROUND (any letter case, any extension).",
@@ -46,6 +50,7 @@ def giant(
     ] = False,
     out: Annotated[
         Path | None,
+        Writes.DIRECTORY,
         typer.Option(
             metavar="OUT",
             help="Directory for adjusted stations and points, and report. Default: DIR-adjusted beside DIR.",
@@ -55,6 +60,7 @@ def giant(
     json: JsonFile = None,
     listing: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="FILE",
             help="Write the printout of the 1987 program, page by page, as COMMON asks for it.",
@@ -111,9 +117,8 @@ def giant(
     """
     if example == (directory is not None):
         raise typer.BadParameter("give a directory, or --example", param_hint="DIR")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from photogram.errors import AdjustmentError
-        from photogram.files import write_whole
         from photogram.giant import Limits, read_project
         from photogram.report import summary
 
@@ -121,7 +126,7 @@ def giant(
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
-        _check_documents([path for path in (json, listing) if path is not None], directory, out)
+        job.writes(*(out / name for name in RESULTS))
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         block = _refracted(
@@ -135,50 +140,40 @@ def giant(
                 errors.print(escape(str(message)))
             raise
         written = _result_files(project, block, result, out, as_published)
+        documents = {}
         if json is not None:
-            written[json] = result.to_json()
+            documents[json] = result.to_json()
         if listing is not None:
             from photogram.giant import listing as printout
 
             text = printout(project, block, result, as_published=as_published, limits=allowed)
-            written[listing] = text.encode()
-        write_whole(written)
+            documents[listing] = text.encode()
+        job.write(written, documents)
         if not quiet:
             print_sections(summary(result), "report.txt")
-            print_written(written)
+            print_written([*written, *documents])
     if not result.converged:
         raise typer.Exit(NOT_CONVERGED)
 
 
 def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Path:
-    """Choose where results go: never over the input, and not over another project unless told."""
+    """Choose where results go: not over another project unless told, and then not beside its files."""
     from photogram.errors import InputError
     from photogram.giant.files import present_files
 
     if out is None:
         return default_out(directory, "-adjusted")
-    if out.exists() and not out.is_dir():
-        raise InputError("is not a directory", file=out)
-    if out.exists() and out.samefile(directory):
-        raise InputError("the results would be written over the input", file=out)
-    if out.exists() and not overwrite:
-        inputs = [path.name for name in ("COMMON", "CAMERAS", "IMAGES") for path in present_files(out)[name]]
-        if inputs:
-            raise InputError(f"holds another project ({', '.join(inputs)}); --overwrite allows it", file=out)
+    if not out.is_dir():
+        return out
+    present = present_files(out)
+    inputs = [path.name for name in ("COMMON", "CAMERAS", "IMAGES") for path in present[name]]
+    if inputs and not overwrite:
+        raise InputError(f"holds another project ({', '.join(inputs)}); --overwrite allows it", file=out)
+    for name in set(RESULTS) & set(present):
+        others = [path for path in present[name] if path.name != name]
+        if inputs and others:
+            raise InputError(f"the project there would have a second {name}", file=others[0])
     return out
-
-
-def _check_documents(documents: list[Path], directory: Path, out: Path) -> None:
-    """Refuse to write a document over a file of the project, or over another result."""
-    from photogram.errors import InputError
-    from photogram.giant.files import spare_input
-
-    taken = {(out / name).resolve() for name in RESULTS}
-    for path in documents:
-        spare_input(path, directory)
-        if path.resolve() in taken:
-            raise InputError("another result has this name", file=path)
-        taken.add(path.resolve())
 
 
 def _refracted(

@@ -9,10 +9,13 @@ from typing import Annotated
 
 import typer
 
+from photogram.cli.job import Writes
+
 __all__ = ["JsonFile", "Ordering", "OrderingName", "Quiet", "Threads", "default_out"]
 
 JsonFile = Annotated[
     Path | None,
+    Writes.FILE,
     typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, failures, output, print_remark, print_written
+from photogram.cli.console import NOT_CONVERGED, output, print_remark, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet
-from photogram.cli.outputs import write_results
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
@@ -32,9 +32,13 @@ class Weights(StrEnum):
     DEVIATIONS = "deviations"
 
 
+@with_job
 def perspective_center(
+    job: Job,
     deck: Annotated[
-        Path | None, typer.Argument(metavar="DECK", help="Deck of cards: a text file.", show_default=False)
+        Path | None,
+        Reads.FILE,
+        typer.Argument(metavar="DECK", help="Deck of cards: a text file.", show_default=False),
     ] = None,
     example: Annotated[
         bool, typer.Option("--example", help="Run the packaged example instead: a grid at two heights.")
@@ -42,12 +46,14 @@ def perspective_center(
     json: JsonFile = None,
     listing: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="FILE", help="Write the listing of the 1969 program, item by item.", show_default=False
         ),
     ] = None,
     plot: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="FILE",
             help="Draw residual vectors and radial distortion (png, pdf, svg).",
@@ -74,14 +80,15 @@ def perspective_center(
     """
     if example == (deck is not None):
         raise typer.BadParameter("give a deck, or --example", param_hint="DECK")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from photogram.perspective_center import run_deck
 
         if deck is None:
             deck = resources.enter_context(as_file(files("photogram").joinpath("examples", *EXAMPLE)))
+            job.reads(deck)
         run = run_deck(deck, as_published=as_published, weights=weights.value)
         written = _files(run, json, listing, plot)
-        write_results(written, [deck])
+        job.write(written)
         if not quiet:
             _summarize(run)
             print_written(written)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.console import errors, failures, output, print_remark, print_written
+from photogram.cli.console import errors, output, print_remark, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile
-from photogram.cli.outputs import write_results
 from photogram.cli.simulated import Control, NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -21,11 +21,14 @@ if TYPE_CHECKING:
 __all__ = ["plan"]
 
 
+@with_job
 @takes_network
 def plan(
+    job: Job,
     network: NetworkOptions,
     projects: Annotated[
         list[Path] | None,
+        Reads.PROJECT,
         typer.Argument(
             metavar="DIR",
             help="GIANT projects, with fictitious or measured images, to be put side by side instead of"
@@ -49,6 +52,7 @@ def plan(
     json: JsonFile = None,
     plot: Annotated[
         Path | None,
+        Writes.FILE,
         typer.Option(
             metavar="FILE",
             help="Draw the patterns in plan with the expected standard deviations in height (png, pdf, svg).",
@@ -61,7 +65,7 @@ def plan(
     No measurements are needed or made: expected standard deviations of points by number of rays and by
     location, of photographs, and the gross errors that can be found.
     """
-    with failures():
+    with job:
         from photogram.planning import plan as predict
 
         if projects:
@@ -77,7 +81,7 @@ def plan(
             patterns = _simulated(network, second)
         made = predict(patterns)
         written = _documents(made, json, plot)
-        write_results(written, [path for project in projects or [] for path in project.iterdir()])
+        job.write(written)
         output.print(made.report(), markup=False, end="")
         print_written(written, errors)
 

@@ -9,19 +9,26 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import failures, output, print_remark
+from photogram.cli.console import output, print_remark
+from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.simulated import NetworkOptions, takes_network
 
 if TYPE_CHECKING:
+    from photogram.block import Block
+    from photogram.giant.common import Common
     from photogram.simulation import Simulation
 
 __all__ = ["simulate"]
 
 
+@with_job
 @takes_network
 def simulate(
+    job: Job,
     out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="Directory for the project; it is made if need be.")
+        Path,
+        Writes.DIRECTORY,
+        typer.Argument(metavar="OUT", help="Directory for the project; it is made if need be."),
     ],
     network: NetworkOptions,
     check_points: Annotated[int, typer.Option(help="Points with known positions that are not held.")] = 20,
@@ -40,11 +47,12 @@ def simulate(
     """Write a simulated block as a GIANT project, and the truth behind it as truth.json.
 
     The GIANT files hold what would have been measured; truth.json holds the true positions and attitudes
-    (rad) of the photographs, the true positions of the points, and the gross errors. Photographs whose
-    positions or attitudes are not observed get the weak default standard deviations of the files.
+    (rad) of the photographs, the true positions of the points, and the gross errors. FRAMES has one set of
+    stations: with --position-sd or --attitude-sd the observed ones, and for what is not observed then the
+    initial ones with their errors as standard deviations; every weight counts in the unit variance (COMMON
+    column 12). Without, the initial ones with the weak default standard deviations of the files.
     """
-    with failures():
-        from photogram.files import write_whole
+    with job:
         from photogram.giant import Project
         from photogram.giant.project import project_files
         from photogram.simulation import simulate as make
@@ -57,16 +65,34 @@ def simulate(
             blunder_size=blunder_size,
             **network.arguments(),
         )
-        project = Project.from_block(simulation.block)
+        block, common = _filed(simulation.block, position_error, attitude_error)
+        project = Project.from_block(block, common)
         written = {**project_files(project, out, overwrite=overwrite), out / "truth.json": _truth(simulation)}
-        write_whole(written)
+        job.write(written)
         for message in project.messages:
             print_remark(message)
-        block = simulation.block
         output.print(
             f"{escape(str(out))}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
             f" {len(block.image_xy)} image points"
         )
+
+
+def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[Block, Common]:
+    """Return a simulated block as files can state it, and the job: no initial value is free in them."""
+    import numpy as np
+
+    from photogram.geometry import lengths_of_units
+    from photogram.giant.common import Common
+
+    weighted = [np.isfinite(sd).all() for sd in (block.photo_position_sd, block.photo_attitude_sd)]
+    if not any(weighted):
+        return block, Common(error_propagation=True)
+    if not weighted[0] and position_error:
+        metres = lengths_of_units(block.photo_positions, block.spheroid)
+        block = block.replace(photo_position_sd=position_error / metres)
+    if not weighted[1] and attitude_error:
+        block = block.replace(photo_attitude_sd=attitude_error)
+    return block, Common(error_propagation=True, unit_variance="constrained")
 
 
 def _truth(simulation: Simulation) -> bytes:

@@ -62,10 +62,13 @@ class NetworkOptions:
     image_sd: Annotated[float, typer.Option(help="Standard deviation of image coordinates, mm.")] = 0.010
     position_sd: Annotated[
         float,
-        typer.Option(help="Of the positions of photographs as observations (GNSS), m; inf: none are."),
+        typer.Option(
+            help="Of observed positions of photographs (GNSS), standard deviation, m; inf: none are observed."
+        ),
     ] = math.inf
     attitude_sd: Annotated[
-        float, typer.Option(help="Of the attitudes of photographs as observations, rad; inf: none are.")
+        float,
+        typer.Option(help="Of observed attitudes, standard deviation, rad; inf: none are observed."),
     ] = math.inf
     spheroid: Annotated[
         Ellipsoid, typer.Option(help="Geographic space on this spheroid; none: rectangular.")

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.console import NOT_CONVERGED, failures, print_sections, print_written
-from photogram.cli.options import JsonFile, Quiet
-from photogram.cli.outputs import write_results
+from photogram.cli.console import NOT_CONVERGED, print_sections, print_written
+from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.options import JsonFile, Quiet, Threads
 
 if TYPE_CHECKING:
     from photogram.stellar.night import CalibratedNight
@@ -22,6 +22,7 @@ __all__ = ["exposures", "stellar_camera"]
 
 Out = Annotated[
     Path | None,
+    Writes.DIRECTORY,
     typer.Option(
         metavar="OUT",
         help="Directory for listing, camera and plots. Default: INPUT-calibrated, here.",
@@ -31,9 +32,12 @@ Out = Annotated[
 Plots = Annotated[bool, typer.Option("--plots", help="Draw the plots (needs matplotlib).")]
 
 
+@with_job
 def stellar_camera(
+    job: Job,
     deck: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Argument(
             metavar="DECK",
             help="Card deck, or a calibration in plain form (a .toml file).",
@@ -58,17 +62,20 @@ def stellar_camera(
     """
     if example == (deck is not None):
         raise typer.BadParameter("give a deck, or --example", param_hint="DECK")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from dataclasses import replace
 
         from photogram.stellar import calibrate
+        from photogram.stellar.document import to_json
         from photogram.stellar.listing import summary
 
         if deck is None:
             deck = resources.enter_context(_example("stellar")) / "plate.toml"
         problems, inputs = _read(deck)
+        job.reads(*inputs)
         target = out or Path(f"{deck.stem}-calibrated")
         written: dict[Path, bytes] = {}
+        documents: dict[Path, bytes] = {}
         converged = True
         for number, problem in enumerate(problems, 1):
             if as_published:
@@ -76,19 +83,24 @@ def stellar_camera(
             result = calibrate(problem)
             converged = converged and result.converged
             mark = f"-{number}" if len(problems) > 1 else ""
-            written |= _files(result, target, mark, json, plots)
+            written |= _files(result, target, mark, plots)
+            if json is not None:
+                documents[json.with_stem(json.stem + mark)] = to_json(result)
             if not quiet:
                 print_sections(summary(result), "the listing")
-        write_results(written, inputs)
+        job.write(written, documents)
         if not quiet:
-            print_written(written)
+            print_written([*written, *documents])
     if not converged:
         raise typer.Exit(NOT_CONVERGED)
 
 
+@with_job
 def exposures(
+    job: Job,
     night: Annotated[
         Path | None,
+        Reads.FILE,
         typer.Argument(
             metavar="FILE",
             help="TOML file that names station, camera, times, rough attitudes and the table of star images.",
@@ -102,32 +114,30 @@ def exposures(
     out: Out = None,
     json: JsonFile = None,
     plots: Plots = False,
-    threads: Annotated[
-        int | None,
-        typer.Option(
-            min=1, help="Threads; the results do not depend on it. Default: all.", show_default=False
-        ),
-    ] = None,
+    threads: Threads = None,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a digital camera by exposures of the sky: pinhole and Brown distortion (needs pyerfa)."""
     if example == (night is not None):
         raise typer.BadParameter("give a file, or --example", param_hint="FILE")
-    with failures(), ExitStack() as resources:
+    with job, ExitStack() as resources:
         from photogram.stellar.night import calibrate_night
+        from photogram.stellar.night_document import to_json
         from photogram.stellar.night_file import inputs, read_night
         from photogram.stellar.night_report import summary
 
         if night is None:
             night = resources.enter_context(_example("exposures")) / "night.toml"
+        job.reads(*inputs(night))
         result = calibrate_night(read_night(night), threads)
-        written = _night_files(result, out or Path(f"{night.stem}-calibrated"), json, plots)
+        written = _night_files(result, out or Path(f"{night.stem}-calibrated"), plots)
+        documents = {json: to_json(result)} if json is not None else {}
         if not quiet:
             print_sections(summary(result), "the report")
-        write_results(written, inputs(night))
+        job.write(written, documents)
         if not quiet:
-            print_written(written)
-    if not result.converged:
+            print_written([*written, *documents])
+    if not result.usable:
         raise typer.Exit(NOT_CONVERGED)
 
 
@@ -143,10 +153,9 @@ def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
     return ([read_plain(deck)], inputs(deck)) if deck.suffix.lower() == ".toml" else (read_deck(deck), [deck])
 
 
-def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool) -> dict[Path, bytes]:
+def _files(result: Result, out: Path, mark: str, plots: bool) -> dict[Path, bytes]:
     """Make everything that is written for one problem."""
     from photogram.stellar.cameras import camera_document
-    from photogram.stellar.document import to_json
     from photogram.stellar.listing import listing, plate_list
 
     made = {
@@ -155,8 +164,6 @@ def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool)
     }
     if result.problem.options.plate_list:
         made[out / f"plate{mark}.txt"] = plate_list(result)
-    if json is not None:
-        made[json.with_stem(json.stem + mark)] = to_json(result)
     if plots:
         from photogram.stellar.plots import figures
 
@@ -166,14 +173,11 @@ def _files(result: Result, out: Path, mark: str, json: Path | None, plots: bool)
     return made
 
 
-def _night_files(result: CalibratedNight, out: Path, json: Path | None, plots: bool) -> dict[Path, bytes]:
+def _night_files(result: CalibratedNight, out: Path, plots: bool) -> dict[Path, bytes]:
     """Make everything that is written for a night."""
-    from photogram.stellar.night_document import to_json
     from photogram.stellar.night_report import report
 
     made = {out / "report.txt": report(result).encode(), out / "camera.json": result.camera.to_json()}
-    if json is not None:
-        made[json] = to_json(result)
     if plots:
         from photogram.stellar.night_plots import figures
 

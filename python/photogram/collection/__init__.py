@@ -1,5 +1,6 @@
 """Collections of photos of unknown cameras: bundle adjustment "in the large"."""
 
+from photogram.arguments import check_arguments
 from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.bal import read, to_bytes
@@ -16,3 +17,5 @@ __all__ = [
     "simulate",
     "to_bytes",
 ]
+
+check_arguments(globals(), ["Collection", "adjust", "read", "simulate", "to_bytes"])

@@ -13,7 +13,8 @@ from photogram.adjusted import Iteration
 from photogram.adjustment import Ordering, Progress, core_threads, teller
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
-from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
+from photogram.memory import available_memory
 from photogram.messages import Message, listed
 from photogram.robust import Loss, loss_row, remark
 
@@ -34,10 +35,12 @@ def adjust(
 ) -> AdjustedCollection:
     """Adjust a collection by Levenberg-Marquardt steps from given values, however far.
 
-    Points with a free coordinate and images on one photo only are left out; photos that have no image then
-    stay as they are. Where nothing weighted or fixed gives a datum, cofactors are those of minimum
-    constraints: position and attitude of the first photo and one component of the translation of another
-    are held. Residuals, redundancy numbers and the variance of unit weight do not depend on which.
+    Points with a free coordinate and images on one photo only are left out, and so are points that run into
+    the station of a photo, where rays that fit badly meet: they would take all digits from the others.
+    Photos that have no image then stay as they are. Where nothing weighted or fixed gives a datum, cofactors
+    are those of minimum constraints: position and attitude of the first photo and one component of the
+    translation of another are held. Residuals, redundancy
+    numbers and the variance of unit weight do not depend on which.
 
     Parameters
     ----------
@@ -104,6 +107,7 @@ def adjust(
             loss=row,
             ordering=ordering,
             threads=core_threads(threads),
+            memory=available_memory(),
             progress=None if progress is None else teller(progress),
         )
     except _photocore.CollectionError as error:
@@ -150,12 +154,13 @@ def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
         messages.append(
             Message(f"left as they are, photos without image points: {_numbers(solution.photo_images == 0)}")
         )
-    if (solution.point_rays == 0).any():
-        messages.append(
-            Message(
-                f"left out, points with images on fewer than two photos: {_numbers(solution.point_rays == 0)}"
-            )
-        )
+    out = solution.point_rays == 0
+    if solution.collapsed:
+        names = listed([str(point) for point in solution.collapsed])
+        messages.append(Message(f"left out, points that ran into the station of a photo: {names}"))
+        out[solution.collapsed] = False
+    if out.any():
+        messages.append(Message(f"left out, points with images on fewer than two photos: {_numbers(out)}"))
     if solution.point_rays_behind.any():
         rays, names = solution.point_rays_behind.sum(), _numbers(solution.point_rays_behind > 0)
         messages.append(Message(f"{rays} image points have their point behind the camera: points {names}"))
@@ -178,4 +183,6 @@ def _named(kind: str, message: str, photos: list[list[int]], points: list[int]) 
         names = [str(photo) for photo in sorted({photo for each in photos for photo in each})]
         text = f"the observations leave {len(photos)} combinations of unknowns undetermined, moving photos"
         return RankError(f"{text} {listed(names)}", names, [])
+    if kind == "memory":
+        return OutOfMemoryError(message)
     return AdjustmentError(message)

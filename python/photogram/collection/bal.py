@@ -32,7 +32,7 @@ COMPRESSED: dict[bytes, Callable[[BinaryIO], BinaryIO]] = {
 }
 """How files that begin like this are unpacked piece by piece."""
 LONGEST = max(map(len, COMPRESSED))
-PIECE = 1 << 20
+PIECE = 1 << 17
 """Characters that are read at a time."""
 ROOM = 64
 """Characters that a number and the white space after it take at the most, in the mean over a file."""
@@ -114,7 +114,9 @@ class _Counts:
         return HEAD + IMAGE * self.images + PHOTO * self.photos + POINT * self.points
 
     def __str__(self) -> str:
-        return f"{self.numbers} numbers of {self.photos} photos, {self.points} points and {self.images} images"
+        return (
+            f"{self.numbers} numbers of {self.photos} photos, {self.points} points and {self.images} images"
+        )
 
 
 def _numbers(path: Path) -> tuple[_Counts, Floats]:

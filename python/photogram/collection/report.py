@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.collection.collection import PARAMETERS
+from photogram.outliers import Observations, outliers
+from photogram.reliability import TESTABLE
 from photogram.sections import Section, composed, headline, problems
+from photogram.statistics import externally_studentized, global_test, studentized_limit
 
 if TYPE_CHECKING:
     from photogram.collection.adjusted import AdjustedCollection
@@ -37,10 +40,38 @@ def report(result: AdjustedCollection) -> str:
 def summary(result: AdjustedCollection) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, suspects."""
     return [
-        ("Problems", problems(result.messages, result.status, result.variance_of_unit_weight)),
+        ("Problems", _problems(result)),
         ("Adjustment", _adjustment(result)),
         (f"Image points with |standardized residual| > {NOTABLE:g} sigma0, largest first", _suspects(result)),
     ]
+
+
+def _problems(result: AdjustedCollection) -> list[str]:
+    """Return a failed test and outliers before other remarks.
+
+    Standard deviations of pixels are guesses: single residuals are tested against all others.
+    """
+    collection, omega, freedom = (
+        result.collection,
+        result.weighted_sum_of_squares,
+        result.degrees_of_freedom,
+    )
+
+    def image(index: tuple[int, ...]) -> str:
+        point, photo = collection.image_points[index[0]], collection.image_photos[index[0]]
+        return f"{'xy'[index[1]]} of point {point} on photo {photo}"
+
+    testable = np.where(result.redundancy > TESTABLE, result.standardized, np.nan)
+    tested = Observations("image coordinates", externally_studentized(testable, omega, freedom), image)
+    found = outliers(
+        [tested], lambda tests: studentized_limit(freedom, tests), "externally studentized residuals"
+    )
+    return problems(
+        [*found, *result.messages],
+        result.status,
+        result.variance_of_unit_weight,
+        global_test(omega, freedom),
+    )
 
 
 def _adjustment(result: AdjustedCollection) -> list[str]:
@@ -128,5 +159,4 @@ def _work(result: AdjustedCollection) -> list[str]:
     return [
         f"ordering                            {result.ordering} (multiply-adds predicted: {tried})",
         f"formations of the normal equations  {result.formations}",
-        *(f"seconds, {phase:<27}{seconds:.3f}" for phase, seconds in result.seconds.items()),
     ]

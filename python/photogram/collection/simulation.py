@@ -72,12 +72,14 @@ def simulate(
     Raises
     ------
     InputError
-        Fewer than two photos, or shares outside 0 to 1.
+        Fewer than two photos, shares outside 0 to 1, what is negative.
     """
     if photos < 2 or points < 1:
         raise InputError(f"there must be two photos and a point at least, not {photos} and {points}")
     if not (0 <= seen <= 1 and 0 <= outlier_share <= 1):
         raise InputError("shares lie between 0 and 1")
+    if not (noise >= 0 and outlier_size >= 0 and seed >= 0):
+        raise InputError("noise, size of outliers and seed are not negative")
     random = np.random.default_rng(seed)
     parameters = _cameras(photos, random)
     positions = random.uniform(-SIZE / 2, SIZE / 2, (points, 3))

@@ -5,6 +5,7 @@ calibration = comparator.calibrate(session)
 calibration.correction.apply(xy_um)
 """
 
+from photogram.arguments import check_arguments
 from photogram.comparator.calibration import Calibration, CaseResult, PlateResult, Pointing, calibrate
 from photogram.comparator.cards import read_cards, to_cards
 from photogram.comparator.correction import Correction
@@ -50,3 +51,26 @@ __all__ = [
     "to_csv",
     "to_json",
 ]
+
+check_arguments(
+    globals(),
+    [
+        "Correction",
+        "Frame",
+        "Grid",
+        "Options",
+        "Polynomial",
+        "built_in_grid",
+        "calibrate",
+        "find_grid",
+        "listing",
+        "read",
+        "read_cards",
+        "read_csv",
+        "read_grid",
+        "simulate_calibration",
+        "to_cards",
+        "to_csv",
+        "to_json",
+    ],
+)

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.comparator.readings import LARGEST_UM
 from photogram.errors import InputError
+from photogram.rows import cells
 
 if TYPE_CHECKING:
     from photogram.comparator.correction import Correction
@@ -38,10 +40,12 @@ def correct_table(correction: Correction, table: Table, *, invert: bool = False)
         A row without coordinates, or no row.
     """
     places = []
-    for row in table.rows:
+    for row in table.records.rows():
         xy = table.coordinates_um(row)
         if xy is None:
             raise row.place.error("the coordinates are blank")
+        if max(map(abs, xy)) > LARGEST_UM:
+            raise row.place.error(f"a coordinate is beyond every comparator ({LARGEST_UM:g} um)")
         places.append(xy)
     if not places:
         raise InputError("holds no measurements", file=table.path)
@@ -50,12 +54,17 @@ def correct_table(correction: Correction, table: Table, *, invert: bool = False)
         columns: tuple[str, ...] = READINGS
         values = correction.invert(xy_um)
     else:
-        sd = np.sqrt(np.diagonal(correction.covariance_of(xy_um), axis1=1, axis2=2))
         columns = CORRECTED
-        values = np.hstack([correction.apply(xy_um), sd])
+        with np.errstate(over="ignore", invalid="ignore"):
+            variances = np.diagonal(correction.covariance_of(xy_um), axis1=1, axis2=2)
+            # Rounding may leave a variance of zero below it.
+            values = np.hstack([correction.apply(xy_um), np.sqrt(np.maximum(variances, 0.0))])
+    if not np.isfinite(values).all():
+        place = table.records.records[int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])]
+        raise place.error("the correction gives no finite coordinates here")
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([*table.columns, *columns])
-    for row, own in zip(table.rows, values.tolist(), strict=True):
-        writer.writerow([*row.cells.values(), *(f"{value:.4f}" for value in own)])
+    for place, own in zip(table.records.records, values.tolist(), strict=True):
+        writer.writerow([*cells(place), *(f"{value:.4f}" for value in own)])
     return buffer.getvalue().encode()

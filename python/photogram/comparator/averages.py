@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,7 +18,33 @@ if TYPE_CHECKING:
     from photogram.comparator.readings import Integers
     from photogram.comparator.residuals import Residuals
 
-__all__ = ["PlateAverages", "average_residuals"]
+__all__ = ["LocationAverages", "PlateAverages", "average_residuals"]
+
+SAME_PLACE = 0.25
+"""Locations nearer to each other than this part of the spacing of the plate are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocationAverages:
+    """Average comparator residuals of the cases in which the plate lay at one place of the comparator.
+
+    Attributes
+    ----------
+    cases
+        Numbers of these cases.
+    locations
+        (m,) numbers of the comparator locations: those of the plate with corner 1 nearest the comparator's
+        zero.
+    xy_um
+        (m, 2) where they are: mean comparator coordinates.
+    residuals_um
+        (m, 2) averages of the comparator residuals there.
+    """
+
+    cases: tuple[int, ...]
+    locations: Integers
+    xy_um: Floats
+    residuals_um: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +70,9 @@ class PlateAverages:
         (l, 2) averages of the grid residuals by point: the corrections of the grid.
     squares_um2
         (2,) sums of squares of all grid residuals in X and in Y.
-    locations, location_um
-        Numbers of the comparator locations, and averages of the comparator residuals there; None where the
-        pattern of the plate does not meet itself when the plate is turned.
+    by_location
+        Averages of the comparator residuals, for each place where the plate lay; none where the pattern of
+        the plate does not meet itself when the plate is turned.
     xy_um
         (l, 2) coordinates of the last case with corner 1 nearest the comparator's zero, else of the last
         case; NaN where missing.
@@ -58,9 +85,13 @@ class PlateAverages:
     counts: Integers
     grid_um: Floats
     squares_um2: Floats
-    locations: Integers | None
-    location_um: Floats | None
+    by_location: tuple[LocationAverages, ...]
     xy_um: Floats
+
+    @property
+    def location_um(self) -> Floats:
+        """(m, 2) averages by location, of all places."""
+        return np.vstack([np.empty((0, 2)), *(place.residuals_um for place in self.by_location)])
 
     @property
     def corrections_um(self) -> Floats:
@@ -89,7 +120,6 @@ def average_residuals(
     all_rows, all_values = np.concatenate(rows), np.vstack(values)
     counts = np.bincount(all_rows, minlength=len(grid.points))
     measured = np.flatnonzero(counts)
-    numbers, location_um = _by_location(grid, cases, residuals)
     last = max(range(len(cases)), key=lambda k: (cases[k].orientation.corner == 1, k))
     xy = np.full((len(grid.points), 2), np.nan)
     xy[rows[last]] = residuals[last].xy_um
@@ -101,26 +131,54 @@ def average_residuals(
         counts=counts[measured],
         grid_um=_means(all_rows, all_values, len(grid.points))[measured],
         squares_um2=(all_values**2).sum(axis=0),
-        locations=numbers,
-        location_um=location_um,
+        by_location=_by_location(grid, cases, residuals),
         xy_um=xy[measured],
     )
 
 
 def _by_location(
     grid: Grid, cases: Sequence[PlacedCase], residuals: Sequence[Residuals]
-) -> tuple[Integers | None, Floats | None]:
+) -> tuple[LocationAverages, ...]:
+    """Average by location; cases whose plate lay elsewhere have other locations, whatever their numbers."""
     maps = {case.orientation.corner: locations(grid, case.orientation.corner) for case in cases}
-    rows, values = [], []
-    for case, own in zip(cases, residuals, strict=True):
+    rows = []
+    for case in cases:
         numbers = maps[case.orientation.corner]
         if numbers is None:
-            return None, None
+            return ()
         rows.append(grid.rows_of(numbers[grid.rows_of(case.points)]))
-        values.append(own.comparator_um)
-    means = _means(np.concatenate(rows), np.vstack(values), len(grid.points))
-    measured = np.isfinite(means[:, 0])
-    return grid.points[measured], means[measured]
+    extent = np.ptp(grid.xy_um, axis=0)
+    apart = SAME_PLACE * math.sqrt(float(extent.prod()) / len(grid.points))
+    together: list[tuple[list[int], Floats]] = []
+    for k, own in enumerate(residuals):
+        for members, places in together:
+            away = np.abs(own.xy_um - places[rows[k]])
+            if np.isfinite(away).any() and np.nanmax(away) < apart:
+                members.append(k)
+                known = np.isfinite(places[rows[k], 0])
+                places[rows[k][~known]] = own.xy_um[~known]
+                break
+        else:
+            places = np.full((len(grid.points), 2), np.nan)
+            places[rows[k]] = own.xy_um
+            together.append(([k], places))
+    return tuple(_averaged(grid, members, cases, rows, residuals) for members, _ in together)
+
+
+def _averaged(
+    grid: Grid,
+    members: list[int],
+    cases: Sequence[PlacedCase],
+    rows: Sequence[Integers],
+    residuals: Sequence[Residuals],
+) -> LocationAverages:
+    own = np.concatenate([rows[k] for k in members])
+    places = _means(own, np.vstack([residuals[k].xy_um for k in members]), len(grid.points))
+    values = _means(own, np.vstack([residuals[k].comparator_um for k in members]), len(grid.points))
+    measured = np.isfinite(values[:, 0])
+    return LocationAverages(
+        tuple(cases[k].number for k in members), grid.points[measured], places[measured], values[measured]
+    )
 
 
 def _means(rows: Integers, values: Floats, count: int) -> Floats:

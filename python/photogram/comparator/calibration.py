@@ -29,8 +29,10 @@ from photogram.comparator.gridsigma import (
 )
 from photogram.comparator.joint import LEAST_UM, JointFit, Weights, adjust_jointly
 from photogram.comparator.options import Options
+from photogram.comparator.outliers import FarPointing, Screening, far_pointings, screen
 from photogram.comparator.placed import PlacedCase, place_case
 from photogram.comparator.pointing import Precision, pool_points
+from photogram.comparator.remarks import plate_remarks, problems
 from photogram.comparator.residuals import Residuals
 from photogram.comparator.rigid import RigidFit, fit_rigid
 from photogram.comparator.significance import (
@@ -44,13 +46,9 @@ from photogram.errors import AdjustmentError
 from photogram.messages import Message
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
-    from photogram.comparator.readings import Integers, Session
+    from photogram.comparator.readings import Session
 
 __all__ = ["Calibration", "CaseResult", "PlateResult", "Pointing", "calibrate"]
-
-SUSPECT = 4.0
-"""A residual of so many standard errors is worth a remark."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +140,12 @@ class Calibration:
     joint_check
         Largest difference between the report's weighted mean and a joint adjustment under its assumptions
         (grid without error, equal weights, no polynomials), in standard deviations.
+    screening
+        Measured points that do not agree with the adjustment of the others, and the harm they do.
+    far_pointings
+        Single pointings that do not agree with the others of their case.
     messages
-        Remarks.
+        Problems, the gravest first, and remarks.
     """
 
     session: Session
@@ -158,7 +160,14 @@ class Calibration:
     case_test: CaseVarianceTest | None
     joint: JointFit | None
     joint_check: float | None
+    screening: Screening
+    far_pointings: tuple[FarPointing, ...]
     messages: list[Message]
+
+    @property
+    def usable(self) -> bool:
+        """Whether the correction may be used: outliers do not falsify it by more than its uncertainty."""
+        return not self.screening.harmful
 
     @property
     def correction(self) -> Correction:
@@ -228,7 +237,10 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
     pointing = _pointing(cases, options)
     averages = _averages(session, cases, linear, nonlinear)
     variance = _variance(session, cases, pointing, linear, nonlinear, averages, options, messages)
-    messages += _remarks(session, cases, nonlinear or linear, averages)
+    messages += plate_remarks(session, placed)
+    joint = _joint(session, placed, linear, pointing, nonlinear is not None, options, messages)
+    screening = screen(placed, nonlinear or linear, session.grids)
+    far = far_pointings(session.cases)
     return Calibration(
         session=session,
         options=options,
@@ -240,9 +252,11 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
         variance=variance,
         polynomial_tests=polynomial_tests(linear, nonlinear) if nonlinear else None,
         case_test=_case_test(cases),
-        joint=_joint(session, placed, linear, pointing, nonlinear is not None, options, messages),
+        joint=joint,
         joint_check=_joint_check(session, placed, linear) if options.joint else None,
-        messages=messages,
+        screening=screening,
+        far_pointings=tuple(far),
+        messages=[*problems(session, placed, screening, far, joint), *messages],
     )
 
 
@@ -421,44 +435,3 @@ def _joint_check(session: Session, placed: Sequence[PlacedCase], linear: Combine
         mean.nonorthogonality_rad - joint.nonorthogonality_rad,
     ]
     return float((np.abs(differences) / np.sqrt(np.diag(joint.covariance)[:3])).max())
-
-
-def _remarks(
-    session: Session,
-    cases: Sequence[CaseResult],
-    last: CombinedLinear | CombinedPolynomial,
-    averages: dict[str, dict[int, PlateResult]],
-) -> list[Message]:
-    """Remark on plates whose grid calibration is not valid, and on residuals too large to be chance."""
-    remarks = []
-    for plate in averages["linear"]:
-        grid = session.grids[plate]
-        own = [case for case in cases if case.placed.case.plate == plate]
-        corners = [case.placed.orientation.corner for case in own]
-        complete = all(len(case.placed.points) == len(grid.points) for case in own)
-        if len({corners.count(corner) for corner in range(1, 5)}) > 1 or not complete:
-            remarks.append(
-                Message(
-                    f"plate {plate}: GRID CALIBRATION CORRECTIONS ARE VALID ONLY IF ALL AVERAGE RESIDUALS"
-                    " ARE COMPUTED FROM A MULTIPLE OF FOUR EXACTLY 90 DEGREE ROTATION CASES"
-                )
-            )
-        missing = [len(grid.points) - len(case.placed.points) for case in own]
-        remarks += [
-            Message(f"case {case.number}: {count} of {len(grid.points)} points of plate {plate} are missing")
-            for case, count in zip(own, missing, strict=True)
-            if count
-        ]
-    for case, fit in zip(cases, last.cases, strict=True):
-        remarks += _suspects(case, fit.residuals.points, fit.residuals.comparator_um)
-    return remarks
-
-
-def _suspects(case: CaseResult, points: Integers, residuals: Floats) -> list[Message]:
-    # The median is not moved by what it is to show; 0.6745 is that of |N(0, 1)|.
-    sigma = float(np.median(np.abs(residuals))) / 0.6745
-    large = np.abs(residuals).max(axis=1)
-    return [
-        Message(f"case {case.number}, point {points[row]}: a residual of {large[row]:.1f} um: a blunder?")
-        for row in np.flatnonzero(large > max(SUSPECT * sigma, 1.0)).tolist()
-    ]

@@ -82,7 +82,10 @@ class _Format:
 
 
 STANDARD = _Format((3, 7), 8, (9, 10), (12, 21), (22, 31), 8)
-"""Formats 122 and, with the centre of the range behind it, 143."""
+"""Formats 122 and, with the centre of the range (TRANS, F9.6) behind it, 143."""
+TRANS = (61, 69)
+TRANS_ON_CARDS = 15
+"""The comparator whose cards hold it."""
 SECONDARY = _Format((3, 7), 8, (9, 10), (32, 41), (42, 51), 8)
 """Format 146: right stage of the STK1."""
 PSK_LEFT = _Format((2, 3), 4, (5, 6), (20, 25), (30, 35), 6, plate=(8, 10))
@@ -182,6 +185,7 @@ class _Deck:
         self.first = first
         self.cards = cards
         self.messages: list[Message] = []
+        self.centre_um: float | None = None
         given = list(grids)
         own = self._special_grid() if header.master == SPECIAL_GRID else None
         master = own or built_in_grid(BUILT_IN[min(header.master, 2)])
@@ -224,6 +228,7 @@ class _Deck:
             sorted_input=self.header.sorted_input,
             least_count_one_micrometre=not self.header.other_least_count,
             plot_each_case=self.header.plot_each_case,
+            range_centre_um=self.centre_um,
             source=self.first.source.path,
             messages=self.messages,
         )
@@ -233,6 +238,8 @@ class _Deck:
         return session
 
     def _reading(self, card: Record, layout: _Format) -> Reading:
+        if self.header.comparator == TRANS_ON_CARDS and not card.blank(*TRANS):
+            self.centre_um = _micrometres(card, TRANS, 6)
         plate, case = _plate_case(card, layout.plate_case)
         if layout.plate is not None:
             plate = _integer(card, *layout.plate)

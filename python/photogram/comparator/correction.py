@@ -14,6 +14,7 @@ import orjson
 from photogram.comparator.polynomial import Frame, Polynomial, design
 from photogram.errors import InputError
 from photogram.files import read_bytes
+from photogram.messages import quoted
 
 if TYPE_CHECKING:
     from photogram.adjusted import Floats
@@ -23,6 +24,8 @@ __all__ = ["Correction"]
 PARAMETERS = 21
 """Scale x, scale y, lack of orthogonality, nine coefficients of x, nine of y."""
 STEPS = 20
+ROUNDING = 1e-6
+"""Of correlations that were written with all digits and read again, with room to spare."""
 
 
 def _no_covariance() -> Floats:
@@ -52,6 +55,23 @@ class Correction:
     nonorthogonality_rad: float
     polynomial: Polynomial | None = None
     covariance: Floats = field(default_factory=_no_covariance, repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse parameters by which nothing can be corrected or turned back."""
+        for name in ("scale_x", "scale_y"):
+            value = getattr(self, name)
+            if not 0 < value < math.inf:
+                raise InputError(f"{name} is {value}: a scale is a positive number")
+        if not abs(self.nonorthogonality_rad) < math.pi / 2:
+            raise InputError(f"nonorthogonality_rad is {self.nonorthogonality_rad}: the axes must differ")
+        if self.polynomial is not None:
+            values = (*self.polynomial.frame.centre_um, *self.polynomial.scaled_um.ravel())
+            if not np.isfinite(values).all():
+                raise InputError("the polynomial has coefficients or a centre that are not finite")
+            if not all(0 < half < math.inf for half in self.polynomial.frame.half_range_um):
+                raise InputError("half_range_um must be positive numbers")
+        if not _is_covariance(self.covariance):
+            raise InputError("covariance is no covariance matrix")
 
     @property
     def matrix(self) -> Floats:
@@ -83,9 +103,15 @@ class Correction:
             Newton's iteration does not come to rest: the place is far outside the calibrated range.
         """
         linear = np.array(corrected_um, dtype=float)
-        if self.polynomial is not None:
-            linear = self._before_polynomial(self.polynomial, linear)
-        return np.asarray(np.linalg.solve(self.matrix, linear.T).T)
+        try:
+            # What overflows on the way does not come to rest, or is not finite in the end.
+            with np.errstate(over="ignore", invalid="ignore"):
+                if self.polynomial is not None:
+                    linear = self._before_polynomial(self.polynomial, linear)
+                readings = np.linalg.solve(self.matrix, linear.T).T
+        except np.linalg.LinAlgError:
+            raise InputError("the correction cannot be inverted: its derivatives are singular") from None
+        return np.asarray(readings)
 
     @staticmethod
     def _before_polynomial(polynomial: Polynomial, corrected: Floats) -> Floats:
@@ -168,17 +194,16 @@ class Correction:
         """
         polynomial = None
         if (members := document["polynomial"]) is not None:
-            (x, y), (half_x, half_y) = members["centre_um"], members["half_range_um"]
-            frame = Frame((float(x), float(y)), (float(half_x), float(half_y)))
-            scaled = np.array([members["coefficients_x_um"], members["coefficients_y_um"]], dtype=float)
-            polynomial = Polynomial(frame, scaled.reshape(2, 9), np.zeros((18, 18)))
-        return cls(
-            float(document["scale_x"]),
-            float(document["scale_y"]),
-            float(document["nonorthogonality_rad"]),
-            polynomial,
-            np.array(document["covariance"], dtype=float).reshape(PARAMETERS, PARAMETERS),
+            x, y = _numbers(members["centre_um"], (2,)).tolist()
+            half_x, half_y = _numbers(members["half_range_um"], (2,)).tolist()
+            scaled = [_numbers(members[f"coefficients_{axis}_um"], (9,)) for axis in "xy"]
+            frame = Frame((x, y), (half_x, half_y))
+            polynomial = Polynomial(frame, np.array(scaled), np.zeros((18, 18)))
+        scale_x, scale_y, lean = (
+            _numbers(document[name], ()).item() for name in ("scale_x", "scale_y", "nonorthogonality_rad")
         )
+        covariance = _numbers(document["covariance"], (PARAMETERS, PARAMETERS))
+        return cls(scale_x, scale_y, lean, polynomial, covariance)
 
     def to_json(self) -> bytes:
         """Return the correction as a JSON document (UTF-8)."""
@@ -196,6 +221,39 @@ class Correction:
         data = read_bytes(path)
         try:
             document = orjson.loads(data)
-            return cls.from_document(document.get("correction", document))
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except ValueError as error:
             raise InputError(f"holds no correction of a comparator: {error}", file=path) from None
+        if isinstance(document, dict) and document.get("usable") is False:
+            raise InputError("holds a calibration whose correction is withheld: see its messages", file=path)
+        try:
+            return cls.from_document(document.get("correction", document))
+        except InputError as error:
+            raise InputError(error.message, file=path) from None
+        except KeyError as error:
+            raise InputError(f"holds no correction of a comparator: {error} is missing", file=path) from None
+        except (ValueError, TypeError, AttributeError) as error:
+            raise InputError(f"holds no correction of a comparator: {error}", file=path) from None
+
+
+def _numbers(value: Any, shape: tuple[int, ...]) -> Floats:
+    """Take numbers from a document; words, switches and lists of other lengths are none."""
+    array = np.array(value)
+    if array.shape != shape or array.dtype.kind not in "iuf":
+        what = "a number" if not shape else f"{' x '.join(str(size) for size in shape)} numbers"
+        raise ValueError(f"{quoted(str(value))} is not {what}")
+    return array.astype(float)
+
+
+def _is_covariance(matrix: Floats) -> bool:
+    """Whether a matrix is finite, symmetric and not indefinite, each parameter taken in its own unit."""
+    if matrix.shape != (PARAMETERS, PARAMETERS) or not np.isfinite(matrix).all():
+        return False
+    variances = np.diagonal(matrix)
+    known = variances > 0
+    if (variances < 0).any() or matrix[~known].any():
+        return False
+    scale = np.sqrt(variances[known])
+    correlations = matrix[np.ix_(known, known)] / scale / scale[:, np.newaxis]
+    if np.abs(correlations - correlations.T).max(initial=0.0) > ROUNDING:
+        return False
+    return bool(np.linalg.eigvalsh(correlations).min(initial=0.0) > -ROUNDING)

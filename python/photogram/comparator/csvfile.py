@@ -6,39 +6,86 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from photogram.errors import InputError
-from photogram.files import read_bytes
+from photogram import rows
+from photogram.messages import quoted
+from photogram.numbers import finite_number, whole_number
 from photogram.places import Place
-from photogram.rows import Row, cells
+from photogram.rows import Row
 
-__all__ = ["Table", "read_table"]
+__all__ = ["Setting", "Table", "read_table"]
 
 MICROMETRES = {"um": 1.0, "mm": 1000.0}
 """Units of coordinates, as the names of columns end."""
 
 
-@dataclass(frozen=True)
-class Table:
-    """A file: what its head sets, its columns, its rows."""
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What a line above the table sets, and where."""
 
-    path: Path
-    settings: Mapping[str, str]
-    columns: tuple[str, ...]
-    head: Place
-    rows: tuple[Row, ...]
-    unit: str
+    key: str
+    text: str
+    place: Place
 
-    def require(self, *columns: str) -> None:
-        """Refuse a table without these columns.
+    def integer(self) -> int:
+        """Return the whole number that it sets.
 
         Raises
         ------
         InputError
-            The first one missing.
+            It is none.
         """
-        missing = [column for column in columns if column not in self.columns]
-        if missing:
-            raise self.head.error(f"the column {missing[0]} is missing")
+        try:
+            return whole_number(self.text)
+        except ValueError as error:
+            raise self.place.error(f"{self.key} = {error}") from None
+
+    def number(self) -> float:
+        """Return the number that it sets.
+
+        Raises
+        ------
+        InputError
+            It is none.
+        """
+        try:
+            return finite_number(self.text)
+        except ValueError as error:
+            raise self.place.error(f"{self.key} = {error}") from None
+
+    def switch(self) -> bool:
+        """Return the yes or no that it sets.
+
+        Raises
+        ------
+        InputError
+            It is neither.
+        """
+        if self.text.lower() not in ("yes", "no"):
+            raise self.place.error(f"{self.key} = {quoted(self.text)} is neither yes nor no")
+        return self.text.lower() == "yes"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with coordinates: its records, what the lines above set by name, and its unit (um or mm)."""
+
+    records: rows.Table
+    settings: Mapping[str, Setting]
+    unit: str
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.records.path
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return self.records.columns
+
+    def text(self, key: str) -> str:
+        """Return what a setting says; nothing where it is not there."""
+        return self.settings[key].text if key in self.settings else ""
 
     def coordinates_um(self, row: Row) -> tuple[float, float] | None:
         """Return x and y of a row in micrometres; None where both are blank.
@@ -56,78 +103,40 @@ class Table:
         factor = MICROMETRES[self.unit]
         return x * factor, y * factor
 
-    def integer_setting(self, key: str, default: int) -> int:
-        """Return a whole number that the head sets.
 
-        Raises
-        ------
-        InputError
-            It is set to something else.
-        """
-        text = self.settings.get(key, str(default))
-        if not (text.isascii() and text.isdigit()):
-            raise InputError(f"{key} = {text!r} is not a whole number", file=self.path)
-        return int(text)
-
-    def switch(self, key: str) -> bool | None:
-        """Return a yes or no that the head sets; None where it sets nothing.
-
-        Raises
-        ------
-        InputError
-            It is set to something else.
-        """
-        text = self.settings.get(key)
-        if text is None:
-            return None
-        if text.lower() not in ("yes", "no"):
-            raise InputError(f"{key} = {text!r} is neither yes nor no", file=self.path)
-        return text.lower() == "yes"
-
-
-def read_table(path: Path) -> Table:
+def read_table(path: Path, *columns: str) -> Table:
     """Read a table with coordinates in micrometres or millimetres.
+
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Columns that it must have besides coordinates.
 
     Raises
     ------
     InputError
-        The file cannot be read, has no names of columns, mixes units, or has a row of another length.
+        The file cannot be read, has no names of columns, lacks one, or mixes units.
     """
-    try:
-        lines = read_bytes(path).decode("utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise InputError("is not a text file in UTF-8", file=path) from None
-    settings: dict[str, str] = {}
-    numbered = []
-    for record, line in enumerate(lines, 1):
-        if line.lstrip().startswith("#"):
-            key, equals, value = line.lstrip("# ").partition("=")
-            if equals:
-                settings[key.strip().lower()] = value.strip()
-        elif line.strip(" ,"):
-            numbered.append(Place(path, record, line))
-    if not numbered:
-        raise InputError("holds no table", file=path)
-    head, *body = numbered
-    columns = tuple(name.lower() for name in cells(head.text or ""))
-    return Table(
-        path, settings, columns, head, tuple(_row(columns, place) for place in body), _unit(columns, head)
-    )
+    records = rows.Table.read(path, comment="#", spelling=str.lower)
+    records.require(*columns)
+    settings: dict[str, Setting] = {}
+    for place in records.comments:
+        key, equals, value = (place.text or "").lstrip("# ").partition("=")
+        if equals:
+            name = key.strip().lower()
+            settings[name] = Setting(name, value.strip(), place)
+    return Table(records, settings, _unit(records))
 
 
-def _row(columns: tuple[str, ...], place: Place) -> Row:
-    found = cells(place.text or "")
-    if len(found) != len(columns):
-        raise place.error(f"there are {len(found)} cells under {len(columns)} columns")
-    return Row(dict(zip(columns, found, strict=True)), place)
-
-
-def _unit(columns: tuple[str, ...], head: Place) -> str:
+def _unit(records: rows.Table) -> str:
     """Return the one unit that both coordinates are in."""
-    units = {axis: [unit for unit in MICROMETRES if f"{axis}_{unit}" in columns] for axis in "xy"}
+    there = set(records.columns)
+    units = {axis: [unit for unit in MICROMETRES if f"{axis}_{unit}" in there] for axis in "xy"}
     found = {unit for of_axis in units.values() for unit in of_axis}
     if len(found) > 1:
-        raise head.error("units are mixed: x and y must both be in um, or both in mm")
+        raise records.head.error("units are mixed: x and y must both be in um, or both in mm")
     if not all(units.values()):
-        raise head.error("there must be columns x_um and y_um, or x_mm and y_mm")
+        raise records.head.error("there must be columns x_um and y_um, or x_mm and y_mm")
     return found.pop()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from photogram.comparator.calibration import Calibration, CaseResult, PlateResult
     from photogram.comparator.closeout import Closeout
     from photogram.comparator.joint import JointFit
-    from photogram.comparator.pointing import PointReadings, Precision
+    from photogram.comparator.pointing import Ellipse, PointReadings, Precision
     from photogram.comparator.residuals import Residuals
     from photogram.comparator.rigid import RigidFit
 
@@ -35,7 +35,10 @@ CONVENTIONS = {
     "variance_components_um": "standard deviations",
     "correlation_percent": "as the listing: 100 where one coordinate does not vary (correlation: null)",
     "correction": "linear parameters and polynomials; covariance of scale_x, scale_y, nonorthogonality_rad,"
-    " nine coefficients of x, nine of y (micrometres, arguments (x - centre) / half range)",
+    " nine coefficients of x, nine of y (micrometres, arguments (x - centre) / half range); null where"
+    " outliers make it unusable",
+    "screening": "measured points that do not agree with the adjustment of the others; off_um: measured less"
+    " expected; change_um: what they change corrected coordinates by",
 }
 
 
@@ -59,6 +62,9 @@ def to_document(calibration: Calibration) -> dict[str, Any]:
         "options": asdict(calibration.options),
         "conventions": CONVENTIONS,
         "messages": [str(message) for message in calibration.messages],
+        "usable": calibration.usable,
+        "screening": asdict(calibration.screening),
+        "far_pointings": [asdict(pointing) for pointing in calibration.far_pointings],
         "linear": {
             "scale_x": linear.correction.scale_x,
             "scale_y": linear.correction.scale_y,
@@ -79,9 +85,9 @@ def to_document(calibration: Calibration) -> dict[str, Any]:
         "variance_components_um": calibration.variance.components_um,
         "variance_analysis_um": _variance(calibration),
         "case_variances": asdict(calibration.case_test) if calibration.case_test else None,
-        "joint": _joint(calibration.joint) if calibration.joint else None,
+        "joint": _joint(calibration.joint, usable=calibration.usable) if calibration.joint else None,
         "joint_check_sd": calibration.joint_check,
-        "correction": calibration.correction.document(),
+        "correction": calibration.correction.document() if calibration.usable else None,
     }
 
 
@@ -194,7 +200,15 @@ def _precision(precision: Precision) -> dict[str, Any]:
         "correlation_percent": precision.listed_correlation_percent,
         "sd_mean_um": list(precision.mean_sd_um),
         "sd_mean_point_um": precision.mean_sd_point_um,
-        "ellipse": None if math.isnan(precision.sd_point_um) else asdict(precision.ellipse),
+        "ellipse": None if math.isnan(precision.sd_point_um) else _ellipse(precision.ellipse),
+    }
+
+
+def _ellipse(ellipse: Ellipse) -> dict[str, float]:
+    return {
+        "major_um": ellipse.major_um,
+        "minor_um": ellipse.minor_um,
+        "angle_rad": ellipse.angle_rad,
     }
 
 
@@ -248,8 +262,15 @@ def _plate(calibration: Calibration, result: PlateResult) -> dict[str, Any]:
             "grid": result.listed.mean_grid_um,
         },
         "random_um": list(result.listed.random_um),
-        "locations": None if averages.locations is None else averages.locations.tolist(),
-        "location_residuals_um": None if averages.location_um is None else averages.location_um.tolist(),
+        "by_location": [
+            {
+                "cases": list(place.cases),
+                "locations": place.locations.tolist(),
+                "xy_um": place.xy_um.tolist(),
+                "residuals_um": place.residuals_um.tolist(),
+            }
+            for place in averages.by_location
+        ],
     }
 
 
@@ -269,7 +290,7 @@ def _variance(calibration: Calibration) -> dict[str, Any]:
     return {**document, "negative": list(variance.negative)}
 
 
-def _joint(joint: JointFit) -> dict[str, Any]:
+def _joint(joint: JointFit, *, usable: bool) -> dict[str, Any]:
     correction = joint.correction
     return {
         "scale_x": correction.scale_x,
@@ -298,8 +319,9 @@ def _joint(joint: JointFit) -> dict[str, Any]:
                 "sigma_um": plate.sigma_um,
                 "sigma_estimated": plate.estimated,
                 "variance_ratio": plate.variance_ratio,
+                "test": asdict(plate.test) if plate.test else None,
             }
             for number, plate in joint.plates.items()
         ],
-        "correction": correction.document(),
+        "correction": correction.document() if usable else None,
     }

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments import path
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
+from photogram.numbers import is_whole_number, whole_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,6 +42,8 @@ class Grid:
         Standard deviation of a calibrated coordinate; None where it is not known.
     adopted
         Date of the calibration, as text.
+    source
+        The file that it was read from.
     """
 
     number: int
@@ -47,13 +51,14 @@ class Grid:
     xy_um: Floats
     sigma_um: float | None = None
     adopted: str = ""
+    source: Path | None = None
 
     def __post_init__(self) -> None:
         """Refuse plates that cannot be."""
         values, counts = np.unique(self.points, return_counts=True)
         if (counts > 1).any():
             raise InputError(f"plate {self.number} has point {values[counts > 1][0]} twice")
-        if self.xy_um.shape != (len(self.points), 2) or not np.isfinite(self.xy_um).all():
+        if self.xy_um.shape != (*np.shape(self.points)[:1], 2) or not np.isfinite(self.xy_um).all():
             raise InputError(f"plate {self.number} needs two coordinates for each of its points")
         if self.sigma_um is not None and not 0 <= self.sigma_um < np.inf:
             raise InputError(f"plate {self.number}: {self.sigma_um} um is no standard deviation")
@@ -95,28 +100,26 @@ def read_grid(path: Path) -> Grid:
     InputError
         The file cannot be read or is not such a table.
     """
-    table = read_table(path)
-    table.require("point")
+    table = read_table(path, "point")
     points, xy = [], []
-    for row in table.rows:
+    for row in table.records.rows():
         coordinates = table.coordinates_um(row)
         if coordinates is not None:
             points.append(row.integer("point"))
             xy.append(coordinates)
-    number = table.integer_setting("grid", 0)
-    sigma = table.settings.get("sigma_um")
+    number, sigma = table.settings.get("grid"), table.settings.get("sigma_um")
+    deviation = None if sigma is None else sigma.number()
     try:
         return Grid(
-            number,
+            0 if number is None else number.integer(),
             np.array(points, dtype=np.int64),
             np.array(xy, dtype=float).reshape(-1, 2),
-            None if sigma is None else float(sigma),
-            table.settings.get("adopted", ""),
+            deviation,
+            table.text("adopted"),
+            path,
         )
     except InputError as error:
         raise InputError(error.message, file=path) from None
-    except ValueError:
-        raise InputError(f"sigma_um = {sigma!r} is not a number", file=path) from None
 
 
 @cache
@@ -145,6 +148,14 @@ def find_grid(name: str) -> Grid:
     InputError
         It is neither.
     """
-    if name.isdigit() and not Path(name).exists():
-        return built_in_grid(int(name))
-    return read_grid(Path(name))
+    file = path("name", name)
+    if is_whole_number(name) and not file.exists():
+        return built_in_grid(_plate_number(name))
+    return read_grid(file)
+
+
+def _plate_number(name: str) -> int:
+    try:
+        return whole_number(name)
+    except ValueError as error:
+        raise InputError(f"grid {error}") from None

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.combined import CombinedLinear, CombinedPolynomial
-from photogram.comparator.polynomial import COUNT, Frame, design
+from photogram.comparator.reduction import GridErrors, Reduction
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
     from photogram.comparator.averages import PlateAverages
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers
@@ -52,7 +51,7 @@ def listed_grid_sigma(averages: PlateAverages) -> ListedGridSigma:
     mean = math.sqrt(float(squares.sum()) / (2 * points - 1))
     location = averages.location_um
     of_locations = (
-        math.nan if location is None else math.sqrt(float((location**2).sum()) / (2 * len(location) - 1))
+        math.sqrt(float((location**2).sum()) / (2 * len(location) - 1)) if len(location) else math.nan
     )
     if cases < 2:
         return ListedGridSigma(of_locations, mean, (math.nan, math.nan), 0.0)
@@ -93,7 +92,8 @@ def unbiased_grid_sigma(
     The adjustment is linear in the errors to first order: residuals are W times (grid errors turned into the
     comparator + random errors). The expectations of two sums of squares, of the average residuals and of all
     residuals, follow from W and are linear in the variances; they are equated with what was found. Rigid,
-    linear and polynomial parameters are thus accounted for, whatever placements and points there are.
+    linear and polynomial parameters are thus accounted for, whatever placements and points there are. No
+    matrix of the size of the readings is formed: see :mod:`photogram.comparator.reduction`.
 
     Parameters
     ----------
@@ -109,93 +109,21 @@ def unbiased_grid_sigma(
         cases do not separate them, 0 where the estimate of a variance is negative.
     """
     plates = list(dict.fromkeys(case.case.plate for case in cases))
-    reduce = _reduction(stage, with_polynomial=isinstance(stage, CombinedPolynomial))
-    residuals = np.concatenate([fit.residuals.comparator_um.ravel() for fit in stage.cases])
-    spread = {plate: _grid_errors(plate, grid_rows, cases, stage) for plate in plates}
-    average = {plate: _averaging(matrix) for plate, matrix in spread.items()}
-    unit = reduce(np.eye(len(residuals)))
-    effect = {plate: reduce(matrix) for plate, matrix in spread.items()}
+    reduction = Reduction.of(stage)
+    errors = {plate: GridErrors.of(plate, grid_rows, cases, stage) for plate in plates}
+    residuals = np.vstack([fit.residuals.comparator_um for fit in stage.cases])
     forms = np.empty((len(plates) + 1, len(plates) + 1))
     found = np.empty(len(plates) + 1)
     for row, plate in enumerate(plates):
-        forms[row] = [_square(average[plate] @ effect[other]) for other in plates] + [
-            _square(average[plate] @ unit)
-        ]
-        found[row] = _square(average[plate] @ residuals)
-    forms[-1] = [_square(effect[plate]) for plate in plates] + [_square(unit)]
-    found[-1] = _square(residuals)
+        own = errors[plate]
+        forms[row, :-1] = [reduction.averages_of_errors(own, errors[other]) for other in plates]
+        forms[row, -1] = reduction.averages_of_units(own)
+        found[row] = float((own.average(residuals) ** 2).sum())
+    forms[-1, :-1] = [reduction.squares_of_errors(errors[plate]) for plate in plates]
+    forms[-1, -1] = reduction.squares_of_units()
+    found[-1] = float((residuals**2).sum())
     if np.linalg.cond(forms / forms.max(axis=1, keepdims=True)) > 1e8:
         return dict.fromkeys(plates, math.nan), math.nan
     variances = np.linalg.solve(forms, found)
     sigmas = [math.sqrt(max(0.0, float(variance))) for variance in variances]
     return dict(zip(plates, sigmas, strict=False)), sigmas[-1]
-
-
-def _square(values: Floats) -> float:
-    return float((values**2).sum())
-
-
-def _grid_errors(
-    plate: int,
-    grid_rows: Sequence[Integers],
-    cases: Sequence[PlacedCase],
-    stage: CombinedLinear | CombinedPolynomial,
-) -> Floats:
-    """Return the effect of errors of the grid on the comparator residuals: v = M^T e, a row a coordinate."""
-    own = [k for k, case in enumerate(cases) if case.case.plate == plate]
-    points = np.unique(np.concatenate([grid_rows[k] for k in own]))
-    blocks = []
-    for k, case in enumerate(cases):
-        block = np.zeros((2 * len(case.points), 2 * len(points)))
-        if k in own:
-            c, s = math.cos(stage.cases[k].rotation_rad), math.sin(stage.cases[k].rotation_rad)
-            turn = np.array([[c, -s], [s, c]])
-            if case.orientation.left_handed:
-                turn = turn[:, ::-1]
-            columns = np.searchsorted(points, grid_rows[k])
-            for row, column in enumerate(columns.tolist()):
-                block[2 * row : 2 * row + 2, 2 * column : 2 * column + 2] = turn
-        blocks.append(block)
-    return np.vstack(blocks)
-
-
-def _averaging(spread: Floats) -> Floats:
-    """Return what averages comparator residuals, turned into the grid system, by point (sign apart)."""
-    return np.asarray(spread.T / (spread**2).sum(axis=0)[:, np.newaxis])
-
-
-def _reduction(stage: CombinedLinear | CombinedPolynomial, *, with_polynomial: bool) -> _Reduction:
-    """Return what takes errors of readings to residuals, as the stages of the adjustment do."""
-    places = [fit.residuals.xy_um for fit in stage.cases]
-    everywhere = np.vstack(places)
-    functions = design(Frame.of(everywhere), everywhere)
-    zero = np.zeros_like(functions)
-    # Rows alternate between x and y.
-    both = np.stack([np.hstack([functions, zero]), np.hstack([zero, functions])], axis=1).reshape(
-        -1, 2 * COUNT
-    )
-    rigid = np.zeros((len(both), 3 * len(places)))
-    start = 0
-    for k, own in enumerate(places):
-        rows = slice(start, start + 2 * len(own))
-        x, y = (own - own.mean(axis=0)).T / 1e5
-        rigid[rows, 3 * k : 3 * k + 3] = np.stack(
-            [np.column_stack([x * 0 + 1, y * 0, -y]), np.column_stack([x * 0, y * 0 + 1, x])], axis=1
-        ).reshape(-1, 3)
-        start = rows.stop
-    # Scales and lack of orthogonality: x in x, y in y, y in x (columns of both: x x, ..., see TERMS).
-    linear = np.hstack([rigid, both[:, [6, COUNT + 7, 7]]])
-    steps = [linear, both, rigid] if with_polynomial else [linear]
-    return _Reduction([np.linalg.qr(step)[0] for step in steps])
-
-
-class _Reduction:
-    """Residuals of one least-squares fit after the other."""
-
-    def __init__(self, bases: list[Floats]) -> None:
-        self.bases = bases
-
-    def __call__(self, values: Floats) -> Floats:
-        for basis in self.bases:
-            values = values - basis @ (basis.T @ values)
-        return values

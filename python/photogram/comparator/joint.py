@@ -21,6 +21,7 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import COUNT, Frame, Polynomial
 from photogram.comparator.residuals import Residuals
 from photogram.errors import AdjustmentError
+from photogram.statistics import GlobalTest, global_test
 
 if TYPE_CHECKING:
     from photogram.adjusted import Floats
@@ -103,6 +104,8 @@ class JointPlate:
     variance_ratio
         Variance of the corrections over the one assumed; near 1 when the latter is right. None for a fixed
         grid.
+    test
+        Of the corrections against the standard deviation a priori; None where it was estimated or fixed.
     """
 
     points: Integers
@@ -111,6 +114,7 @@ class JointPlate:
     sigma_um: float
     estimated: bool
     variance_ratio: float | None
+    test: GlobalTest | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,10 +296,33 @@ def _grid_ratio(
     arrays: _Arrays, solution: _photocore.ComparatorSolution, plate: int, sigma_um: float
 ) -> float:
     """Weighted squares of the corrections of a plate over their redundancy."""
+    squares, redundancy = _grid_squares(arrays, solution, plate, sigma_um)
+    return squares / float(redundancy.sum()) if redundancy.sum() > 1e-9 else 1.0
+
+
+def _grid_test(
+    arrays: _Arrays, solution: _photocore.ComparatorSolution, plate: int, sigma_um: float
+) -> GlobalTest | None:
+    """Test the corrections of a plate against their standard deviation.
+
+    Their weighted squares are a sum of chi-squares, each times a redundancy, and thus nearly c times
+    chi-square with g degrees of freedom, of the same mean and variance (Satterthwaite): c = sum r^2 / sum r,
+    g = sum r / c.
+    """
+    squares, redundancy = _grid_squares(arrays, solution, plate, sigma_um)
+    if redundancy.sum() <= 1e-9:
+        return None
+    part = float((redundancy**2).sum() / redundancy.sum())
+    return global_test(squares / part, float(redundancy.sum()) / part)
+
+
+def _grid_squares(
+    arrays: _Arrays, solution: _photocore.ComparatorSolution, plate: int, sigma_um: float
+) -> tuple[float, Floats]:
+    """Return the weighted squares of the corrections of a plate, and their redundancy numbers."""
     own = arrays.plate_of == plate
     corrections = solution.grid_xy[own] - arrays.grid_xy[own]
-    redundancy = float(solution.grid_redundancy[own].sum())
-    return float((corrections**2).sum()) / sigma_um**2 / redundancy if redundancy > 1e-9 else 1.0
+    return float((corrections**2).sum()) / sigma_um**2, solution.grid_redundancy[own]
 
 
 def _result(
@@ -377,11 +404,13 @@ def _plate(
     scale: float,
 ) -> JointPlate:
     own = arrays.plate_of == plate
+    estimated = weights.grid_um[plate] is None
     return JointPlate(
         points=points,
         corrections_um=np.asarray(solution.grid_xy[own] - arrays.grid_xy[own]),
         covariance_um2=scale * solution.grid_cofactors[own],
         sigma_um=sigma_um,
-        estimated=weights.grid_um[plate] is None,
+        estimated=estimated,
         variance_ratio=_grid_ratio(arrays, solution, plate, sigma_um) if sigma_um > 0 else None,
+        test=_grid_test(arrays, solution, plate, sigma_um) if sigma_um > 0 and not estimated else None,
     )

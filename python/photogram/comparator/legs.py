@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.comparator.grouping import rows_by_point
 from photogram.comparator.readings import Case
 from photogram.errors import InputError
 
@@ -69,10 +70,12 @@ def reduce_legs(case: Case) -> tuple[Case, list[LegPoint], list[Message]]:
     keep = case.legs == 0
     xy_um = case.xy_um.copy()
     reduced, messages = [], []
-    for point in dict.fromkeys(case.points[case.legs > 0].tolist()):
-        rows = np.flatnonzero((case.points == point) & (case.legs > 0))
+    on_legs = np.flatnonzero(case.legs > 0)
+    on_intersections = set(case.points[keep].tolist())
+    for point, own_rows in rows_by_point(case.points[on_legs]):
+        rows = on_legs[own_rows]
         place = case.places[rows[0]]
-        if (keep & (case.points == point)).any():
+        if point in on_intersections:
             raise place.error(f"point {point} is measured both on its intersection and on its legs")
         own = [rows[case.legs[rows] == leg] for leg in LEGS]
         present = sum(len(leg) > 0 for leg in own)

@@ -27,8 +27,8 @@ class Options:
         Grid residuals of the polynomials of one case: `consistent` (measured less given, as everywhere) or
         `listing` (the reverse).
     nanometres
-        Sigmas of the analysis of variance: `exact`, or `truncated` to whole nanometres as the listing stores
-        them.
+        Sigmas after the linear stage in the analysis of variance: `exact`, or `truncated` to whole nanometres
+        as the listing stores them.
     free_residuals
         Comparator residuals of rigid fits: `report` (turned with the scale of the similarity transformation,
         which changes them by 1e-5 of themselves) or `exact`.

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.errors import InputError
+from photogram.neighbours import mutually_nearest
 
 if TYPE_CHECKING:
     from photogram.adjusted import Floats
@@ -101,11 +103,12 @@ def locations(grid: Grid, corner: int) -> Integers | None:
     turned = centred
     for _ in range(TURNS[corner] % 4):
         turned = np.column_stack([-turned[:, 1], turned[:, 0]])
-    distances = np.hypot(*(turned[:, np.newaxis] - centred[np.newaxis]).transpose(2, 0, 1))
-    nearest = distances.argmin(axis=1)
-    apart = np.hypot(*(centred[:, np.newaxis] - centred[np.newaxis]).transpose(2, 0, 1))
-    spacing = apart[apart > 0].min(initial=np.inf)
-    if len(set(nearest.tolist())) < len(nearest) or distances.min(axis=1).max() > MATCH * spacing:
+    # Typical of neighbours; the least distance may be that of two points outside the pattern.
+    spacing = math.sqrt(float((high - low).prod()) / len(centred))
+    if spacing == 0:
+        return None
+    nearest = mutually_nearest(turned, centred, MATCH * spacing)
+    if (nearest < 0).any():
         return None
     numbers: Integers = grid.points[nearest]
     return numbers

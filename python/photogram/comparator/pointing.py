@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.comparator.grouping import group
+
 if TYPE_CHECKING:
     from photogram.adjusted import Floats
     from photogram.comparator.readings import Integers
@@ -156,23 +158,26 @@ def read_points(points: Integers, xy_um: Floats) -> list[PointReadings]:
     Deviations are formed from the first reading of each point, so that large coordinates cost no digits and
     identical readings give exactly zero.
     """
-    result = []
-    for point in dict.fromkeys(points.tolist()):
-        own = xy_um[points == point]
-        offsets = own - own[0]
-        shift = offsets.mean(axis=0)
-        deviations = offsets - shift
-        squares = (deviations**2).sum(axis=0)
-        result.append(
-            PointReadings(
-                point,
-                len(own),
-                own[0] + shift,
-                (float(squares[0]), float(squares[1])),
-                float(deviations.prod(axis=1).sum()),
-            )
+    order = group(points)
+    starts = np.flatnonzero(np.diff(points[order], prepend=points[order[:1]] - 1))
+    counts = np.diff([*starts, len(points)])
+    first = xy_um[order[starts]]
+    offsets = xy_um[order] - np.repeat(first, counts, axis=0)
+    shifts = np.add.reduceat(offsets, starts) / counts[:, np.newaxis]
+    deviations = offsets - np.repeat(shifts, counts, axis=0)
+    squares = np.add.reduceat(deviations**2, starts)
+    products = np.add.reduceat(deviations.prod(axis=1), starts)
+    return [
+        PointReadings(point, count, mean, (square_x, square_y), product)
+        for point, count, mean, (square_x, square_y), product in zip(
+            points[order[starts]].tolist(),
+            counts.tolist(),
+            first + shifts,
+            squares.tolist(),
+            products.tolist(),
+            strict=True,
         )
-    return result
+    ]
 
 
 def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> Precision:
@@ -190,21 +195,20 @@ def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> P
     readings = list(points)
     total = sum(point.count for point in readings)
     dof = total - len(readings) if listed_dof is None else listed_dof
-    squares = np.array([point.squares_um2 for point in readings]).reshape(-1, 2)
-    counts = np.array([point.count for point in readings])[:, np.newaxis]
 
-    def mean(values: Floats) -> tuple[float, float]:
-        x, y = values.sum(axis=0) / dof if dof > 0 else (math.nan, math.nan)
-        return float(x), float(y)
+    def mean(values: Iterable[float]) -> float:
+        return math.fsum(values) / dof if dof > 0 else math.nan
 
-    products = sum(point.products_um2 for point in readings)
     return Precision(
         readings=total,
         points=len({point.point for point in readings}),
         degrees_of_freedom=dof,
-        variance_um2=mean(squares),
-        covariance_um2=products / dof if dof > 0 else math.nan,
-        mean_variance_um2=mean(squares / counts),
+        variance_um2=(mean(p.squares_um2[0] for p in readings), mean(p.squares_um2[1] for p in readings)),
+        covariance_um2=mean(p.products_um2 for p in readings),
+        mean_variance_um2=(
+            mean(p.squares_um2[0] / p.count for p in readings),
+            mean(p.squares_um2[1] / p.count for p in readings),
+        ),
     )
 
 

@@ -21,13 +21,23 @@ if TYPE_CHECKING:
 
     Integers = NDArray[np.int64]
 
-__all__ = ["Case", "Reading", "Session", "collect_cases"]
+__all__ = ["LARGEST_UM", "Case", "Reading", "Session", "collect_cases"]
 
 FURTHEST_UM = 1000.0
 """A reading this far from the others on its point was taken on another point, or is in another unit."""
 
 
-@dataclass(frozen=True)
+LARGEST_UM = 1e8
+"""A hundred metres: larger coordinates are no measurements, and their powers would overflow."""
+
+
+CENTRE_UM = 125_000.0
+"""Middle of the range of most comparators (TRANS)."""
+CENTRES_UM = {10: 1_000_000.0, 11: 1_500_000.0, 12: 300_000.0, 13: 300_000.0, 14: 1_000_000.0}
+"""And of those of the program with other ranges: STK1, PSK, other."""
+
+
+@dataclass(frozen=True, slots=True)
 class Reading:
     """One pointing.
 
@@ -98,21 +108,40 @@ class Case:
         if not finite.all():
             at = int(np.flatnonzero(~finite)[0])
             raise self.places[at].error(f"case {self.number}, point {self.points[at]}: not a number")
+        largest = np.abs(self.xy_um).max(axis=1, initial=0.0)
+        if largest.max(initial=0.0) > LARGEST_UM:
+            at = int(largest.argmax())
+            raise self.places[at].error(
+                f"case {self.number}, point {self.points[at]}: a coordinate of {largest[at]:.3g} um is beyond"
+                f" every comparator ({LARGEST_UM:g} um)"
+            )
         known = np.isin(self.points, grid.points)
         if not known.all():
             at = int(np.flatnonzero(~known)[0])
             raise self.places[at].error(f"point {self.points[at]} is unknown: plate {grid.number} has it not")
-        for point in np.unique(self.points):
-            own = np.flatnonzero((self.points == point) & (self.legs == 0))
-            if not len(own):
-                continue
-            away = np.abs(self.xy_um[own] - np.median(self.xy_um[own], axis=0)).max(axis=1)
-            if away.max() > FURTHEST_UM:
-                place = self.places[own[int(away.argmax())]]
-                raise place.error(
-                    f"case {self.number}, point {point}: a reading is {away.max():.0f} um from the others: "
-                    "another point, or another unit?"
-                )
+        self._refuse_far_readings()
+
+    def _refuse_far_readings(self) -> None:
+        rows = np.flatnonzero(self.legs == 0)
+        _, own = np.unique(self.points[rows], return_inverse=True)
+        away = np.abs(self.xy_um[rows] - _medians(own, self.xy_um[rows])[own]).max(axis=1)
+        if away.max(initial=0.0) > FURTHEST_UM:
+            at = rows[int(away.argmax())]
+            raise self.places[at].error(
+                f"case {self.number}, point {self.points[at]}: a reading is {away.max():.0f} um from the"
+                " others: another point, or another unit?"
+            )
+
+
+def _medians(groups: Integers, values: Floats) -> Floats:
+    """Return the medians of columns by group, numbered from 0."""
+    counts = np.bincount(groups)
+    first = np.cumsum(counts) - counts
+    medians = np.empty((len(counts), values.shape[1]))
+    for axis, column in enumerate(values.T):
+        ordered = column[np.lexsort((column, groups))]
+        medians[:, axis] = (ordered[first + (counts - 1) // 2] + ordered[first + counts // 2]) / 2
+    return medians
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +161,13 @@ class Session:
     left_handed
         Whether the comparator is left-handed against the plate; None where nothing is said. The measurements
         decide; what they contradict is an error.
-    sorted_input, least_count_one_micrometre, plot_each_case
+    sorted_input, least_count_one_micrometre
         Options of the header that the title page repeats.
+    plot_each_case
+        Whether tables and pictures of the corrections of every case are wanted, too.
+    range_centre_um
+        Middle of the range of the comparator in x and in y (TRANS of the listing); None for that of the
+        program for this comparator.
     source
         File of the first record.
     messages
@@ -149,8 +183,18 @@ class Session:
     sorted_input: bool = False
     least_count_one_micrometre: bool = True
     plot_each_case: bool = False
+    range_centre_um: float | None = None
     source: Path | None = None
     messages: list[Message] = field(default_factory=list)
+
+    @property
+    def centre_um(self) -> float:
+        """Middle of the range of the comparator, in x and in y: of the table of corrections."""
+        if self.range_centre_um is not None:
+            return self.range_centre_um
+        if self.secondary or (self.comparator == 11 and self.least_count_one_micrometre):
+            return CENTRES_UM[10]
+        return CENTRES_UM.get(self.comparator, CENTRE_UM)
 
     def grid_of(self, case: Case) -> Grid:
         """Return the plate that a case was measured on.

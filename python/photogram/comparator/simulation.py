@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arrays import shaped
 from photogram.comparator.correction import Correction
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.readings import Case, Session
+from photogram.errors import InputError
 from photogram.places import Place
 
 if TYPE_CHECKING:
@@ -90,10 +92,17 @@ def simulate_calibration(
         One for each four cases.
     comparator, date, seed
         Number, date, and seed of the random numbers.
+
+    Raises
+    ------
+    InputError
+        No operator, a rotation that is infinite, a negative seed, errors of another shape.
     """
+    if not operators or not math.isfinite(rotation_rad) or seed < 0:
+        raise InputError("a simulation needs an operator, a finite rotation and a seed that is not negative")
     random = np.random.default_rng(seed)
     drawn = grid_um * random.standard_normal((len(grid.points), 2))
-    errors = drawn if grid_errors_um is None else np.asarray(grid_errors_um, dtype=float)
+    errors = drawn if grid_errors_um is None else shaped("grid_errors_um", grid_errors_um, drawn.shape)
     plate = replace(grid, xy_um=grid.xy_um + errors)
     points = _default_sequence(grid.points) if sequence is None else np.array(sequence, dtype=np.int64)
     rows = grid.rows_of(points)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from photogram.comparator.csvfile import Table, read_table
+from photogram.comparator.csvfile import Setting, Table, read_table
 from photogram.comparator.grid import Grid, find_grid
-from photogram.comparator.readings import Case, Reading, Session, collect_cases
+from photogram.comparator.readings import LARGEST_UM, Case, Reading, Session, collect_cases
 from photogram.errors import InputError
+from photogram.numbers import is_whole_number
 from photogram.rows import Row
 
 __all__ = ["read_csv", "to_csv"]
@@ -22,7 +23,8 @@ def read_csv(
     Each has the columns `case`, `point` and `x_um`, `y_um` (or `x_mm`, `y_mm`), and may have `plate` (number
     of the grid), `leg` (1 to 4; 0 or blank: intersection) and `operator`. Rows stand in the order measured;
     those with blank coordinates are missing. Lines above the table may set `# grid = 1320` (a built-in grid,
-    or a file beside the table), `# comparator = 3`, `# date = 7/17/72`, `# left_handed = yes`.
+    or a file beside the table), `# comparator = 3`, `# date = 7/17/72`, `# left_handed = yes`,
+    `# range_centre_um = 125000` (middle of the range of the comparator).
 
     Parameters
     ----------
@@ -38,39 +40,51 @@ def read_csv(
     InputError
         A file that is no such table, no plate, a case measured twice.
     """
-    tables = [read_table(path) for path in paths]
+    if not paths:
+        raise InputError("there is no table to read")
+    tables = [read_table(path, "case", "point") for path in paths]
     plates = {grid.number: grid for grid in grids}
     if not plates:
         plates = {grid.number: grid for table in tables for grid in _named_grids(table)}
     if not plates:
         raise InputError("names no grid plate: '# grid = 1320', or --grid", file=paths[0])
     cases = collect_cases(reading for table in tables for reading in _readings(table, plates))
-    said = [table.switch("left_handed") for table in tables]
+    said = [setting.switch() for setting in _settings(tables, "left_handed")]
+    centres = [_range_centre_um(setting) for setting in _settings(tables, "range_centre_um")]
     session = Session(
         cases=cases,
         grids=plates,
-        comparator=max(table.integer_setting("comparator", 0) for table in tables),
-        date=next((table.settings["date"] for table in tables if "date" in table.settings), ""),
-        left_handed=left_handed
-        if left_handed is not None
-        else next((s for s in said if s is not None), None),
+        comparator=max((setting.integer() for setting in _settings(tables, "comparator")), default=0),
+        date=next((setting.text for setting in _settings(tables, "date")), ""),
+        left_handed=left_handed if left_handed is not None else next(iter(said), None),
+        range_centre_um=next(iter(centres), None),
         source=paths[0],
     )
     session.check()
     return session
 
 
+def _settings(tables: Sequence[Table], key: str) -> list[Setting]:
+    return [table.settings[key] for table in tables if key in table.settings]
+
+
+def _range_centre_um(setting: Setting) -> float:
+    value = setting.number()
+    if abs(value) > LARGEST_UM:
+        raise setting.place.error(f"{setting.key} = {value:g} is beyond every comparator ({LARGEST_UM:g} um)")
+    return value
+
+
 def _named_grids(table: Table) -> list[Grid]:
     """Return the plates that a table names: built in, or files beside it."""
-    names = [name.strip() for name in table.settings.get("grid", "").split(",") if name.strip()]
-    return [find_grid(name if name.isdigit() else str(table.path.parent / name)) for name in names]
+    names = [name.strip() for name in table.text("grid").split(",") if name.strip()]
+    return [find_grid(name if is_whole_number(name) else str(table.path.parent / name)) for name in names]
 
 
 def _readings(table: Table, plates: dict[int, Grid]) -> list[Reading]:
-    table.require("case", "point")
     return [
         _reading(row, xy, next(iter(plates)) if len(plates) == 1 else 0)
-        for row in table.rows
+        for row in table.records.rows()
         if (xy := table.coordinates_um(row)) is not None
     ]
 
@@ -95,6 +109,8 @@ def to_csv(session: Session) -> bytes:
     lines = [f"# comparator = {session.comparator}"]
     lines += [f"# grid = {', '.join(str(number) for number in session.grids)}"]
     lines += [f"# date = {session.date}"] if session.date else []
+    if session.range_centre_um is not None:
+        lines.append(f"# range_centre_um = {session.range_centre_um:g}")
     if session.left_handed is not None:
         lines.append(f"# left_handed = {'yes' if session.left_handed else 'no'}")
     lines.append("plate,case,operator,leg,point,x_um,y_um")

@@ -32,7 +32,7 @@ class AxisSigma:
         return math.sqrt((self.x**2 + self.y**2) / 2)
 
     def truncated(self) -> AxisSigma:
-        """Return both cut to whole nanometres, as the INTEGER array CAL of the listing did."""
+        """Return both cut to whole nanometres, as SIGX and SIGY in the INTEGER array CAL of the listing."""
         return AxisSigma(math.floor(self.x * NM) / NM, math.floor(self.y * NM) / NM)
 
 
@@ -107,7 +107,8 @@ def analyse_variance(
     grid_um
         Standard deviation of a grid coordinate.
     as_listed
-        Cut the sigmas after the linear and nonlinear stages to whole nanometres first.
+        Cut the sigmas after the linear stage (SIGX, SIGY) to whole nanometres first: the listing takes them
+        back from the INTEGER array of its cards, those after the nonlinear stage it still has.
     """
     before = _pooled(free, sum(len(fit.residuals.points) - 1.5 for fit in free))
     # nu of equation 57 counts both axes.
@@ -115,7 +116,6 @@ def analyse_variance(
     after = AxisSigma(*nonlinear.sigma_um) if nonlinear else None
     if as_listed:
         after_linear = after_linear.truncated()
-        after = after.truncated() if after else None
     last = after or after_linear
     means = pointing.mean_sd_um if pointing.degrees_of_freedom > 0 else (0.0, 0.0)
     mean_pointing = AxisSigma(*means)

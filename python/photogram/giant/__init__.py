@@ -1,5 +1,6 @@
 """The files of GIANT (Elassal and Malhotra, NOAA 1987): COMMON, CAMERAS, IMAGES, FRAMES and GROUND."""
 
+from photogram.arguments import check_arguments
 from photogram.giant.cameras import Camera
 from photogram.giant.checks import Check, Finding, Section, check
 from photogram.giant.common import Common
@@ -29,3 +30,19 @@ __all__ = [
     "read_project",
     "write_project",
 ]
+
+check_arguments(
+    globals(),
+    [
+        "Camera",
+        "Common",
+        "Frame",
+        "GroundPoint",
+        "Limits",
+        "check",
+        "error_warnings",
+        "listing",
+        "read_project",
+        "write_project",
+    ],
+)

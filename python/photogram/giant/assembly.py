@@ -15,7 +15,7 @@ from photogram.giant.frames import ATTITUDE_SD, Frame
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.limits import Limits, allowed_images, check_bandwidth, check_files, check_points
 from photogram.giant.records import error_at, message_at
-from photogram.giant.remarks import remarks
+from photogram.giant.remarks import plain_name, remarks
 from photogram.messages import Message
 from photogram.refraction import Air, Refraction, Water, metres_per_unit
 from photogram.structuring import structure
@@ -182,6 +182,7 @@ def _control(project: Contents, index: dict[str, int], messages: list[Message]) 
     sd = np.full((len(index), 3), np.inf)
     control: dict[int, GroundPoint] = {}
     placed: set[str] = set()
+    alike = {plain_name(name): name for name in index}
     for point in project.ground:
         if point.name in placed:
             messages.append(
@@ -191,8 +192,10 @@ def _control(project: Contents, index: dict[str, int], messages: list[Message]) 
         placed.add(point.name)
         row = index.get(point.name)
         if row is None:
+            like = alike.get(plain_name(point.name))
+            hint = f" (the point {like!r} is, but names are compared exactly)" if like else ""
             messages.append(
-                message_at(point.record, f"control point {point.name} is not photographed: ignored")
+                message_at(point.record, f"control point {point.name} is not photographed: ignored{hint}")
             )
             continue
         control[row] = point

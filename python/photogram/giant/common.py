@@ -140,6 +140,7 @@ def parse_common(source: Source) -> Common:
     common.residual_limit = job.real(41, 50)
     common.semi_major = job.real(51, 60, 2) or common.semi_major
     common.semi_minor = job.real(61, 70, 2) or common.semi_minor
+    _remark_on_refraction(common, job)
     if common.convergence_percent < 0:
         raise job.error("columns 18-19: the convergence criterion is negative")
     if not 0 < common.semi_minor <= common.semi_major:
@@ -157,6 +158,21 @@ def parse_common(source: Source) -> Common:
         if record.number > 3:
             record.remark("COMMON has three records: this one is ignored")
     return common
+
+
+def _remark_on_refraction(common: Common, job: Record) -> None:
+    """Say what columns 16 and 17 ask for: images that were corrected before would be corrected twice."""
+    if common.air_refraction:
+        job.remark(
+            "column 16 asks for refraction in air, and it is applied (by the model of Appendix F unless an"
+            " option names another); 0 if the preprocessing has corrected the images for it"
+        )
+    if common.water_refraction:
+        job.remark(
+            "column 17 asks for refraction in water, and it is applied to points below"
+            f" {common.water_level:g} m (columns 31-40; by the model of Appendix G unless an option names"
+            " another); 0 if there are none"
+        )
 
 
 def _digit(job: Record, column: int, largest: int) -> int:

@@ -43,6 +43,8 @@ def block_files(
         strip="",
     )
     messages = _write_refraction(common, block)
+    stations, moved = _stations(block)
+    messages += moved
     if block.spheroid is not None:
         common.semi_major, common.semi_minor = round(block.spheroid.a, 2), round(block.spheroid.b, 2)
         if (common.semi_major, common.semi_minor) != (block.spheroid.a, block.spheroid.b):
@@ -50,7 +52,7 @@ def block_files(
     distances = dict.fromkeys(block.principal_distances.tolist())
     names = {distance: f"CAMERA{number}" for number, distance in enumerate(distances, 1)}
     cameras = [Camera(name, distance) for distance, name in names.items()]
-    frames = _frames(block)
+    frames = _frames(block, stations)
     images = _images(block, [names[distance] for distance in block.principal_distances.tolist()])
     return common, cameras, frames, images, _ground(block), messages
 
@@ -83,11 +85,26 @@ def _write_refraction(common: Common, block: Block) -> list[Message]:
     return messages
 
 
-def _frames(block: Block) -> list[Frame]:
+def _stations(block: Block) -> tuple[tuple[Floats, Floats], list[Message]]:
+    """Return the positions and attitudes for FRAMES, which has one set: observed ones where weighted."""
+    stations, left = [], False
+    for initial, observed, sd in (
+        (block.photo_positions, block.photo_positions_observed, block.photo_position_sd),
+        (block.photo_attitudes, block.photo_attitudes_observed, block.photo_attitude_sd),
+    ):
+        weighted = np.isfinite(sd)
+        values = initial if observed is None else np.where(weighted, observed, initial)
+        left |= bool((values != initial).any())
+        stations.append(values)
+    text = "FRAMES has one set of stations: observed values are written, initial values are not"
+    return (stations[0], stations[1]), [Message(text)] if left else []
+
+
+def _frames(block: Block, stations: tuple[Floats, Floats]) -> list[Frame]:
     rows = zip(
         block.photo_ids,
-        block.photo_positions,
-        _turns(block.photo_attitudes),
+        stations[0],
+        _turns(stations[1]),
         _weights("the position of photo", block.photo_ids, block.photo_position_sd),
         _weights("the attitude of photo", block.photo_ids, block.photo_attitude_sd),
         strict=True,

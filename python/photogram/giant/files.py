@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from photogram.errors import InputError
-from photogram.files import spare
 
-__all__ = ["NAMES", "find_files", "present_files", "spare_input", "to_bytes", "written"]
+__all__ = ["NAMES", "find_files", "present_files", "project_name", "to_bytes", "written"]
 
 NAMES = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")
 """The input files; they are found in any letter case and with any one extension."""
@@ -19,25 +18,21 @@ def present_files(directory: Path) -> dict[str, list[Path]]:
     found: dict[str, list[Path]] = {name: [] for name in NAMES}
     try:
         entries = sorted(directory.iterdir())
-    except OSError as error:
-        raise InputError(f"the directory cannot be read: {error.strerror}", file=directory) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"the directory cannot be read: {reason}", file=directory) from None
     for entry in entries:
-        name = entry.stem.upper()
-        if name in found and entry.is_file():
+        name = project_name(entry)
+        # A link that leads nowhere or round in a loop is meant to be the file: reading it says what it is.
+        if name and (entry.is_file() or (entry.is_symlink() and not entry.exists())):
             found[name].append(entry)
     return found
 
 
-def spare_input(path: Path, directory: Path) -> None:
-    """Refuse to write a document over a file of the project in a directory.
-
-    Raises
-    ------
-    InputError
-        The path is one of its files.
-    """
-    inputs = [found for candidates in present_files(directory).values() for found in candidates]
-    spare([path], inputs)
+def project_name(path: Path) -> str | None:
+    """Return which file of a project this would be by its name; None for another file."""
+    name = path.stem.upper()
+    return name if name in NAMES else None
 
 
 def find_files(directory: Path) -> dict[str, Path]:

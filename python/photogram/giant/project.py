@@ -7,7 +7,6 @@ from pathlib import Path
 
 from photogram.block import Block
 from photogram.errors import InputError
-from photogram.files import write_whole
 from photogram.giant.assembly import assemble
 from photogram.giant.cameras import parse_cameras
 from photogram.giant.common import Common, parse_common
@@ -19,6 +18,7 @@ from photogram.giant.ground import parse_ground
 from photogram.giant.images import parse_images
 from photogram.giant.limits import Limits
 from photogram.giant.records import Source
+from photogram.writing import write_whole
 
 __all__ = ["Project", "project_files", "read_project", "write_project"]
 

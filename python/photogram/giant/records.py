@@ -94,8 +94,16 @@ class Record(records.Record):
 
     def real(self, first: int, last: int, decimals: int = 3) -> float:
         """Read an Fw.d field."""
-        format_ = f"F{last - first + 1}.{decimals}"
-        return float(self._parse(first, last, format_, lambda text: parse_real(text, decimals)))
+        width = last - first + 1
+        value = float(
+            self._parse(first, last, f"F{width}.{decimals}", lambda text: parse_real(text, decimals))
+        )
+        if abs(value) >= 10**width:
+            # As with standard deviations: the output files have the same columns.
+            raise self.error(
+                f"columns {first}-{last}: {value:g} is out of range, {width} columns could not hold it"
+            )
+        return value
 
     def angle(self, first: int, last: int, decimals: int = 3) -> float:
         """Read a packed DMS field as radians."""

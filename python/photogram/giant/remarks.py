@@ -8,9 +8,9 @@ from photogram import geometry
 from photogram.block import Block
 from photogram.giant.frames import Frame
 from photogram.giant.records import message_at
-from photogram.messages import Message
+from photogram.messages import Message, listed
 
-__all__ = ["FEWEST_TIES", "remarks", "ties"]
+__all__ = ["FEWEST_TIES", "plain_name", "remarks", "ties"]
 
 FEWEST_TIES = 3
 """Points that the orientation of a photo needs at least."""
@@ -23,7 +23,7 @@ UPRIGHT = 0.97
 
 
 def remarks(block: Block, frames: list[Frame]) -> list[Message]:
-    """Return remarks on stations without enough rays, and on coordinates of a map projection.
+    """Return remarks on stations without enough rays, names that are alike, and coordinates of a map.
 
     Parameters
     ----------
@@ -41,7 +41,32 @@ def remarks(block: Block, frames: list[Frame]) -> list[Message]:
                 " rests on its weights, which are the weak defaults"
             )
             messages.append(message_at(frame.record, text))
-    return messages + _map_projection(block)
+    return messages + _alike(block) + _map_projection(block)
+
+
+def plain_name(name: str) -> str:
+    """Return a name without blanks and case."""
+    return "".join(name.split()).casefold()
+
+
+def _alike(block: Block) -> list[Message]:
+    """Name the photos and points whose names differ by case or blanks inside only.
+
+    The program compared names exactly (2A4), so they are different ones; few users mean that.
+    """
+    messages = []
+    for what, names in (("photos", block.photo_ids), ("points", block.point_ids)):
+        groups: dict[str, list[str]] = {}
+        for name in names:
+            groups.setdefault(plain_name(name), []).append(name)
+        pairs = [" and ".join(map(repr, group)) for group in groups.values() if len(group) > 1]
+        if pairs:
+            messages.append(
+                Message(
+                    f"{what} whose names differ by case or blanks only are different {what}: {listed(pairs)}"
+                )
+            )
+    return messages
 
 
 def ties(block: Block) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import orjson
@@ -28,6 +29,7 @@ def to_json(run: Run) -> bytes:
             "residual": "measured minus projected, unit of the model",
             "radial_distortion": "mm on the plate, positive outward",
             "standardized": "residual / its own standard deviation, from sigma0_plate",
+            "studentized": "residual / its own standard deviation, from that of all others: Student",
         },
         "messages": [str(message) for message in run.messages],
         "error": None if run.stop is None else str(run.stop.error),
@@ -48,6 +50,11 @@ def _set(result: PerspectiveCenter) -> dict[str, Any]:
         "sigma0_plate": result.sigma0_plate,
         "sigma0_model": result.sigma0_model,
         "covariance": None if result.covariance is None else result.covariance.tolist(),
+        "test": {
+            "of": "studentized",
+            "limit": result.limit if math.isfinite(result.limit) else None,
+            "outliers": [[result.grid.ids[row], "XY"[axis]] for row, axis in result.outliers],
+        },
         "converged": result.converged,
         "iterations": len(result.cycles),
         "points": _points(result),
@@ -64,7 +71,11 @@ def _points(result: PerspectiveCenter) -> list[dict[str, Any]]:
         result.radial_distortion.tolist(),
         result.redundancy.tolist(),
         result.standardized.tolist(),
+        result.studentized.tolist(),
         strict=True,
     )
-    names = ("id", "readings", "mean", "residual", "radial_distortion", "redundancy", "standardized")
+    names = (
+        *("id", "readings", "mean", "residual", "radial_distortion"),
+        *("redundancy", "standardized", "studentized"),
+    )
     return [dict(zip(names, row, strict=True)) for row in columns]

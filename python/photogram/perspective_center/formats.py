@@ -7,6 +7,7 @@ columns, and NaN has no spelling.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -58,6 +59,7 @@ class CardFormat:
         self.text = _parenthesised("".join(text.split()).upper())
         if _ALLOWED.fullmatch(self.text) is None:
             raise ValueError(f"{self.text} holds more than the descriptors I, F, E, D, X and T")
+        _check_sizes(self.text)
         try:
             self._reader = fortranformat.FortranRecordReader(self.text)
             ruler = "".join(chr(_FIRST + column) for column in range(4 * COLUMNS))
@@ -115,6 +117,15 @@ class CardFormat:
         if counts:
             record.remark(f"{place}: the blanks in {raw!r} count as zeros, which makes it {digits}")
         return digits.rjust(field.last - field.first)
+
+
+def _check_sizes(text: str) -> None:
+    """Refuse what cannot stand on a card, before any memory or time is spent on it."""
+    # Nine digits do: int() has a limit of its own.
+    numbers = [int(digits[:9]) for digits in re.findall(r"[0-9]+", text)]
+    groups = math.prod(int(digits[:9]) for digits in re.findall(r"([0-9]+)\(", text))
+    if max(numbers, default=0) > COLUMNS or groups > COLUMNS**2:
+        raise ValueError(f"{text} holds repeats, widths or columns beyond the {COLUMNS} columns of a card")
 
 
 def _parenthesised(text: str) -> str:

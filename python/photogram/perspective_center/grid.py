@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arrays import shaped
+from photogram.arrays import names, number, shaped
 from photogram.errors import InputError
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "reduce"]
@@ -95,7 +96,7 @@ class Grid:
     number: int = 1
 
     def __post_init__(self) -> None:
-        count = len(self.ids)
+        count = len(names("ids", self.ids))
         shapes: dict[str, tuple[int, ...]] = {
             "plate_xy": (count, 2),
             "model": (count, 3),
@@ -108,11 +109,11 @@ class Grid:
             if not np.isfinite(values).all():
                 raise InputError(f"{name} holds values that are not finite")
             object.__setattr__(self, name, values)
-        readings = shaped("readings", self.readings, (count,)).astype(np.int64)
-        if (readings < 1).any():
-            raise InputError("readings: every point has one reading at least")
-        object.__setattr__(self, "readings", readings)
-        if not self.principal_distance > 0:
+        readings = shaped("readings", self.readings, (count,))
+        if not ((readings >= 1) & (readings < 2**53) & (readings == np.trunc(readings))).all():
+            raise InputError("readings: every point has a whole number of them, one at least")
+        object.__setattr__(self, "readings", readings.astype(np.int64))
+        if not 0 < number("principal_distance", self.principal_distance) < math.inf:
             raise InputError(f"the principal distance must be positive, not {self.principal_distance}")
 
 
@@ -138,7 +139,14 @@ def reduce(
         None to leave the means as they are. Standard deviations are always those of the raw readings.
     ids, plate_xy, principal_distance, initial, tolerance, title, number
         As in :class:`Grid`.
+
+    Raises
+    ------
+    InputError
+        Readings of another shape.
     """
+    if any(each.ndim != 2 or each.shape[1] != 3 or not len(each) for each in readings):
+        raise InputError("the readings of a point are an array of the shape (k, 3)")
     means = np.array([np.mean(each, axis=0) for each in readings])
     sd = [np.std(each[:, :2], axis=0, ddof=1) if len(each) > 1 else np.zeros(2) for each in readings]
     if coordinatograph is not None:

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
-from photogram.arrays import shaped
+from photogram.arrays import one_of, shaped
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.geometry import rotation_matrix
-from photogram.messages import Message
+from photogram.messages import Message, listed
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
 from photogram.resection import Observed, solve
+from photogram.statistics import externally_studentized, studentized_limit
 
 __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]
 
@@ -83,7 +84,11 @@ class PerspectiveCenter:
         difference, positive outward.
     redundancy, standardized
         (n, 2) redundancy numbers of the residuals in X and Y, and residual / its own standard deviation, the
-        latter from `sigma0_plate`; NaN without redundancy.
+        latter from `sigma0_plate`; NaN without redundancy. The latter never exceed the root of the degrees of
+        freedom.
+    studentized
+        (n, 2) the same with the standard error of unit weight of all other coordinates: Student with 2 n - 7
+        degrees of freedom, and without a bound. NaN with less than two degrees of freedom.
     messages
         Remarks on the solution.
     """
@@ -106,12 +111,25 @@ class PerspectiveCenter:
     radial_distortion: Floats
     redundancy: Floats
     standardized: Floats
+    studentized: Floats
     messages: list[Message]
 
     @property
     def attitude_minutes(self) -> Floats:
         """(3,) omega, phi, kappa in minutes."""
         return self.attitude * MINUTES_PER_RADIAN
+
+    @property
+    def limit(self) -> float:
+        """What studentized residuals of good readings exceed in one of twenty sets (Bonferroni)."""
+        return studentized_limit(self.degrees_of_freedom, int(np.isfinite(self.studentized).sum()))
+
+    @property
+    def outliers(self) -> list[tuple[int, int]]:
+        """Row and axis (0 X, 1 Y) of the residuals beyond the limit, the largest first."""
+        values = np.abs(np.nan_to_num(self.studentized))
+        beyond = np.argwhere(values > self.limit).tolist()
+        return sorted(((row, axis) for row, axis in beyond), key=lambda place: -values[place])
 
     @property
     def covariance(self) -> Floats | None:
@@ -178,8 +196,7 @@ def determine(
 
 def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats:
     """Return weights of the points, 1 in the mean."""
-    if weights not in get_args(Weights):
-        raise InputError(f"weights is one of {', '.join(get_args(Weights))}, not {weights!r}")
+    one_of("weights", weights, get_args(Weights))
     if model_sd is not None:
         variance = shaped("model_sd", model_sd, (len(grid.ids),)) ** 2
     elif weights == "deviations":
@@ -264,10 +281,12 @@ def _result(
         math.sqrt(float((weight[:, np.newaxis] * v**2).sum() / freedom)) if freedom > 0 else None
         for v in (on_plate, residual)
     )
-    redundancy, standardized = _tests(solution, weight, to_model, residual, sigma0)
+    redundancy, reduced = _tests(solution, weight, to_model, residual)
+    standardized = reduced / (sigma0 or math.nan)
+    squares = float((weight[:, np.newaxis] * on_plate**2).sum())
     observed_radius = np.hypot(*(grid.plate_xy - solution.residuals).T)
     fixed_radius = np.hypot(*grid.plate_xy.T)
-    return PerspectiveCenter(
+    result = PerspectiveCenter(
         grid=grid,
         as_published=as_published,
         converged=solution.status == "converged",
@@ -289,8 +308,23 @@ def _result(
         radial_distortion=observed_radius - fixed_radius,
         redundancy=redundancy,
         standardized=standardized,
+        studentized=externally_studentized(reduced, squares, freedom),
         messages=messages,
     )
+    if result.outliers:
+        messages.append(Message(_outliers_named(result)))
+    return result
+
+
+def _outliers_named(result: PerspectiveCenter) -> str:
+    grid = result.grid
+    named = [
+        f"point {grid.ids[row]} {'XY'[axis]} (t {result.studentized[row, axis]:.3g},"
+        f" residual {result.residual[row, axis]:.4g})"
+        for row, axis in result.outliers
+    ]
+    where = f"{grid.title}, data set {grid.number}: ".lstrip(", ")
+    return f"{where}readings beyond the limit {result.limit:.2f} of their test: {listed(named)}"
 
 
 def _projection(grid: Grid, position: Floats, attitude: Floats) -> tuple[Floats, Floats]:
@@ -318,9 +352,8 @@ def _tests(
     weight: Floats,
     to_model: Floats,
     residual: Floats,
-    sigma0: float | None,
 ) -> tuple[Floats, Floats]:
-    """Redundancy numbers and standardized residuals in the model.
+    """Redundancy numbers, and residuals in the model / their standard deviations for unit weight.
 
     The residuals on the plate have the cofactors P^-1 - A Q A^T; both sides turned into the model, the
     quotient of their diagonals is the part of an error of X or Y that shows in its residual.
@@ -331,6 +364,4 @@ def _tests(
     turned = [to_model @ each @ to_model.transpose(0, 2, 1) for each in (residuals, observed)]
     of_residuals, of_observed = (np.diagonal(each, axis1=1, axis2=2) for each in turned)
     redundancy: Floats = of_residuals / of_observed
-    testable = (redundancy > TESTABLE) & (sigma0 is not None)
-    scale = (sigma0 or math.nan) * np.sqrt(np.where(testable, of_residuals, np.nan))
-    return redundancy, residual / scale
+    return redundancy, residual / np.sqrt(np.where(redundancy > TESTABLE, of_residuals, np.nan))

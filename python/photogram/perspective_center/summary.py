@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
+from photogram.messages import listed
 from photogram.perspective_center.listing import NOT_CONVERGED
 from photogram.perspective_center.solution import PerspectiveCenter
 
 __all__ = ["summary"]
-
-SUSPECT = 3.29
-"""Standardized residuals beyond this are named: one in a thousand by chance."""
 
 
 def summary(result: PerspectiveCenter) -> list[str]:
@@ -35,10 +35,10 @@ def summary(result: PerspectiveCenter) -> list[str]:
         f" {result.sigma0_model:.5f} in the model; largest radial distortion"
         f" {1000 * max(result.radial_distortion, key=abs):+.1f} um"
     )
+    if not math.isfinite(result.limit):
+        return [*lines, "  no test of single residuals: it takes two degrees of freedom"]
     suspects = [
-        f"{name} {axis} ({value:+.2f})"
-        for name, pair in zip(grid.ids, result.standardized, strict=True)
-        for axis, value in zip("XY", pair, strict=True)
-        if abs(value) > SUSPECT
+        f"{grid.ids[row]} {'XY'[axis]} ({result.studentized[row, axis]:+.2f})"
+        for row, axis in result.outliers
     ]
-    return [*lines, f"  standardized residuals beyond {SUSPECT}: {', '.join(suspects) or 'none'}"]
+    return [*lines, f"  studentized residuals beyond {result.limit:.2f}: {listed(suspects) or 'none'}"]

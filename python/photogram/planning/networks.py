@@ -10,6 +10,7 @@ import orjson
 
 from photogram import _photocore
 from photogram.adjustment import Progress
+from photogram.arguments import check_arguments
 from photogram.block import Block
 from photogram.errors import InputError, RankError
 from photogram.planning.pattern import Pattern
@@ -142,3 +143,6 @@ def _pattern(pattern: Pattern) -> dict[str, Any]:
         "photos": [asdict(quality) for quality in pattern.photos],
         "control": [asdict(quality) for quality in pattern.control],
     }
+
+
+check_arguments(globals(), ["plan"])

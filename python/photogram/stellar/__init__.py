@@ -1,5 +1,6 @@
 """Stellar camera calibration (NOAA Technical Report NOS 55, 1972)."""
 
+from photogram.arguments import check_arguments
 from photogram.stellar.adjustment import calibrate
 from photogram.stellar.cameras import BrownCamera, PlateCamera
 from photogram.stellar.options import Options
@@ -20,3 +21,19 @@ __all__ = [
     "default_parameters",
     "refraction",
 ]
+
+check_arguments(
+    globals(),
+    [
+        "Air",
+        "Axis",
+        "BrownCamera",
+        "Options",
+        "PlateCamera",
+        "Problem",
+        "Site",
+        "calibrate",
+        "default_parameters",
+        "refraction",
+    ],
+)

@@ -15,6 +15,7 @@ from photogram.stellar import published, strict
 from photogram.stellar.combination import combine
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.movement import movement, pairs_to_combine
+from photogram.stellar.outliers import culprits, outliers
 from photogram.stellar.parameters import GROUPS, INDEX
 from photogram.stellar.problem import Problem
 from photogram.stellar.result import PreRun, Result, Stage
@@ -53,10 +54,12 @@ def calibrate(
     AdjustmentError
         Errors 2 to 4 of the report: stars or parameters that are not determined, observations too few.
     InputError
-        Stars of the minimum solution that are not there.
+        Stars of the minimum solution that are not there; fewer than one thread.
     KeyboardInterrupt
         Ctrl-C.
     """
+    if threads is not None and threads < 1:
+        raise InputError(f"{threads} threads are too few")
     iterate = (
         published.iterate
         if problem.options.as_published
@@ -82,16 +85,52 @@ def calibrate(
     free = free_parameters(problem)
     _check_groups(problem)
     limit = problem.options.max_iterations
-    solved = iterate(problem, initial, free, solution="maximum", limit=limit)
-    stages = (*stages, _stage(problem, solved))
     remarks: list[str] = []
+    if problem.options.as_published:
+        solved, remarks = _from_far(problem, initial, free)
+    else:
+        solved = iterate(problem, initial, free, solution="maximum", limit=limit)
+    stages = (*stages, _stage(problem, solved))
     if problem.options.refraction and solved.converged:
         solved = _refraction(problem, iterate, solved)
         stages = (*stages, _stage(problem, solved))
     elif problem.options.refraction:
         remarks = ["REFRACTION SOLUTION ELIMINATED FROM PROBLEM"]
+    if not stages[-1].converged:
+        remarks += culprits(
+            problem,
+            solved,
+            lambda left: iterate(left, initial, free_parameters(left), solution="maximum", limit=limit),
+        )
     result = _result(problem, problem, solved, stages, remarks=remarks)
-    return _combined(result) if problem.options.movement_factor > 0 else result
+    return _combined(result, threads) if problem.options.movement_factor > 0 else result
+
+
+def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, list[str]]:
+    """Iterate as published; where its steps, which nothing damps, lead astray, from better attitudes.
+
+    A deck starts all groups with the attitude of the event. Attitudes by the strict iteration, the camera
+    held, begin where the report's steps lead to its solution, which does not depend on the beginning.
+    """
+    run = partial(published.iterate, solution="maximum", limit=problem.options.max_iterations)
+    failed: AdjustmentError | None = None
+    try:
+        solved = run(problem, initial, free)
+        if solved.stop != published.DIVERGED:
+            return solved, []
+    except AdjustmentError as error:
+        failed = error
+    attitudes = free & (np.arange(len(free)) < INDEX["epsilon"])
+    try:
+        start = strict.iterate(problem, initial, attitudes, solution="maximum", limit=0).parameters
+        again = run(problem, start, free)
+        if again.converged:
+            return again, ["the initial attitudes are far: the iteration began with those of a damped one"]
+    except AdjustmentError:
+        pass
+    if failed is not None:
+        raise failed
+    return solved, []
 
 
 def free_parameters(problem: Problem) -> Bools:
@@ -190,15 +229,27 @@ def _result(
 ) -> Result:
     unsettled = [] if solved.converged else [f"the solution has not converged: {solved.stop}"]
     result = Result(solved_problem, solved, stages[-1].counts, (), problem, stages, pre_run)
-    texts = (*unsettled, *remarks, *solved.remarks, *result.doubtful())
+    failed = result.test.problem() if result.test else None
+    texts = (
+        *unsettled,
+        *([failed] if failed else []),
+        *outliers(result),
+        *remarks,
+        *solved.remarks,
+        *result.doubtful(),
+    )
     return replace(result, messages=tuple(Message(text) for text in texts))
 
 
-def _combined(result: Result) -> Result:
+def _combined(result: Result, threads: int | None) -> Result:
     """Test the camera for movement; combine the attitudes whose directions do not differ."""
     test = movement(result)
     pairs = pairs_to_combine(test, result.problem.options.movement_factor)
     result = replace(result, movement=test)
     if not pairs:
         return replace(result, messages=(*result.messages, Message("NO COMBINED SOLUTION")))
-    return replace(result, combined=combine(result, pairs))
+    combined = combine(result, pairs, threads=threads)
+    if not combined.converged:
+        text = f"the combined solution has not converged: {combined.solved.stop}"
+        result = replace(result, messages=(Message(text), *result.messages))
+    return replace(result, combined=combined)

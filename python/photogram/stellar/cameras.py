@@ -62,6 +62,9 @@ def _read(path: Path, kind: str, names: tuple[str, ...]) -> tuple[dict[str, Any]
         order = [names.index(name) for name in document["covariance"]["order"]]
         matrix = np.array(document["covariance"]["matrix"], float).reshape(len(order), len(order))
         found = np.array([v["value"] if isinstance(v, dict) else v for v in values], float)
+        # A null becomes NaN.
+        if not (np.isfinite(found).all() and np.isfinite(matrix).all() and (np.diag(matrix) >= 0).all()):
+            raise InputError("is not a camera: what is not a number, or a negative variance", file=path)
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise

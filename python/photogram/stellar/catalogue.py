@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from photogram.angles import ARCSEC
 from photogram.errors import InputError
-from photogram.rows import read_rows
+from photogram.rows import Row, read_rows
 
 __all__ = ["Catalogue"]
 
@@ -96,13 +96,21 @@ class Catalogue:
         Raises
         ------
         InputError
-            The file cannot be read, a column is missing, or a value is not a number; with the record.
+            The file cannot be read, a column is missing, a value is not a number, a declination is beyond the
+            pole, or a star is listed twice; with the record.
         """
         rows = read_rows(path, _COLUMNS)
+        first: dict[str, Row] = {}
+        for row in rows:
+            name = row.cells.get("id", "")
+            if first.setdefault(name, row) is not row:
+                raise row.place.error(f"star {name} is listed twice")
+            if not abs(row.required("dec_deg")) <= 90:
+                raise row.place.error("dec_deg is not between -90 and 90")
         values = [[row.required(name) for name in _COLUMNS[1:]] for row in rows]
         table = np.array(values, float).reshape(-1, 6)
         return cls(
-            tuple(row.cells["id"] for row in rows),
+            tuple(row.cells.get("id", "") for row in rows),
             np.radians(table[:, :2]),
             _MAS * table[:, 2:4],
             _MAS * table[:, 4],

@@ -1,4 +1,4 @@
-"""Attitudes constrained to common values by the method of modification (report, equations 104, 105)."""
+"""Attitudes constrained to common values: as published by the method of modification (equations 104, 105)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.stellar import published, strict
-from photogram.stellar.parameters import GROUPS
+from photogram.stellar.parameters import GROUPS, NAMES
 
 if TYPE_CHECKING:
+    from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
+    from photogram.stellar.state import Solved
 
 __all__ = ["combine", "constraints", "modify"]
 
@@ -50,8 +52,10 @@ def modify(cofactors: Floats, right: Floats, c: Floats, misclosure: Floats) -> t
     return step + gain @ (misclosure - c @ step), cofactors - gain @ across.T
 
 
-def combine(result: Result, pairs: tuple[tuple[str, str], ...]) -> Result:
-    """Constrain the attitudes of the given pairs to common values, without iterating again.
+def combine(result: Result, pairs: tuple[tuple[str, str], ...], *, threads: int | None = None) -> Result:
+    """Constrain the attitudes of the given pairs to common values.
+
+    As published by one linear step, without iterating again; else iterated, with one attitude for the groups.
 
     Parameters
     ----------
@@ -59,11 +63,22 @@ def combine(result: Result, pairs: tuple[tuple[str, str], ...]) -> Result:
         The solution without constraints.
     pairs
         Groups that the movement test found equal; two pairs stand for all three groups.
+    threads
+        Number of threads; all processors when None.
 
     Returns
     -------
     A result of its own, whose degrees of freedom count the constraints.
     """
+    counts = replace(result.counts, constraints=len(constraints(pairs, len(NAMES))))
+    made = (
+        _modified(result, pairs) if result.problem.options.as_published else _iterated(result, pairs, threads)
+    )
+    return replace(result, solved=made, counts=counts, pairs=pairs, movement=(), messages=())
+
+
+def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
+    """Correct once (equations 104 and 105), and compute residuals."""
     solved, problem = result.solved, result.problem
     c = constraints(pairs, len(solved.parameters))
     # Whole turns between two kappas are no movement.
@@ -71,10 +86,57 @@ def combine(result: Result, pairs: tuple[tuple[str, str], ...]) -> Result:
     misclosure = -(np.remainder(off + np.pi, 2 * np.pi) - np.pi)
     step, cofactors = modify(solved.cofactors, np.zeros(len(solved.parameters)), c, misclosure)
     parameters = solved.parameters + step
-    if problem.options.as_published:
-        again = published.residual_cycle(problem, parameters, solved.free, cofactors=cofactors)
-    else:
-        again = strict.residual_cycle(problem, parameters, solved.free, solved.places, cofactors=cofactors)
-    again = replace(again, stop=solved.stop, converged=solved.converged, levels=solved.levels)
-    counts = replace(result.counts, constraints=len(c))
-    return replace(result, solved=again, counts=counts, pairs=pairs, movement=(), messages=())
+    again = published.residual_cycle(problem, parameters, solved.free, cofactors=cofactors)
+    return replace(again, stop=solved.stop, converged=solved.converged, levels=solved.levels)
+
+
+def _iterated(result: Result, pairs: tuple[tuple[str, str], ...], threads: int | None) -> Solved:
+    """Adjust again with one attitude for the groups of the pairs, and give it to all of them."""
+    solved, problem = result.solved, result.problem
+    together = sorted({GROUPS.index(name) for pair in pairs for name in pair})
+    last = together[-1]
+    groups = np.array([last if group in together else group for group in range(3)])
+    # All parameters from those that are left.
+    spread = np.eye(len(NAMES))
+    for group in together[:-1]:
+        spread[3 * group : 3 * group + 3] = spread[3 * last : 3 * last + 3]
+    weights, initial = _common_weights(problem, spread, solved.parameters)
+    merged = replace(
+        problem,
+        image_groups=groups[problem.image_groups],
+        axis=problem.axis and replace(problem.axis, group=int(groups[problem.axis.group])),
+        parameter_weights=weights,
+        initial=initial,
+    )
+    free = solved.free & (spread.any(axis=0))
+    again = strict.iterate(
+        merged,
+        solved.parameters,
+        free,
+        solution="combined",
+        limit=problem.options.max_iterations,
+        threads=threads,
+    )
+    final = strict.residual_cycle(
+        problem,
+        spread @ again.parameters,
+        solved.free,
+        again.places,
+        cofactors=spread @ again.cofactors @ spread.T,
+    )
+    return replace(final, stop=again.stop, converged=again.converged, levels=again.levels)
+
+
+def _common_weights(problem: Problem, spread: Floats, near: Floats) -> tuple[Floats, Floats]:
+    """Return weights and weighted values of the parameters that are left: those of groups together add up."""
+    weights = spread.T @ problem.parameter_weights @ spread
+    if not problem.weighted[:9].any():
+        return weights, problem.initial
+    initial = problem.initial.copy()
+    # Whole turns between two angles are no difference.
+    initial[:9] += 2 * np.pi * np.round(((spread @ near)[:9] - initial[:9]) / (2 * np.pi))
+    weighted = np.flatnonzero(np.diag(weights) > 0)
+    right = spread.T @ problem.parameter_weights @ initial
+    values = initial.copy()
+    values[weighted] = np.linalg.solve(weights[np.ix_(weighted, weighted)], right[weighted])
+    return weights, values

@@ -105,9 +105,11 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
     event, plate, comparator = (
         cards.take(what) for what in ("card 5 (event)", "card 6 (plate)", "card 7 (comparator)")
     )
-    site = _site(cards.take("card 8 (station)"), Air(values[2], values[3]))
-    if not values[2] > 0 or values[3] < 0:
-        raise constants.error("the temperature in kelvin must be positive, the pressure not negative")
+    try:
+        air = Air(values[2], values[3])
+    except InputError as error:
+        raise constants.error(error.message) from None
+    site = _site(cards.take("card 8 (station)"), air)
     reference, pole = None, (0.0, 0.0)
     if descriptors[9]:
         reference = _site(cards.take("card 9 (reference station)"), site.air)
@@ -325,8 +327,9 @@ def _minimum(cards: Cards, count: int) -> dict[str, Card]:
 
 
 def _refuse_missing(named: dict[str, Card], there: list[str], message: str) -> None:
+    known = set(there)
     for number, card in named.items():
-        if number not in there:
+        if number not in known:
             raise card.error(f"{message}: {number}")
 
 
@@ -345,17 +348,22 @@ def _factor(card: Card) -> float:
 
 def _data(cards: Cards, common: _Common) -> _Data:
     data, last = _Data(), False
+    known: set[str] = set()
     while not last:
         card = cards.take("a star card")
         number, count = card.integer(61, 66), card.integer(69, 71)
         star = str(abs(number))
-        if star in data.ids:
+        if star in known:
             raise card.error(f"star {star} is in the deck twice")
         if count < 1:
             raise card.error(f"star {star} has no images")
+        known.add(star)
         data.ids.append(star)
         data.names.append(card.name(72, 77) or star)
-        data.places.append([card.real(1, 14), card.real(15, 28)])
+        place = [card.real(1, 14), card.real(15, 28)]
+        if abs(place[1]) > np.pi / 2:
+            raise card.error(f"the declination {place[1]:g} of star {star} is beyond the pole")
+        data.places.append(place)
         data.weights.append(np.zeros((2, 2)) if number < 0 else _star_weight(card, common))
         for image in range(count):
             card = cards.take(f"an image of star {star}")

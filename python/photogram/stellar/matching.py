@@ -1,93 +1,227 @@
-"""Which catalogue star a measured image shows, from an approximate attitude and camera."""
+"""Which catalogue star a measured image shows, from an approximate attitude and camera, and by what odds."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["match", "mutually_nearest"]
+from photogram.neighbours import mutually_nearest
+from photogram.stellar.odds import ACCEPTED, CROWDED, expected_false
+
+__all__ = ["Match", "match"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
-_SEEDS, _PAIRS = 25, 400
-"""Brightest images that make hypotheses, and hypotheses tried."""
-_PLAIN = 0.7
-"""Share of bright images that a hypothesis has to explain to be taken at once."""
+_SEEDS = 25
+"""Brightest images that make hypotheses; three times as many vote for them."""
+_RASTER, _BATCH, _EXACT = 2000, 4096, 20
+"""Cells of a raster a side, hypotheses that are counted in it at once, and those that are counted exactly."""
+_CANDIDATES = 1500
+"""Pairs of an image and a star that make hypotheses at most: they are compared two by two."""
+_DEEPER = 2
+"""Stars in the frame for each image: where the catalogue has more, the faint ones only match by chance."""
+STRETCH = 0.01
+"""Share by which the scale of the approximate camera may be wrong."""
 
 
-def match(measured: Floats, predicted: Floats, *, radius: float, tolerance: float) -> Indices:
+@dataclass(frozen=True, eq=False)
+class Match:
+    """What was matched, and how likely chance would have done as well.
+
+    Attributes
+    ----------
+    found
+        (m,) index of the predicted image of each image; -1 where there is none.
+    expected
+        Expected number of equally good matches among all hypotheses if every one of them is wrong.
+    matched, images
+        Of how many images the count was made that this rests on, and how many of them matched.
+    crowded
+        Whether there are so many stars in a tolerance area that counting cannot tell.
+    scale
+        Of the predicted images over the measured ones.
+    """
+
+    found: Indices
+    expected: float
+    matched: int
+    images: int
+    crowded: bool = False
+    scale: float = 1.0
+
+    @property
+    def accepted(self) -> bool:
+        """Whether chance would not have found as much."""
+        return self.expected < ACCEPTED
+
+
+@dataclass(frozen=True, eq=False)
+class _Sky:
+    """Predicted images as deep as the measured ones, and their density.
+
+    Attributes
+    ----------
+    predicted
+        (n, 2), the brightest first.
+    density
+        Stars a square pixel: in the frame or around it, whichever is larger.
+    """
+
+    predicted: Floats
+    density: float
+
+    @classmethod
+    def as_deep(cls, predicted: Floats, images: int, frame: tuple[float, float], radius: float) -> _Sky:
+        """Take the brightest predicted images, for so many measured ones in the frame."""
+        area = frame[0] * frame[1]
+        around = (frame[0] + 2 * radius) * (frame[1] + 2 * radius)
+        chosen = predicted[: math.ceil(_DEEPER * max(images, _SEEDS) * around / area)]
+        inside = int(((chosen >= 0) & (chosen <= frame)).all(axis=1).sum())
+        return cls(chosen, max(inside / area, len(chosen) / around))
+
+    def mu(self, tolerance: float) -> float:
+        """Return the mean number of stars in a tolerance area."""
+        return self.density * math.pi * tolerance**2
+
+
+def match(
+    measured: Floats,
+    predicted: Floats,
+    *,
+    frame: tuple[float, float],
+    radius: float,
+    tolerance: float,
+    stretch: float = STRETCH,
+) -> Match:
     """Match measured star images to predicted ones.
 
     Pairs of bright images vote for a similarity between the two sets; the best one is refined by cubic
-    polynomials.
+    polynomials. Two counts say whether that is more than chance (`photogram.stellar.odds`): of the bright
+    images near a star under the best similarity; and of every second image under polynomials that were fitted
+    to the others. Either holds for all hypotheses together, so both take part in their number.
 
     Parameters
     ----------
     measured
         (m, 2) images, the brightest first.
     predicted
-        (n, 2) images of catalogue stars under the approximate attitude, the brightest first.
+        (n, 2) images of catalogue stars under the approximate attitude, the brightest first. Of many, the
+        brightest are taken, two for each image.
+    frame
+        Width and height.
     radius
         Largest distance between an image and its prediction.
     tolerance
-        Largest distance that is left after them.
-
-    Returns
-    -------
-    (m,) index of the predicted image; -1 where there is none.
+        Largest distance that is left after the polynomials.
+    stretch
+        Share by which the scale may be wrong.
     """
-    none = np.full(len(measured), -1, np.int64)
+    none = Match(np.full(len(measured), -1, np.int64), math.inf, 0, len(measured))
     if len(measured) < 3 or len(predicted) < 3:
         return none
-    best, most = None, 2
     seeds = measured[: 3 * _SEEDS]
-    for transform in _hypotheses(measured[:_SEEDS], predicted[: 2 * _SEEDS], radius, tolerance):
-        found = mutually_nearest(_apply(transform, seeds), predicted, 3 * tolerance)
-        count = int((found >= 0).sum())
-        if count > most:
-            best, most = transform, count
-        if most > _PLAIN * len(seeds):
-            break
+    bright = _Sky.as_deep(predicted, len(seeds), frame, radius)
+    transforms = _hypotheses(measured[:_SEEDS], bright.predicted, radius, tolerance, stretch)
+    count = len(transforms)
+    best, most = None, 2
+    for transform in _promising(transforms, seeds, bright.predicted, 3 * tolerance):
+        found = mutually_nearest(_apply(transform, seeds), bright.predicted, 3 * tolerance)
+        matched = int((found >= 0).sum())
+        if matched > most:
+            best, most = transform, matched
+    expected = expected_false(len(seeds), 2, bright.mu(3 * tolerance), most, 2 * count)
     if best is None:
         return none
-    moved = _apply(best, measured)
+    if bright.mu(3 * tolerance) > CROWDED:
+        expected = math.inf
+    sky = _Sky.as_deep(predicted, len(measured), frame, radius)
+    halves = np.arange(len(measured)) % 2 == 0
+    again = mutually_nearest(
+        _refined(measured, sky.predicted, best, tolerance, halves), sky.predicted, tolerance
+    )
+    held_out = int((again[~halves] >= 0).sum())
+    # Both images of a pair may be among those held out.
+    second = expected_false(int((~halves).sum()), 2, sky.mu(tolerance), held_out, 2 * count)
+    crowded = sky.mu(tolerance) > CROWDED
+    counted = (most, len(seeds))
+    if not crowded and second < expected:
+        expected, counted = second, (held_out, int((~halves).sum()))
+    moved = _refined(measured, sky.predicted, best, tolerance, np.ones(len(measured), bool))
+    return Match(
+        mutually_nearest(moved, sky.predicted, tolerance),
+        expected,
+        *counted,
+        crowded=crowded and bright.mu(3 * tolerance) > CROWDED,
+        scale=math.hypot(best[0, 0], best[0, 1]),
+    )
+
+
+def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: float, fitted: Bools) -> Floats:
+    """Move all images by polynomials that fit some of them to the predicted ones."""
+    moved = _apply(start, measured)
     for degree in (1, 1, 2, 3, 3, 3):
         found = mutually_nearest(moved, predicted, 2 * tolerance)
-        chosen = found >= 0
+        chosen = (found >= 0) & fitted
         if chosen.sum() < 3:
-            return none
+            return moved
         # Three matches and more for each coefficient.
         degree = min(degree, 3 if chosen.sum() > 30 else 2 if chosen.sum() > 18 else 1)
         moved = _fitted(measured, chosen, predicted[found[chosen]], degree)
-    return mutually_nearest(moved, predicted, tolerance)
+    return moved
 
 
-def _hypotheses(measured: Floats, predicted: Floats, radius: float, tolerance: float) -> list[Floats]:
-    """Return similarities (3, 2) from pairs of candidates whose separations agree, the widest pairs first."""
+def _hypotheses(
+    measured: Floats, predicted: Floats, radius: float, tolerance: float, stretch: float
+) -> Floats:
+    """Return similarities (h, 3, 2) from pairs of candidates whose separations agree."""
     distance = np.linalg.norm(measured[:, None] - predicted[None], axis=2)
     i, k = np.nonzero(distance <= radius)
+    if len(i) > _CANDIDATES:
+        # The brightest images and stars.
+        order = np.argsort(i / len(measured) + k / len(predicted), kind="stable")[:_CANDIDATES]
+        i, k = i[order], k[order]
     a, b = np.triu_indices(len(i), 1)
     keep = (i[a] != i[b]) & (k[a] != k[b])
     a, b = a[keep], b[keep]
     first = (measured[i[b]] - measured[i[a]]) @ np.array([1, 1j])
     second = (predicted[k[b]] - predicted[k[a]]) @ np.array([1, 1j])
-    agree = (np.abs(np.abs(first) - np.abs(second)) < 3 * tolerance + 0.01 * np.abs(first)) & (
-        np.abs(first) > radius
+    agree = (np.abs(np.abs(first) - np.abs(second)) < 3 * tolerance + stretch * np.abs(first)) & (
+        np.abs(first) > min(radius, 0.25 * np.ptp(measured, axis=0).max())
     )
-    # Small turns first: the approximate attitude is nearly right.
-    turn = np.abs(np.angle(second[agree] / first[agree]))
-    order = np.argsort(np.round(turn, 2) * 10 - np.abs(first[agree]) / np.abs(first).max(initial=1.0))[
-        :_PAIRS
-    ]
-    made = []
-    for p, z, w in zip(a[agree][order], first[agree][order], second[agree][order], strict=True):
-        factor = w / z
-        shift = predicted[k[p]] @ np.array([1, 1j]) - factor * (measured[i[p]] @ np.array([1, 1j]))
-        made.append(
-            np.array([[factor.real, factor.imag], [-factor.imag, factor.real], [shift.real, shift.imag]])
-        )
-    return made
+    a, b, z, w = a[agree], b[agree], first[agree], second[agree]
+    factor = w / z
+    shift = predicted[k[a]] @ np.array([1, 1j]) - factor * (measured[i[a]] @ np.array([1, 1j]))
+    rows = [[factor.real, factor.imag], [-factor.imag, factor.real], [shift.real, shift.imag]]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _promising(transforms: Floats, seeds: Floats, predicted: Floats, limit: float) -> Floats:
+    """Return the similarities (h, 3, 2) under which the most images fall near a star, counted in a raster."""
+    corner = predicted.min(axis=0) - 3 * limit
+    size = max(0.5 * limit, float(np.ptp(predicted, axis=0).max()) / _RASTER)
+    shape = np.ceil((predicted.max(axis=0) + 3 * limit - corner) / size).astype(np.int64) + 1
+    near = np.zeros(shape, bool)
+    steps = math.ceil(limit / size)
+    x, y = np.floor((predicted - corner) / size).astype(np.int64).T
+    for dx in range(-steps, steps + 1):
+        for dy in range(-steps, steps + 1):
+            if math.hypot(dx, dy) * size <= limit:
+                near[np.clip(x + dx, 0, shape[0] - 1), np.clip(y + dy, 0, shape[1] - 1)] = True
+    # The rim is far from every star: what falls outside goes there.
+    near[0] = near[-1] = False
+    near[:, 0] = near[:, -1] = False
+    counts = np.empty(len(transforms), np.int64)
+    for first in range(0, len(transforms), _BATCH):
+        some = transforms[first : first + _BATCH]
+        cells = (seeds @ some[:, :2] + some[:, 2:] - corner) / size
+        column, row = np.clip(cells, 0, shape - 1).astype(np.int64).transpose(2, 0, 1)
+        counts[first : first + _BATCH] = near[column, row].sum(axis=1)
+    return transforms[np.argsort(-counts, kind="stable")[:_EXACT]]
 
 
 def _apply(transform: Floats, points: Floats) -> Floats:
@@ -100,37 +234,3 @@ def _fitted(measured: Floats, chosen: NDArray[np.bool_], predicted: Floats, degr
     powers = [(i, k - i) for k in range(degree + 1) for i in range(k + 1)]
     design = np.column_stack([x**i * y**j for i, j in powers])
     return np.asarray(design @ np.linalg.lstsq(design[chosen], predicted, rcond=None)[0], float)
-
-
-def mutually_nearest(points: Floats, predicted: Floats, limit: float) -> Indices:
-    """Return for each point its mutually nearest predicted one within a limit; else -1."""
-    found, back = _nearest(points, predicted, limit), _nearest(predicted, points, limit)
-    mutual = (found >= 0) & (back[found] == np.arange(len(points))) if len(predicted) else found >= 0
-    return np.where(mutual, found, -1)
-
-
-def _nearest(points: Floats, others: Floats, limit: float) -> Indices:
-    """Return for each point the nearest of the others within a limit, -1 for none.
-
-    The others are sorted into cells as wide as the limit, so that only nine cells are searched.
-    """
-    best, least = np.full(len(points), -1, np.int64), np.full(len(points), limit**2)
-    if not len(others):
-        return best
-    corner = others.min(axis=0)
-    cells = np.floor((others - corner) / limit).astype(np.int64) + 1
-    width = int(cells[:, 1].max()) + 2
-    order = np.argsort(cells @ [width, 1], kind="stable")
-    keys = (cells @ [width, 1])[order]
-    own = np.floor((points - corner) / limit).astype(np.int64) + 1
-    inside = np.flatnonzero(((own >= 0) & (own <= cells.max(axis=0) + 1)).all(axis=1))
-    for step in (-width - 1, -width, -width + 1, -1, 0, 1, width - 1, width, width + 1):
-        wanted = own[inside] @ [width, 1] + step
-        first, last = (np.searchsorted(keys, wanted, side) for side in ("left", "right"))
-        for k in range(int((last - first).max(initial=0))):
-            here = first + k < last
-            point, other = inside[here], order[first[here] + k]
-            square = np.sum((points[point] - others[other]) ** 2, axis=1)
-            nearer = square <= least[point]
-            best[point[nearer]], least[point[nearer]] = other[nearer], square[nearer]
-    return best

@@ -9,24 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.errors import InputError
-from photogram.messages import Message
+from photogram.messages import Message, listed
+from photogram.statistics import GlobalTest, global_test
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.matching import mutually_nearest
-from photogram.stellar.places import Earth, apparent_places, sidereal_time
-from photogram.stellar.skies import (
-    Exposure,
-    SkyCalibration,
-    calibrate_exposures,
-    identify,
-    project_sky,
-    stars_near,
-)
+from photogram.stellar.comparison import held_out
+from photogram.stellar.hints import Setting, find_hint
+from photogram.stellar.identification import Found, Sighting, identify, identify_again
+from photogram.stellar.odds import ACCEPTED
+from photogram.stellar.places import Earth
+from photogram.stellar.skies import Exposure, SkyCalibration, calibrate_exposures
 from photogram.stellar.sky import Site
 
 __all__ = ["CalibratedNight", "Night", "calibrate_night"]
@@ -43,6 +41,8 @@ _REACH = 3.0
 """Distance from a predicted image up to which a measured one is called its star at least, pixels."""
 _FEWEST = 2
 """Stars that an attitude needs."""
+DOUBTFUL = 5.0
+"""Residuals that are larger than assumed by more than this make no camera."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Night:
     site, earth
         Where the camera stood; UT1 - UTC and the pole.
     catalogue
-        As deep as the images.
+        The brightest stars first (`Catalogue.brighter`); at least as deep as the images.
     frame
         Width and height, pixels.
     camera
@@ -122,6 +122,9 @@ class CalibratedNight:
         Camera and attitudes.
     identified, rejected
         (E,) images with a star, and those of them that were left out because they contradict the rest.
+    odds
+        (E,) expected number of wrong attitudes under which as many images have a star, under the final
+        camera. NaN where the images name their stars.
     messages
         Remarks.
     """
@@ -132,12 +135,35 @@ class CalibratedNight:
     calibration: SkyCalibration
     identified: Indices
     rejected: Indices
+    odds: Floats
     messages: tuple[Message, ...]
 
     @property
     def converged(self) -> bool:
         """Whether the last adjustment ended by its criterion."""
         return self.calibration.status == "converged"
+
+    @cached_property
+    def test(self) -> GlobalTest | None:
+        """The global test of the residuals against `Night.pixel_sd`."""
+        found = self.calibration
+        return global_test(found.mean_error**2 * found.degrees_of_freedom, found.degrees_of_freedom)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the camera may be used.
+
+        Not so when the adjustment has not converged, residuals are larger than assumed by a factor of
+        `DOUBTFUL`, or more exposures are left out than take part.
+        """
+        test = self.test
+        beyond = test is not None and test.rejected_high and test.factor > DOUBTFUL
+        return self.converged and not beyond and not self.mostly_left_out
+
+    @property
+    def mostly_left_out(self) -> bool:
+        """Whether more exposures are left out than take part."""
+        return len(self.night.exposures) > 2 * len(self.exposures)
 
     @property
     def camera(self) -> BrownCamera:
@@ -172,11 +198,14 @@ class _Seen:
         (k,) catalogue star of each image, -1 for none.
     kept
         (k,) which images take part.
+    odds
+        Expected number of wrong attitudes that would do as well.
     """
 
     index: int
     stars: Indices
     kept: NDArray[np.bool_]
+    odds: float = 0.0
 
     def exposure(self, night: Night, attitude: Floats | None = None) -> Exposure:
         """Return the exposure with the stars of the images that take part."""
@@ -188,6 +217,10 @@ class _Seen:
 def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight:
     """Identify the stars of a night and calibrate the camera.
 
+    An exposure takes part when chance would not have found its stars (`photogram.stellar.odds`), and stays
+    when it fits the camera of the others (`photogram.stellar.comparison`). The others are named, with the
+    mistake that explains them if there is one (`photogram.stellar.hints`).
+
     Raises
     ------
     InputError
@@ -197,32 +230,143 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
     """
     # The pole turns all attitudes alike: it waits for the last adjustment.
     still = replace(night, earth=Earth(night.earth.dut1))
-    seen, messages = _identified(still)
-    found = _adjusted(still, [each.exposure(still) for each in seen], night.camera, threads)
-    for _ in range(_ROUNDS):
-        pairs = zip(seen, found.attitudes, strict=True)
-        again = [_seen_again(still, each, found, attitude) for each, attitude in pairs]
-        same = zip(again, seen, strict=True)
-        if all((a.kept == b.kept).all() and (a.stars == b.stars).all() for a, b in same):
-            break
-        seen = again
-        exposures = [each.exposure(still, a) for each, a in zip(seen, found.attitudes, strict=True)]
-        found = _adjusted(still, exposures, found.camera, threads)
-    else:
-        messages.append(Message(f"images still come and go after {_ROUNDS} rounds of rejection"))
-    exposures = [each.exposure(still, a) for each, a in zip(seen, found.attitudes, strict=True)]
+    run = _Run(still, threads)
+    run.compare()
+    if run.identify_left_out():
+        run.compare()
     if night.earth.pole != (0.0, 0.0):
-        found = _adjusted(night, exposures, found.camera, threads)
+        run.adjust(night)
     result = CalibratedNight(
         night=night,
-        exposures=tuple(exposures),
-        names=tuple(night.names[each.index] for each in seen),
-        calibration=found,
-        identified=np.array([int((each.stars >= 0).sum()) for each in seen]),
-        rejected=np.array([int(((each.stars >= 0) & ~each.kept).sum()) for each in seen]),
+        exposures=tuple(run.exposures()),
+        names=tuple(night.names[each.index] for each in run.seen),
+        calibration=run.found,
+        identified=np.array([int((each.stars >= 0).sum()) for each in run.seen]),
+        rejected=np.array([int(((each.stars >= 0) & ~each.kept).sum()) for each in run.seen]),
+        odds=np.array([each.odds for each in run.seen]),
         messages=(),
     )
-    return replace(result, messages=(*messages, *_doubtful(result)))
+    return replace(result, messages=(*_failed(result), *run.messages(), *_doubtful(result)))
+
+
+class _Run:
+    """The exposures that take part, the camera they give, and those that are left out."""
+
+    def __init__(self, night: Night, threads: int | None) -> None:
+        self.night, self.threads = night, threads
+        self.left_out: dict[int, str] = {}
+        self.remarks: list[str] = []
+        self.first: list[_Seen] = []
+        self.seen: list[_Seen] = []
+        self.found: SkyCalibration
+        self.unsettled = False
+        for index, exposure in enumerate(night.exposures):
+            stars = exposure.stars
+            if stars is None:
+                sighting = _identify(night, index, night.camera, night.tolerance)
+                stars = sighting.stars
+                if not sighting.accepted:
+                    self.left_out[index] = sighting.reason()
+            if index not in self.left_out and (stars >= 0).sum() < _FEWEST:
+                self.left_out[index] = f"{int((stars >= 0).sum())} of its {len(stars)} images have a star"
+            if index not in self.left_out:
+                self.first.append(_Seen(index, stars, stars >= 0))
+        unknown = [index for index in self.left_out if night.exposures[index].stars is None]
+        hint = find_hint(
+            [night.exposures[index] for index in unknown], [night.names[i] for i in unknown], _setting(night)
+        )
+        if hint:
+            named = f"exposure{'s' if len(hint.exposures) > 1 else ''} {listed(list(hint.exposures))}"
+            self.remarks.append(f"as it seems, {hint.text}: stars of {named} are found then")
+        if not self.first:
+            reasons = [f"exposure {night.names[i]}: {reason}" for i, reason in self.left_out.items()]
+            texts = ["no exposure shows stars of the catalogue where its attitude says they are"]
+            raise InputError("; ".join([*texts, *self.remarks, listed(reasons, 3)]))
+        self.settle()
+
+    def exposures(self) -> list[Exposure]:
+        pairs = zip(self.seen, self.found.attitudes, strict=True)
+        return [each.exposure(self.night, attitude) for each, attitude in pairs]
+
+    def adjust(self, night: Night) -> None:
+        """Adjust once more from the values that were found."""
+        self.found = _adjusted(night, self.exposures(), self.found.camera, self.threads)
+
+    def settle(self) -> None:
+        """Adjust from the first identification, until no image comes or goes."""
+        night, self.seen = self.night, self.first
+        exposures = [each.exposure(night) for each in self.seen]
+        self.found = _adjusted(night, exposures, night.camera, self.threads)
+        self.unsettled = True
+        for _ in range(_ROUNDS):
+            pairs = zip(self.seen, self.found.attitudes, strict=True)
+            again = [_seen_again(night, each, self.found, attitude) for each, attitude in pairs]
+            same = zip(again, self.seen, strict=True)
+            self.unsettled = not all((a.kept == b.kept).all() and (a.stars == b.stars).all() for a, b in same)
+            self.seen = again
+            if not self.unsettled:
+                break
+            self.adjust(night)
+
+    def compare(self) -> None:
+        """Take out exposures that do not fit the others, the worst first, until all do."""
+        while worst := self._worst():
+            index, reason = worst
+            self.left_out[index] = reason
+            self.first = [each for each in self.first if each.index != index]
+            if not self.first:
+                name = self.night.names[index]
+                raise InputError(f"no exposure is left; the last one, {name}, is left out: {reason}")
+            self.settle()
+
+    def _worst(self) -> tuple[int, str] | None:
+        by_chance = max(self.seen, key=lambda each: np.nan_to_num(each.odds))
+        if by_chance.odds >= ACCEPTED:
+            count, images = int(by_chance.kept.sum()), len(by_chance.kept)
+            return by_chance.index, (
+                f"under the calibrated camera {count} of its {images} images have a star, which chance may do"
+            )
+        tests = held_out(
+            self.exposures(),
+            self.found,
+            self.night.site,
+            self.night.catalogue,
+            pixel_sd=self.night.pixel_sd,
+            earth=self.night.earth,
+        )
+        unlike = [(test.factor, k) for k, test in enumerate(tests) if test.unlike(len(tests))]
+        if not unlike:
+            return None
+        factor, k = max(unlike)
+        return self.seen[k].index, (
+            f"under the camera of the other exposures its residuals are {factor:.3g} times larger than theirs"
+        )
+
+    def identify_left_out(self) -> bool:
+        """Try exposures that are left out once more, with the calibrated camera; say whether any is found."""
+        night, before = self.night, len(self.first)
+        tolerance = min(night.tolerance, max(2 * night.rejection * _noise(night, self.found), _REACH))
+        for index in [i for i in self.left_out if night.exposures[i].stars is None]:
+            sighting = _identify(night, index, self.found.camera, tolerance)
+            if sighting.accepted and (sighting.stars >= 0).sum() >= _FEWEST:
+                del self.left_out[index]
+                self.first.append(_Seen(index, sighting.stars, sighting.stars >= 0))
+        self.first.sort(key=lambda each: each.index)
+        if len(self.first) == before:
+            return False
+        self.settle()
+        return True
+
+    def messages(self) -> list[Message]:
+        """Say what was left out, and why."""
+        names = self.night.names
+        texts = [
+            *self.remarks,
+            *(f"exposure {names[i]} is left out: {reason}" for i, reason in sorted(self.left_out.items())),
+        ]
+        if self.unsettled:
+            texts.append(f"images still come and go after {_ROUNDS} rounds of rejection")
+        return [Message(text) for text in texts]
 
 
 def _adjusted(
@@ -242,68 +386,83 @@ def _adjusted(
     )
 
 
-def _identified(night: Night) -> tuple[list[_Seen], list[Message]]:
-    """Identify stars with the camera as it is known beforehand; leave out exposures that show too few."""
-    radius = float(night.camera.values[0]) * math.tan(night.attitude_error)
-    seen, messages = [], []
-    for index, exposure in enumerate(night.exposures):
-        stars = exposure.stars
-        if stars is None:
-            stars = identify(
-                exposure,
-                night.camera,
-                night.site,
-                night.catalogue,
-                frame=night.frame,
-                radius=radius,
-                tolerance=night.tolerance,
-                earth=night.earth,
-            )
-        count = int((stars >= 0).sum())
-        if count < _FEWEST:
-            name = night.names[index]
-            text = f"exposure {name} is left out: {count} of its {len(stars)} images are identified"
-            messages.append(Message(text))
-        else:
-            seen.append(_Seen(index, stars, stars >= 0))
-    if not seen:
-        raise InputError("no exposure shows stars of the catalogue where its attitude says they are")
-    return seen, messages
+def _setting(night: Night) -> Setting:
+    return Setting(
+        night.site,
+        night.catalogue,
+        night.frame,
+        night.camera,
+        night.attitude_error,
+        night.tolerance,
+        night.earth,
+    )
+
+
+def _identify(night: Night, index: int, camera: BrownCamera, tolerance: float) -> Sighting:
+    return identify(
+        night.exposures[index],
+        camera,
+        night.site,
+        night.catalogue,
+        frame=night.frame,
+        radius=_setting(night).radius,
+        tolerance=tolerance,
+        earth=night.earth,
+    )
+
+
+def _noise(night: Night, found: SkyCalibration) -> float:
+    """Return the robust standard deviation of the residuals, pixels."""
+    return max(1.4826 * float(np.median(np.abs(found.residuals))), 1e-3 * night.pixel_sd)
 
 
 def _seen_again(night: Night, seen: _Seen, found: SkyCalibration, attitude: Floats) -> _Seen:
     """Identify stars with the calibrated camera, and leave out images that are far from theirs."""
-    given = night.exposures[seen.index]
-    noise = max(1.4826 * float(np.median(np.abs(found.residuals))), 1e-3 * night.pixel_sd)
+    given, noise = night.exposures[seen.index], _noise(night, found)
     limit = night.rejection * noise if night.rejection else math.inf
-    turned = replace(given, attitude=attitude)
-    near = stars_near(turned, found.camera, night.site, night.catalogue, night.frame, 0.0, night.earth.dut1)
-    stars = given.stars
-    if stars is not None:
-        near = np.union1d(near, stars[stars >= 0])
-    places = apparent_places(night.catalogue.take(near), given.utc)
-    time = sidereal_time(night.site, given.utc, night.earth.dut1)
-    predicted = project_sky(found.camera, attitude, night.site, places, time)
-    if stars is None:
-        reach = max(2 * night.rejection * noise, _REACH)
-        with np.errstate(invalid="ignore"):
-            seen_by = ((predicted > -reach) & (predicted < np.array(night.frame) + reach)).all(axis=1)
-        inside = np.flatnonzero(seen_by)
-        nearest = mutually_nearest(given.xy, predicted[inside], reach)
-        local = np.where(nearest >= 0, inside[nearest], -1) if len(inside) else nearest
-        stars = np.where(local >= 0, near[local], -1)
-    else:
-        local = np.where(stars >= 0, np.searchsorted(near, stars), -1)
-    off = np.abs(given.xy - predicted[local]).max(axis=1)
-    kept = (stars >= 0) & (off <= limit)
-    return _Seen(seen.index, stars, kept) if kept.sum() >= _FEWEST else seen
+    again = identify_again(
+        replace(given, attitude=attitude),
+        found.camera,
+        night.site,
+        night.catalogue,
+        frame=night.frame,
+        reach=max(2 * night.rejection * noise, _REACH),
+        earth=night.earth,
+    )
+    with np.errstate(invalid="ignore"):
+        kept = again.off <= limit
+    if kept.sum() < _FEWEST:
+        return replace(seen, odds=math.inf)
+    odds = math.nan if given.stars is not None else _odds(night, again, limit)
+    return _Seen(seen.index, again.stars, kept, odds)
+
+
+def _odds(night: Night, again: Found, limit: float) -> float:
+    reach = limit if math.isfinite(limit) else _REACH
+    return again.expected(reach, _setting(night).radius, night.frame)
+
+
+def _failed(result: CalibratedNight) -> list[Message]:
+    """Say what makes the camera unfit for use, and of which nature it is."""
+    texts = []
+    if not result.converged:
+        texts.append(f"the adjustment has not converged: {result.calibration.status}: do not use this camera")
+    if result.mostly_left_out:
+        texts.append("more exposures are left out than take part: do not use this camera")
+    test = result.test
+    failed = test.problem() if test else None
+    if test and failed:
+        texts.append(f"{failed}: do not use this camera" if test.factor > DOUBTFUL else failed)
+        texts.append(
+            "the stars are found beyond doubt: sd_px is too small, or the terms of Brown do not describe this"
+            " camera (a fisheye needs others)"
+        )
+    return [Message(text) for text in texts]
 
 
 def _doubtful(result: CalibratedNight) -> list[Message]:
     """Name what the stars hardly determine."""
-    status = result.calibration.status
-    texts = [] if result.converged else [f"the adjustment has not converged: {status}"]
-    texts += [f"correlation of {a} and {b}: {r:+.4f}" for a, b, r in result.correlated()]
+    texts = [f"correlation of {a} and {b}: {r:+.4f}" for a, b, r in result.correlated()]
     weak = [f"{name} ({t:.1f} mean errors)" for name, t in result.significance().items() if t < SIGNIFICANT]
     if weak:
         texts.append(f"distortion terms that are not significant: {', '.join(weak)}")

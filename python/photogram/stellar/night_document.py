@@ -12,18 +12,11 @@ from photogram import _photocore
 from photogram.angles import ARCSEC
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.night import CalibratedNight
+from photogram.stellar.pointing import axis_of
 
-__all__ = ["axis_of", "to_json"]
+__all__ = ["to_json"]
 
 _FORMAT = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
-
-
-def axis_of(attitude: np.ndarray) -> tuple[float, float]:
-    """Return azimuth (from south, positive west) and elevation of the axis, radians."""
-    alpha, omega = float(attitude[0]), float(attitude[1])
-    north, east = math.sin(alpha) * math.cos(omega), math.sin(omega)
-    zenith = math.cos(alpha) * math.cos(omega)
-    return math.atan2(-east, -north) % math.tau, math.atan2(zenith, math.hypot(north, east))
 
 
 def to_json(result: CalibratedNight) -> bytes:
@@ -48,6 +41,14 @@ def to_json(result: CalibratedNight) -> bytes:
             "iterations": found.iterations,
             "stop": found.status,
             "converged": result.converged,
+            "usable": result.usable,
+            "global_test": None
+            if result.test is None
+            else {
+                "variance_of_unit_weight": result.test.variance,
+                "limits": result.test.limits,
+                "probability": result.test.probability,
+            },
             "messages": [str(message) for message in result.messages],
             "parameters": {
                 name: {
@@ -82,8 +83,9 @@ def _exposures(result: CalibratedNight) -> list[dict[str, Any]]:
             "images": len(exposure.xy),
             "identified": identified,
             "rejected": rejected,
+            "expected_chance_matches": odds,
         }
-        for name, exposure, attitude, covariance, cross, identified, rejected in zip(
+        for name, exposure, attitude, covariance, cross, identified, rejected, odds in zip(
             result.names,
             result.exposures,
             found.attitudes,
@@ -91,6 +93,7 @@ def _exposures(result: CalibratedNight) -> list[dict[str, Any]]:
             found.cross_covariances,
             result.identified.tolist(),
             result.rejected.tolist(),
+            result.odds.tolist(),
             strict=True,
         )
     ]

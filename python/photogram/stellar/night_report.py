@@ -10,8 +10,8 @@ from photogram.angles import ARCSEC
 from photogram.sections import Section, composed, headline
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.night import SIGNIFICANT, CalibratedNight
-from photogram.stellar.night_document import axis_of
 from photogram.stellar.parameters import GRAD
+from photogram.stellar.pointing import axis_of
 
 __all__ = ["report", "summary"]
 
@@ -54,12 +54,22 @@ def _adjustment(result: CalibratedNight) -> list[str]:
         ("stars, of them estimated", f"{len(found.catalogue)}, {estimated}"),
         ("degrees of freedom", f"{found.degrees_of_freedom}"),
         ("mean error of unit weight", f"{found.mean_error:.4f}"),
+        ("global test", _global_test(result)),
         ("mean error of an image coordinate", f"{found.mean_error * night.pixel_sd:.4f} px"),
         ("root mean square residual x, y", f"{rms[0]:.4f}, {rms[1]:.4f} px"),
         ("UT1 - UTC", f"{night.earth.dut1:.4f} s"),
         ("pole x, y", ", ".join(f"{value / ARCSEC:.4f}" for value in night.earth.pole) + " arcsec"),
     ]
     return [f"{name:<36}{value}" for name, value in rows]
+
+
+def _global_test(result: CalibratedNight) -> str:
+    test = result.test
+    if test is None:
+        return "no degrees of freedom"
+    low, high = test.limits
+    verdict = "fails" if test.rejected_high or test.rejected_low else "holds"
+    return f"{verdict}: variance {test.variance:.4f}, expected {low:.3f} to {high:.3f}"
 
 
 def _camera(result: CalibratedNight) -> list[str]:
@@ -88,7 +98,7 @@ def _exposures(result: CalibratedNight) -> list[str]:
     found = result.calibration
     lines = [
         f"{'name':<10}{'utc':<26}{'images':>7}{'found':>7}{'left out':>9}{'azimuth':>11}{'elevation':>11}"
-        f"{'alpha':>13}{'omega':>13}{'kappa':>13}{'mean errors arcsec':>26}{'rms px':>8}"
+        f"{'alpha':>13}{'omega':>13}{'kappa':>13}{'mean errors arcsec':>26}{'rms px':>8}{'by chance':>11}"
     ]
     for i, (name, exposure) in enumerate(zip(result.names, result.exposures, strict=True)):
         attitude = found.attitudes[i]
@@ -99,12 +109,17 @@ def _exposures(result: CalibratedNight) -> list[str]:
             f"{name:<10}{exposure.utc:<26}{len(exposure.xy):7d}{result.identified[i]:7d}{result.rejected[i]:9d}"
             f"{azimuth:11.5f}{elevation:11.5f}"
             + "".join(f"{angle / GRAD:13.6f}" for angle in attitude)
-            + f"{errors[0]:10.2f}{errors[1]:8.2f}{errors[2]:8.2f}{rms:8.3f}"
+            + f"{errors[0]:10.2f}{errors[1]:8.2f}{errors[2]:8.2f}{rms:8.3f}{_odds(result.odds[i]):>11}"
         )
     return [
         *lines,
         "azimuth from south, positive west, and elevation in degrees; alpha, omega, kappa in grads",
+        "by chance: expected number of wrong attitudes under which as many images have a star",
     ]
+
+
+def _odds(expected: float) -> str:
+    return "named" if math.isnan(expected) else "<1E-99" if expected < 1e-99 else f"{expected:.0E}"
 
 
 def _correlations(result: CalibratedNight) -> list[str]:

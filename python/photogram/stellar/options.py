@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields
 
 from photogram.angles import ARCSEC
 from photogram.errors import InputError
@@ -85,6 +86,10 @@ class Options:
     def __post_init__(self) -> None:
         if self.pre_run and not self.minimum_stars:
             raise InputError("option 7 (pre-run) needs option 6 (minimum solution)")
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise InputError(f"{field.name} is {value}, not a number")
         positive = ("refraction_tolerance", "interval")
         for name in positive:
             if not getattr(self, name) > 0:

@@ -19,41 +19,35 @@ from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.rejection import rejected
-from photogram.stellar.tomlfile import read_document, site, usable
+from photogram.stellar.tomlfile import Document, Table, pole_arcsec, read_document, site
 
 __all__ = ["inputs", "read_plain"]
 
 Floats = NDArray[np.float64]
 
 
-def _switch(value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise InputError(f"{value!r} is neither true nor false")
-    return value
-
-
-_OPTIONS: dict[str, Callable[[Any], Any]] = {
-    "common_scale": _switch,
-    "refraction": _switch,
-    "minimum_stars": lambda value: tuple(str(star) for star in value),
-    "pre_run": _switch,
-    "curves": _switch,
-    "plate_list": _switch,
-    "max_iterations_minimum": int,
-    "max_iterations": int,
-    "mean_error": float,
-    "histogram": _switch,
-    "tolerance": float,
-    "refraction_tolerance_arcsec": float,
-    "distortion_tolerance": float,
-    "movement_factor": float,
-    "movement_time": float,
-    "crossover": float,
-    "interval": float,
-    "extent": float,
-    "comparator_angle_deg": float,
-    "distortion_first": float,
-    "as_published": _switch,
+_OPTIONS: dict[str, Callable[[Table, str], Any]] = {
+    "common_scale": Table.switch,
+    "refraction": Table.switch,
+    "minimum_stars": Table.words,
+    "pre_run": Table.switch,
+    "curves": Table.switch,
+    "plate_list": Table.switch,
+    "max_iterations_minimum": Table.count,
+    "max_iterations": Table.count,
+    "mean_error": Table.number,
+    "histogram": Table.switch,
+    "tolerance": Table.number,
+    "refraction_tolerance_arcsec": Table.number,
+    "distortion_tolerance": Table.number,
+    "movement_factor": Table.number,
+    "movement_time": Table.number,
+    "crossover": Table.number,
+    "interval": Table.number,
+    "extent": Table.number,
+    "comparator_angle_deg": Table.number,
+    "distortion_first": Table.number,
+    "as_published": Table.switch,
 }
 _STAR_WEIGHT = ("weight_ra", "weight_dec", "weight_cross")
 _IMAGE_WEIGHT = ("weight_xx", "weight_yy", "weight_xy")
@@ -86,94 +80,106 @@ def read_plain(path: Path) -> Problem:
         A file that cannot be read, and what cannot be used, with the file, and the record of a CSV file.
     """
     document = read_document(path, _TABLES)
-    with usable(path):
-        return _problem(document, path)
+    try:
+        return _problem(document)
+    except InputError as error:
+        raise error if error.file else InputError(error.message, file=path) from None
 
 
 def inputs(path: Path) -> list[Path]:
     """Return the files that a calibration is read from: results must not replace them."""
     document = read_document(path, _TABLES)
     files = (("stars", "file"), ("images", "file"), ("camera", "prior"))
-    named = [document.get(table, {}).get(key) for table, key in files]
-    return [path, *(path.parent / name for name in named if isinstance(name, str))]
+    named = [document.optional(table) for table, _ in files]
+    return [path, *(table.path(key) for table, (_, key) in zip(named, files, strict=True) if key in table)]
 
 
-def _problem(document: dict[str, Any], path: Path) -> Problem:
-    camera = dict(document["camera"])
-    prior, unit = camera.pop("prior", None), camera.pop("prior_unit_m", None)
-    known = None if prior is None else PlateCamera.read(path.parent / prior)
+def _problem(document: Document) -> Problem:
+    camera = document.table("camera")
+    known = PlateCamera.read(camera.path("prior")) if "prior" in camera else None
+    unit = camera.positive("prior_unit_m") if "prior_unit_m" in camera else None
     initial, fixed = _camera(camera, known)
-    stars, images = document["stars"], document["images"]
-    star_rows = read_rows(path.parent / stars["file"], ("star", "ra_rad", "dec_rad"))
-    image_rows = read_rows(path.parent / images["file"], ("star", "point", "x_m", "y_m", "sidereal_time_rad"))
-    ids = tuple(row.cells["star"] for row in star_rows)
+    stars, images = document.table("stars"), document.table("images")
+    star_rows = read_rows(stars.path("file"), ("star", "ra_rad", "dec_rad"))
+    image_rows = read_rows(images.path("file"), ("star", "point", "x_m", "y_m", "sidereal_time_rad"))
+    ids = tuple(row.cells.get("star", "") for row in star_rows)
     place: dict[str, int] = {}
     for index, row in enumerate(star_rows):
         if place.setdefault(ids[index], index) != index:
             raise row.place.error(f"star {ids[index]} is listed twice")
+        if abs(row.required("dec_rad")) > math.pi / 2:
+            raise row.place.error("dec_rad is beyond the pole: declinations are between -pi/2 and pi/2")
     for row in image_rows:
-        if row.cells["star"] not in place:
-            raise row.place.error(f"ERROR 1: star {row.cells['star']} is not listed")
+        name = row.cells.get("star", "")
+        if name not in place:
+            raise row.place.error(f"ERROR 1: star {name} is not listed")
+    star_weight, image_weight = _common_weight(stars), _common_weight(images)
+    groups = _Groups(images)
     problem = Problem(
-        site=site(document["station"]),
+        site=site(document.table("station")),
         star_ids=ids,
-        star_names=tuple(row.cells.get("name") or row.cells["star"] for row in star_rows),
+        star_names=tuple(row.cells.get("name") or row.cells.get("star", "") for row in star_rows),
         star_places=_pairs(star_rows, "ra_rad", "dec_rad"),
-        star_weights=_matrices([_star_weight(row, stars.get("weight")) for row in star_rows]),
-        image_points=tuple(row.cells["point"] for row in image_rows),
-        image_stars=np.array([place[row.cells["star"]] for row in image_rows], np.int64),
-        image_groups=np.array([_group(row, images) for row in image_rows], np.int64),
+        star_weights=_matrices([_star_weight(row, star_weight) for row in star_rows]),
+        image_points=tuple(row.cells.get("point", "") for row in image_rows),
+        image_stars=np.array([place[row.cells.get("star", "")] for row in image_rows], np.int64),
+        image_groups=np.array([groups.of(row) for row in image_rows], np.int64),
         image_xy=_pairs(image_rows, "x_m", "y_m"),
-        image_weights=_matrices([_weight(row, images.get("weight"), _IMAGE_WEIGHT) for row in image_rows]),
-        image_times=np.array([_time(row, images) for row in image_rows]),
+        image_weights=_matrices([_weight(row, image_weight, _IMAGE_WEIGHT) for row in image_rows]),
+        image_times=np.array([groups.time(row) for row in image_rows]),
         initial=initial,
-        parameter_weights=_parameter_weights(document.get("weights", {})),
+        parameter_weights=_parameter_weights(document.optional("weights")),
         fixed=fixed,
-        axis=_axis(document["axis"]) if "axis" in document else None,
+        axis=_axis(document.table("axis")) if "axis" in document else None,
         options=_options(document),
-        labels={name: str(value) for name, value in document.get("labels", {}).items()},
+        labels={name: document.table("labels").word(name) for name in document.optional("labels").values},
     )
     if known is not None:
         problem = known.as_prior(problem, unit)
-    reject = document.get("reject", {})
-    return rejected(
-        problem, {str(s) for s in reject.get("stars", [])}, {str(p) for p in reject.get("points", [])}
-    )
+    reject = document.optional("reject")
+    return rejected(problem, set(reject.words("stars", ())), set(reject.words("points", ())))
 
 
-def _camera(table: dict[str, Any], prior: PlateCamera | None) -> tuple[Floats, NDArray[np.bool_]]:
+def _camera(table: Table, prior: PlateCamera | None) -> tuple[Floats, NDArray[np.bool_]]:
     """Read initial values: angles in grads, all else in the units of the parameters."""
-    if prior is not None:
-        table.setdefault("cx", float(prior.values[INDEX["cx"] - 9]))
     fixed = np.zeros(len(NAMES), bool)
-    for name in table.pop("fixed", []):
-        fixed[_index(name)] = True
-    parameters = default_parameters(float(table["cx"]))
+    for name in table.words("fixed", ()):
+        fixed[_index(table, name)] = True
+    values = {name: name for name in table.values if name not in ("prior", "prior_unit_m", "fixed")}
     for angle in ("alpha", "omega", "kappa"):
-        if angle in table:
-            value = table.pop(angle)
+        if values.pop(angle, None):
             for group in GROUPS:
-                table.setdefault(f"{angle}_{group}", value)
-    for name, value in table.items():
-        parameters[_index(name)] = float(value) * (GRAD if UNITS[name] == "rad" else 1.0)
+                values.setdefault(f"{angle}_{group}", angle)
+    own = None if prior is None else float(prior.values[INDEX["cx"] - 9])
+    parameters = default_parameters(table.positive("cx", own))
+    for name, key in values.items():
+        index = _index(table, name)
+        parameters[index] = table.number(key) * (GRAD if UNITS[name] == "rad" else 1.0)
     return parameters, fixed
 
 
-def _index(name: str) -> int:
+def _index(table: Table, name: str) -> int:
     if name not in INDEX:
-        raise ValueError(f"there is no parameter {name!r}; there are {', '.join(NAMES)}")
+        raise InputError(
+            f"[{table.name}] there is no parameter {name!r}; there are {', '.join(NAMES)}", file=table.file
+        )
     return INDEX[name]
 
 
-def _parameter_weights(table: dict[str, Any]) -> Floats:
+def _parameter_weights(table: Table) -> Floats:
     """Read weights, angles in radians: `name = w`, or `pairs = [[name, name, w], ...]`."""
-    table = dict(table)
     weights = np.zeros((len(NAMES), len(NAMES)))
-    for first, second, value in table.pop("pairs", []):
-        weights[_index(first), _index(second)] = weights[_index(second), _index(first)] = value
-    for name, value in table.items():
-        weights[_index(name), _index(name)] = value
+    for first, second, value in table.rows("pairs", (str, str, float)):
+        row, column = _index(table, first), _index(table, second)
+        weights[row, column] = weights[column, row] = value
+    for name in table.values:
+        if name != "pairs":
+            weights[_index(table, name), _index(table, name)] = table.number(name, low=0)
     return weights
+
+
+def _common_weight(table: Table) -> list[float] | None:
+    return table.numbers("weight", 3) if "weight" in table else None
 
 
 def _pairs(rows: list[Row], first: str, second: str) -> Floats:
@@ -195,60 +201,59 @@ def _star_weight(row: Row, common: list[float] | None) -> Floats:
     return _weight(row, common, _STAR_WEIGHT)
 
 
-def _orientation(name: str) -> int:
-    if name not in GROUPS:
-        raise InputError(f"orientation {name!r} is not one of {', '.join(GROUPS)}")
-    return GROUPS.index(name)
+class _Groups:
+    """How images belong to groups, and what is added to their times."""
+
+    def __init__(self, table: Table) -> None:
+        self.post, self.event = table.count("first_post", 500), table.count("first_event", 900)
+        self.corrections = table.numbers("time_corrections_rad", 3, [0.0, 0.0, 0.0])
+
+    def of(self, row: Row) -> int:
+        """Take the column `orientation`, else the number of the point as in the deck."""
+        name, point = row.cells.get("orientation", ""), row.cells.get("point", "")
+        if name:
+            if name not in GROUPS:
+                raise row.place.error(f"orientation {name!r} is not one of {', '.join(GROUPS)}")
+            return GROUPS.index(name)
+        digits = point.removeprefix("-")
+        if not (digits.isascii() and digits.isdigit()):
+            raise row.place.error(f"point {point!r} is not a number: name its orientation")
+        # The trail is the last three digits.
+        trail = int(digits[-3:])
+        return 0 if trail < self.post else 1 if trail < self.event else 2
+
+    def time(self, row: Row) -> float:
+        """Return the sidereal time of an image."""
+        return row.required("sidereal_time_rad") + self.corrections[self.of(row)]
 
 
-def _group(row: Row, images: dict[str, Any]) -> int:
-    """Take the column `orientation`, else the number of the point as in the deck."""
-    if row.cells.get("orientation"):
-        try:
-            return _orientation(row.cells["orientation"])
-        except InputError as error:
-            raise row.place.error(error.message) from None
-    try:
-        trail = abs(int(row.cells["point"])) % 1000
-    except ValueError:
-        raise row.place.error(f"point {row.cells['point']!r} is not a number: name its orientation") from None
-    return 0 if trail < images.get("first_post", 500) else 1 if trail < images.get("first_event", 900) else 2
-
-
-def _time(row: Row, images: dict[str, Any]) -> float:
-    corrections = images.get("time_corrections_rad", [0.0, 0.0, 0.0])
-    return row.required("sidereal_time_rad") + float(corrections[_group(row, images)])
-
-
-def _axis(table: dict[str, Any]) -> Axis:
-    xx, yy, xy = table["weight"]
+def _axis(table: Table) -> Axis:
+    xx, yy, xy = table.numbers("weight", 3)
+    group = table.text("orientation", "event")
+    if group not in GROUPS:
+        raise table.error("orientation", f"{group!r} is not one of {', '.join(GROUPS)}")
     return Axis(
-        azimuth=math.radians(table["azimuth_deg"]),
-        zenith_distance=math.radians(table["zenith_distance_deg"]),
-        xy=np.array([table.get("x_m", 0.0), table.get("y_m", 0.0)]),
+        azimuth=math.radians(table.number("azimuth_deg", low=-360, high=360)),
+        zenith_distance=math.radians(table.number("zenith_distance_deg", low=-90, high=90)),
+        xy=np.array([table.number("x_m", 0.0), table.number("y_m", 0.0)]),
         weight=np.array([[xx, xy], [xy, yy]]),
-        group=_orientation(table.get("orientation", "event")),
+        group=GROUPS.index(group),
     )
 
 
-def _options(document: dict[str, Any]) -> Options:
-    table = document.get("options", {})
-    unknown = sorted(set(table) - set(_OPTIONS))
+def _options(document: Document) -> Options:
+    table = document.optional("options")
+    unknown = sorted(set(table.values) - set(_OPTIONS))
     if unknown:
-        raise InputError(f"there is no option {listed(unknown)}")
-    values = {}
-    for name, value in table.items():
-        try:
-            values[name] = _OPTIONS[name](value)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"option {name}: {error}") from None
+        raise InputError(f"there is no option {listed(unknown)}", file=table.file)
+    values = {name: _OPTIONS[name](table, name) for name in table.values}
     if "refraction_tolerance_arcsec" in values:
         values["refraction_tolerance"] = values.pop("refraction_tolerance_arcsec") * ARCSEC
     if "comparator_angle_deg" in values:
         values["comparator_angle"] = math.radians(values.pop("comparator_angle_deg"))
-    pole = document.get("pole", {})
+    pole = document.optional("pole")
     return Options(
-        reference=site(document["reference"]) if "reference" in document else None,
-        pole=(pole.get("x_arcsec", 0.0) * ARCSEC, pole.get("y_arcsec", 0.0) * ARCSEC),
+        reference=site(document.table("reference")) if "reference" in document else None,
+        pole=(pole_arcsec(pole, "x_arcsec") * ARCSEC, pole_arcsec(pole, "y_arcsec") * ARCSEC),
         **values,
     )

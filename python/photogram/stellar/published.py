@@ -72,8 +72,9 @@ def _form(problem: Problem, parameters: Floats, free: Bools) -> _Formed:
     unknown = ~problem.known
     if unknown.any():
         directions = problem.core(parameters, places, ~free).directions()
-        for star in np.flatnonzero(unknown):
-            places[star] = directions[np.flatnonzero(problem.image_stars == star)[0]]
+        stars, first = np.unique(problem.image_stars, return_index=True)
+        seen = unknown[stars]
+        places[stars[seen]] = directions[first[seen]]
     core = problem.core(parameters, places, ~free)
     equations = _published(problem, core)
     return _Formed(equations, reduce(problem, core, equations, places), places)

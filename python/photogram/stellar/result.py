@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.messages import Message
+from photogram.statistics import GlobalTest, global_test
 from photogram.stellar.counts import Counts
 from photogram.stellar.moved import Movement
 from photogram.stellar.parameters import INDEX, NAMES
@@ -24,6 +26,7 @@ CORRELATED = 0.95
 """Correlations above this are named."""
 SIGNIFICANT = 1.96
 """Distortion terms below this multiple of their mean error are named (5 % of error)."""
+_SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 DISTORTION = ("K1", "K2", "K3", "K4", "K5")
 
 
@@ -199,6 +202,12 @@ class Result:
         return math.sqrt(sum(self.solved.sums) / self.counts.usable)
 
     @property
+    def test(self) -> GlobalTest | None:
+        """The global test where the mean error of unit weight is given (option 14); else it is not known."""
+        given = self.problem.options.mean_error
+        return global_test(sum(self.solved.sums) / given**2, self.degrees_of_freedom) if given else None
+
+    @property
     def mean_error(self) -> float:
         """Mean error of unit weight in use: the given one (option 14), or the computed one."""
         return self.problem.options.mean_error or self.computed_mean_error
@@ -262,12 +271,16 @@ class Result:
             return []
         core = self.problem.core(self.solved.parameters, self.solved.places, ~self.solved.free)
         of_images = core.directions()
-        return [self._direction(int(star), of_images) for star in unknown]
+        order = np.argsort(self.problem.image_stars, kind="stable")
+        firsts, ends = (np.searchsorted(self.problem.image_stars[order], unknown, side) for side in _SIDES)
+        return [
+            self._direction(int(star), order[first:end], of_images)
+            for star, first, end in zip(unknown, firsts, ends, strict=True)
+        ]
 
-    def _direction(self, star: int, of_images: Floats) -> Direction:
+    def _direction(self, star: int, images: NDArray[np.int64], of_images: Floats) -> Direction:
         problem, solved = self.problem, self.solved
         place, unit = solved.places[star], self.mean_error
-        images = np.flatnonzero(problem.image_stars == star)
         residuals, weights = solved.residuals[images], problem.image_weights[images]
         square = float(np.einsum("mi,mij,mj->", residuals, weights, residuals))
         own = math.sqrt(square / (2 * len(images) - 2)) if len(images) > 1 else unit

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.errors import AdjustmentError, InputError
+from photogram.memory import available_memory
 from photogram.stellar.cameras import BROWN_PLACE, COMMON, BrownCamera, weight_of
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.matching import match
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
 from photogram.stellar.problem import weight_root
 from photogram.stellar.sky import Site
@@ -29,7 +29,7 @@ __all__ = [
     "Exposure",
     "SkyCalibration",
     "calibrate_exposures",
-    "identify",
+    "partials",
     "project_sky",
     "stars_near",
 ]
@@ -38,8 +38,8 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _STILL = Earth()
 _SLACK = math.radians(2.0)
-_FEWEST, _SHARE = 6, 0.2
-"""Stars, and their share of all that could be, below which an identification is one of chance."""
+_PER_IMAGE = 2000
+"""Bytes of memory that an image takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,8 @@ class Exposure:
     attitude
         (3,) approximate alpha, omega, kappa, radians.
     stars
-        (k,) index of each image's star in the catalogue, -1 for none; None where `identify` is to find out.
+        (k,) index of each image's star in the catalogue, -1 for none; None where they are not
+        known.
     """
 
     utc: str
@@ -159,53 +160,6 @@ def stars_near(
     return np.flatnonzero(cosine >= math.cos(min(reach, math.pi)))
 
 
-def identify(
-    exposure: Exposure,
-    camera: BrownCamera,
-    site: Site,
-    catalogue: Catalogue,
-    *,
-    frame: tuple[float, float],
-    radius: float,
-    tolerance: float = 3.0,
-    earth: Earth = _STILL,
-) -> Indices:
-    """Find the catalogue star of each image.
-
-    Parameters
-    ----------
-    exposure
-        With its approximate attitude; the brightest images first.
-    camera
-        Approximate, such as `BrownCamera.of_field`.
-    site, catalogue
-        Where, and which stars; as deep as the images, the brightest first (`Catalogue.brighter`).
-    frame
-        Width and height in pixels.
-    radius, tolerance
-        Largest error of the approximate attitude, and of an image after the best polynomials, pixels.
-    earth
-        UT1 - UTC, and the pole.
-
-    Returns
-    -------
-    (k,) index in the catalogue; -1 where there is none, and everywhere where so few images have one that
-    chance would have found them.
-    """
-    site = earth.site_of_date(site)
-    time = sidereal_time(site, exposure.utc, earth.dut1)
-    near = stars_near(exposure, camera, site, catalogue, frame, radius / camera.values[0], earth.dut1)
-    places = apparent_places(catalogue.take(near), exposure.utc)
-    predicted = project_sky(camera, exposure.attitude, site, places, time)
-    margin = np.array([-radius, -radius]), np.array(frame) + radius
-    with np.errstate(invalid="ignore"):
-        seen = np.flatnonzero(((predicted >= margin[0]) & (predicted <= margin[1])).all(axis=1))
-    found = match(exposure.xy, predicted[seen], radius=radius, tolerance=tolerance)
-    if (found >= 0).sum() < max(_FEWEST, _SHARE * min(len(found), len(seen))):
-        return np.full(len(found), -1, np.int64)
-    return np.where(found >= 0, near[seen[found]] if len(seen) else -1, -1)
-
-
 def calibrate_exposures(
     exposures: Sequence[Exposure],
     camera: BrownCamera,
@@ -250,7 +204,7 @@ def calibrate_exposures(
     InputError
         An exposure without stars; a parameter that does not exist; a standard deviation that is not positive.
     AdjustmentError
-        The stars do not determine the camera.
+        The stars do not determine the camera, or the memory does not hold the adjustment.
     """
     unknown = sorted(set(fixed) - set(BrownCamera.NAMES))
     if unknown:
@@ -259,6 +213,7 @@ def calibrate_exposures(
         raise InputError(f"the standard deviation of an image coordinate is {pixel_sd} pixels")
     place = earth.site_of_date(site)
     images = _Images(exposures, place, catalogue, earth.dut1, weigh_stars)
+    _refuse_too_large(len(images.xy), len(exposures), weigh_stars)
     free = np.array([name not in fixed for name in BrownCamera.NAMES])
     core = _core(images, exposures, camera, place, free, prior, pixel_sd)
     try:
@@ -276,6 +231,38 @@ def calibrate_exposures(
     turned = [transformed_angles(angles, place, site, earth.pole) for angles in result.attitudes]
     change = np.array(turned) - result.attitudes
     return replace(result, attitudes=result.attitudes + np.remainder(change + np.pi, 2 * np.pi) - np.pi)
+
+
+def _refuse_too_large(images: int, exposures: int, weigh_stars: bool) -> None:
+    """Refuse what the machine cannot hold: stars that are estimated tie all attitudes to each other."""
+    attitudes = 3 * exposures
+    needed = _PER_IMAGE * images + (16 * attitudes**2 if weigh_stars else 0)
+    free = available_memory()
+    if free is not None and needed > free:
+        raise AdjustmentError(
+            f"{exposures} exposures with {images} images take {needed / 2**30:.1f} GiB of memory, and"
+            f" {free / 2**30:.1f} GiB are free" + ("; hold the stars" if weigh_stars else "")
+        )
+
+
+def partials(
+    exposures: Sequence[Exposure],
+    camera: BrownCamera,
+    site: Site,
+    catalogue: Catalogue,
+    earth: Earth = _STILL,
+) -> tuple[Floats, Floats]:
+    """Return partials of the images that have a star, by their attitude and by the camera.
+
+    Returns
+    -------
+    (m, 2, 3) pixels a radian, and (m, 2, 9) in the order of `BrownCamera.NAMES`.
+    """
+    place = earth.site_of_date(site)
+    images = _Images(exposures, place, catalogue, earth.dut1, False)
+    core = _core(images, exposures, camera, place, np.ones(len(camera.values), bool), None, 1.0)
+    equations = core.equations()
+    return equations["pointing"], equations["common"][:, :, list(BROWN_PLACE)]
 
 
 class _Images:

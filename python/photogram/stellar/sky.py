@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.angles import ARCSEC
+from photogram.arrays import shaped
+from photogram.errors import InputError
 
 __all__ = ["ABERRATION", "TAU", "Air", "Site", "refraction"]
 
@@ -22,6 +24,13 @@ TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.6
 """Coefficients of refraction in seconds of arc, the report's fit to Garfinkel's tables."""
 ABERRATION = 0.320 * ARCSEC
 """Constant of diurnal aberration at the equator as the report has it, in radians; 0.3192 arcsec is nearer."""
+
+
+TEMPERATURES = (150.0, 350.0)
+"""Air on the ground in kelvin: -123 to 77 degrees Celsius."""
+HIGHEST_PRESSURE = 850.0
+"""Millimetres of mercury; 840 at the Dead Sea in a strong anticyclone."""
+_HECTOPASCAL = 1013.25 / 760.0
 
 
 @dataclass(frozen=True)
@@ -34,10 +43,30 @@ class Air:
         Kelvin.
     pressure
         Millimetres of mercury; 0 for no refraction.
+
+    Raises
+    ------
+    InputError
+        Air that cannot be, most often in other units.
     """
 
     temperature: float = 273.15
     pressure: float = 760.0
+
+    def __post_init__(self) -> None:
+        low, high = TEMPERATURES
+        if not low <= self.temperature <= high:
+            raise InputError(
+                f"the air has {self.temperature:g} K; temperatures in kelvin are between {low:g} and {high:g}"
+            )
+        if not 0 <= self.pressure <= HIGHEST_PRESSURE:
+            hint = ""
+            if HIGHEST_PRESSURE < self.pressure <= HIGHEST_PRESSURE * _HECTOPASCAL:
+                hint = f"; {self.pressure:g} hPa are {self.pressure / _HECTOPASCAL:.1f}"
+            raise InputError(
+                f"the pressure is {self.pressure:g} mm of mercury; it must be between 0 and"
+                f" {HIGHEST_PRESSURE:g}{hint}"
+            )
 
 
 def refraction(
@@ -59,13 +88,18 @@ def refraction(
     Returns
     -------
     (n,) radians.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes.
     """
     air = air or Air()
     return _photocore.refraction(
-        np.atleast_1d(np.asarray(zenith_distances, float)),
+        np.atleast_1d(shaped("zenith_distances", zenith_distances, np.shape(zenith_distances)[:1])),
         air.temperature,
         air.pressure,
-        np.asarray(tau, float),
+        shaped("tau", tau, (len(TAU),)),
         observed,
     )
 

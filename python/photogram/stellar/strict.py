@@ -28,6 +28,11 @@ _EXPECTED = 1e-6
 _ROUGH, _FINE, _FINEST = 1e-3, 1e-4, 1e-9
 """Largest changes in standard deviations: of a first solution, of one that has converged, of the best."""
 _LIMIT, _MORE = 100, 5
+_FIRST, _NEXT = 25, 8
+"""Iterations after which the sum of squares is looked at, and again and again."""
+_STILL = 1e-6
+"""Change of the sum of squares, in units of the squared mean error of unit weight, that is none: its root is
+how far unknowns are from the smallest sum, in mean errors."""
 
 
 def iterate(
@@ -46,6 +51,8 @@ def iterate(
     once the others have given them one. Weights are only known up to a factor, so a first solution finds the
     mean error of unit weight. A second one goes on until its corrections are rounding errors, a billionth of
     the standard deviations on an ordinary plate; then a few more, so that the cofactors hold at the solution.
+    Where some combination of parameters hardly has an effect (the centre of a small distortion), corrections
+    fall slowly or not at all: the iteration stops, too, when the sum of squares stands still.
 
     Raises
     ------
@@ -58,14 +65,15 @@ def iterate(
     run = _Run(problem, solution, limit or _LIMIT, dof, threads or 0, progress)
     for _ in range(3):
         active = free & run.effective(parameters, places, free)
-        found = run.adjust(parameters, places, active, unit, _ROUGH)
+        found = run.settle(parameters, places, active, unit, _ROUGH)
         parameters, places = found["parameters"], found["places"]
-        if (active == free).all() or found["status"] != "converged":
+        if (active == free).all() or found["status"] not in ("converged", "still"):
             break
     mean_error = float(np.sqrt(sum(found["sums_of_squares"]) / dof))
     rounding = _rounding(problem, parameters)
     unit = max(mean_error, rounding / _FINE)
-    found = run.adjust(parameters, places, free, unit, max(rounding / unit, _FINEST))
+    run.rounding = rounding / unit
+    found = run.settle(parameters, places, free, unit, max(rounding / unit, _FINEST))
     last = run.adjust(found["parameters"], found["places"], free, unit, 0.0, most=_MORE, covariance=True)
     return run.solved({**last, "status": found["status"]}, free, unit)
 
@@ -135,6 +143,28 @@ class _Run:
         self.problem, self.solution, self.limit = problem, solution, limit
         self.dof, self.threads, self.progress = dof, threads, progress
         self.levels: list[float] = []
+        self.rounding = 0.0
+
+    def settle(
+        self, parameters: Floats, places: Floats, free: Bools, unit: float, fraction: float
+    ) -> dict[str, Any]:
+        """Adjust until corrections are small, the sum of squares stands still, or the limit is reached."""
+        found = self.adjust(parameters, places, free, unit, fraction, most=_FIRST)
+        while found["status"] != "converged":
+            if self._still():
+                return {**found, "status": "still"}
+            if found["status"] == "diverged" or len(self.levels) > self.limit:
+                break
+            found = self.adjust(found["parameters"], found["places"], free, unit, fraction, most=_NEXT)
+        return found
+
+    def _still(self) -> bool:
+        """Say whether the last sums of squares are equal, but for what is no change and for rounding."""
+        last = np.array(self.levels[-_NEXT:])
+        if len(last) < _NEXT or not last[-1] > 0:
+            return False
+        sums = self.dof * (last / last[-1]) ** 2
+        return bool(np.ptp(sums) <= max(_STILL, self.dof * self.rounding))
 
     def effective(self, parameters: Floats, places: Floats, free: Bools) -> Bools:
         """Find the parameters that have an effect at some values, or a weight."""
@@ -191,6 +221,7 @@ class _Run:
         count = len(self.levels) - 1
         stops = {
             "converged": "NO UNKNOWN CHANGES BY MORE THAN 1E-4 OF ITS MEAN ERROR",
+            "still": "THE SUM OF SQUARES STANDS STILL: NO CHANGE BY 1E-6 OF THE SQUARED MEAN ERROR",
             "diverged": "NO STEP LOWERS THE SUM OF SQUARES",
         }
         cofactors = found["cofactors"].reshape(len(NAMES), len(NAMES)) if len(found["cofactors"]) else None
@@ -215,6 +246,6 @@ class _Run:
             sums=(plate, stars, weighted + axis),
             log_determinant=log_determinant(reduced.normal + problem.parameter_weights, free),
             stop=stops.get(status, f"{count} ITERATIONS COMPLETED"),
-            converged=status == "converged",
+            converged=status in ("converged", "still"),
             levels=tuple(Level(self.solution, i + 1, level) for i, level in enumerate(self.levels)),
         )

@@ -1,11 +1,11 @@
-"""TOML files of calibrations: tables and keys that are not known are refused, and errors name the file."""
+"""TOML files of calibrations: values are read by kind and range, and errors name file, table and key."""
 
 from __future__ import annotations
 
 import math
+import re
 import tomllib
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from photogram.files import read_bytes
 from photogram.messages import listed
 from photogram.stellar.sky import ABERRATION, Air, Site
 
-__all__ = ["read_document", "site", "usable"]
+__all__ = ["Document", "Table", "pole_arcsec", "read_document", "site"]
 
 _STATION = {
     "latitude_deg",
@@ -27,9 +27,266 @@ _STATION = {
     "number",
     "name",
 }
+_MOST_DIGITS = 1000
+_ENDLESS = re.compile(rf"\d[\d_]{{{_MOST_DIGITS}}}")
+"""Python refuses whole numbers of thousands of digits, and does not say where they stand."""
+_LONGEST = 60
+"""Characters of a value that an error shows."""
 
 
-def read_document(path: Path, tables: Mapping[str, Collection[str] | None]) -> dict[str, Any]:
+class Table:
+    """One table of a TOML file.
+
+    Parameters
+    ----------
+    values
+        What stands in it.
+    name
+        How it is called in errors.
+    file
+        The file.
+    """
+
+    def __init__(self, values: Mapping[str, Any], name: str, file: Path) -> None:
+        self.values, self.name, self.file = dict(values), name, file
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def error(self, key: str, text: str) -> InputError:
+        """Return an error that names file, table and key."""
+        return InputError(f"[{self.name}] {key} {text}", file=self.file)
+
+    def only(self, known: Collection[str]) -> None:
+        """Refuse keys that are not known.
+
+        Raises
+        ------
+        InputError
+            There are some.
+        """
+        unknown = sorted(set(self.values) - set(known))
+        if unknown:
+            raise InputError(f"[{self.name}] has no {listed(unknown)}", file=self.file)
+
+    def number(
+        self, key: str, default: float | None = None, *, low: float = -math.inf, high: float = math.inf
+    ) -> float:
+        """Return a finite number between two limits.
+
+        Raises
+        ------
+        InputError
+            It is missing and has no default, is of another kind, or beyond the limits.
+        """
+        value = self._value(key, default)
+        found = self._number(key, value)
+        if not low <= found <= high:
+            raise self.error(key, f"is {found:g}; it must be {_range(low, high)}")
+        return found
+
+    def positive(self, key: str, default: float | None = None) -> float:
+        """Return a finite number above zero; errors are those of `number`."""
+        found = self.number(key, default)
+        if not found > 0:
+            raise self.error(key, f"is {found:g}; it must be positive")
+        return found
+
+    def count(self, key: str, default: int | None = None) -> int:
+        """Return a whole number that is not negative.
+
+        Raises
+        ------
+        InputError
+            It is missing and has no default, or is something else.
+        """
+        value = self._value(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or abs(value) >= 2**31:
+            raise self.error(key, f"is {_shown(value)}, not a whole number")
+        if value < 0:
+            raise self.error(key, f"is {value}; it cannot be negative")
+        return value
+
+    def switch(self, key: str, default: bool | None = None) -> bool:
+        """Return true or false.
+
+        Raises
+        ------
+        InputError
+            It is missing and has no default, or is something else.
+        """
+        value = self._value(key, default)
+        if not isinstance(value, bool):
+            raise self.error(key, f"is {_shown(value)}, neither true nor false")
+        return value
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Return a string.
+
+        Raises
+        ------
+        InputError
+            It is missing and has no default, or is something else.
+        """
+        value = self._value(key, default)
+        if not isinstance(value, str):
+            raise self.error(key, f"is {_shown(value)}, not text: put it in quotation marks")
+        return value
+
+    def word(self, key: str, default: str | None = None) -> str:
+        """Return a name or a number of something, which may be written as a whole number.
+
+        Raises
+        ------
+        InputError
+            It is missing and has no default, or is something else.
+        """
+        return self._word(key, self._value(key, default))
+
+    def words(self, key: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
+        """Return names of things as `word` does.
+
+        Raises
+        ------
+        InputError
+            They are missing and have no default, or are something else.
+        """
+        return tuple(self._word(key, value) for value in self.items(key, default))
+
+    def path(self, key: str) -> Path:
+        """Return the path of another file, relative to this one.
+
+        Raises
+        ------
+        InputError
+            It is missing, or cannot be a path.
+        """
+        name = self.text(key)
+        if not name or not name.isprintable():
+            raise self.error(key, f"is {_shown(name)}, not the name of a file")
+        return self.file.parent / name
+
+    def numbers(self, key: str, count: int, default: list[float] | None = None) -> list[float]:
+        """Return so many finite numbers; infinite ones where they say that something is held.
+
+        Raises
+        ------
+        InputError
+            They are missing and have no default, or are something else.
+        """
+        values = self.items(key, default)
+        if len(values) != count:
+            raise self.error(key, f"has {len(values)} values, not {count}")
+        return [
+            math.inf if isinstance(value, float) and value == math.inf else self._number(key, value)
+            for value in values
+        ]
+
+    def items(self, key: str, default: Collection[Any] | None = None) -> list[Any]:
+        """Return a list of anything.
+
+        Raises
+        ------
+        InputError
+            It is missing and has no default, or is something else.
+        """
+        value = self._value(key, default)
+        if not isinstance(value, list | tuple):
+            raise self.error(key, f"is {_shown(value)}, not a list")
+        return list(value)
+
+    def rows(self, key: str, kinds: tuple[type[str] | type[float], ...]) -> list[list[Any]]:
+        """Return a list of lists of names (`str`) and numbers (`float`); empty where it is missing.
+
+        Raises
+        ------
+        InputError
+            It is something else.
+        """
+        found = []
+        for row in self.items(key, []):
+            if not isinstance(row, list) or len(row) != len(kinds):
+                raise self.error(key, f"has {_shown(row)}, not a list of {len(kinds)}")
+            found.append(
+                [
+                    self._word(key, value) if kind is str else self._number(key, value)
+                    for kind, value in zip(kinds, row, strict=True)
+                ]
+            )
+        return found
+
+    def _value(self, key: str, default: Any) -> Any:
+        value = self.values.get(key, default)
+        if value is None:
+            raise self.error(key, "is missing")
+        return value
+
+    def _number(self, key: str, value: Any) -> float:
+        try:
+            found = (
+                math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
+            )
+        except OverflowError:
+            found = math.nan
+        if not math.isfinite(found):
+            raise self.error(key, f"is {_shown(value)}, not a number")
+        return found
+
+    def _word(self, key: str, value: Any) -> str:
+        if isinstance(value, bool) or not isinstance(value, str | int):
+            raise self.error(key, f"has {_shown(value)}, which is neither text nor a whole number")
+        return str(value)
+
+
+class Document:
+    """A TOML file of tables.
+
+    Parameters
+    ----------
+    tables
+        By name: one table, or several of the same name.
+    file
+        The file.
+    """
+
+    def __init__(self, tables: Mapping[str, list[Table]], file: Path) -> None:
+        self._tables, self.file = tables, file
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._tables
+
+    def table(self, name: str) -> Table:
+        """Return a table that must be there, once.
+
+        Raises
+        ------
+        InputError
+            It is not.
+        """
+        if name not in self._tables:
+            raise InputError(f"the table {name} is missing", file=self.file)
+        if len(self._tables[name]) != 1:
+            raise InputError(f"[{name}] is there {len(self._tables[name])} times", file=self.file)
+        return self._tables[name][0]
+
+    def optional(self, name: str) -> Table:
+        """Return a table, an empty one where it is not there; errors are those of `table`."""
+        return self.table(name) if name in self._tables else Table({}, name, self.file)
+
+    def tables(self, name: str) -> list[Table]:
+        """Return all tables of a name.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        if name not in self._tables:
+            raise InputError(f"the table {name} is missing", file=self.file)
+        return self._tables[name]
+
+
+def read_document(path: Path, tables: Mapping[str, Collection[str] | None]) -> Document:
     """Read a TOML file.
 
     Parameters
@@ -45,62 +302,92 @@ def read_document(path: Path, tables: Mapping[str, Collection[str] | None]) -> d
         The file cannot be read, is not TOML, or has tables or keys besides these.
     """
     try:
-        document = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        text = read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(str(error), file=path) from None
+    for number, line in enumerate(text.splitlines(), 1):
+        if _ENDLESS.search(line):
+            key = line.split("=")[0].strip()[:_LONGEST]
+            raise InputError(
+                f"{key} has a number of more than {_MOST_DIGITS} digits", file=path, record=number
+            )
+    try:
+        document = tomllib.loads(text)
+    except RecursionError:
+        raise InputError("brackets are nested too deeply", file=path) from None
+    except tomllib.TOMLDecodeError as error:
         raise InputError(str(error), file=path) from None
     unknown = sorted(set(document) - set(tables))
     if unknown:
         raise InputError(f"there is no table {listed(unknown)}", file=path)
+    found = {}
     for name, content in document.items():
-        keys, single = tables[name], isinstance(content, dict)
-        if not single and not (isinstance(content, list) and all(isinstance(c, dict) for c in content)):
+        single = isinstance(content, dict)
+        rows = [content] if single else content
+        if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             raise InputError(f"{name} is not a table", file=path)
-        for table in [content] if single else content:
-            if keys is not None and set(table) - set(keys):
-                raise InputError(f"[{name}] has no {listed(sorted(set(table) - set(keys)))}", file=path)
-    return document
+        found[name] = [
+            Table(row, name if single else f"{name} {number}", path) for number, row in enumerate(rows, 1)
+        ]
+        for table in found[name]:
+            keys = tables[name]
+            if keys is not None:
+                table.only(keys)
+    return Document(found, path)
 
 
-@contextmanager
-def usable(path: Path) -> Iterator[None]:
-    """Turn what is missing or of a wrong kind in a document into an error that names its file."""
-    try:
-        yield
-    except InputError as error:
-        raise error if error.file else InputError(error.message, file=path) from None
-    except KeyError as error:
-        raise InputError(f"{error.args[0]} is missing", file=path) from None
-    except (AttributeError, TypeError, ValueError, IndexError) as error:
-        raise InputError(str(error), file=path) from None
-
-
-def site(table: dict[str, Any]) -> Site:
+def site(table: Table) -> Site:
     """Return the station of a table.
 
     Raises
     ------
     InputError
-        A key that is not known, a latitude beyond the poles, air that cannot be.
-    KeyError, TypeError
-        The latitude is missing, or something is not a number.
+        A key that is not known, a value of another kind, a latitude beyond the poles, air that cannot be.
     """
-    unknown = sorted(set(table) - _STATION)
-    if unknown:
-        raise InputError(f"a station has no {listed(unknown)}")
-    latitude, air = (
-        table["latitude_deg"],
-        Air(table.get("temperature_K", 273.15), table.get("pressure_mmHg", 760.0)),
-    )
+    table.only(_STATION)
+    latitude = table.number("latitude_deg")
     if not abs(latitude) <= 90:
-        raise InputError(f"the latitude {latitude} is not between -90 and 90 degrees")
-    if not (air.temperature > 0 and air.pressure >= 0):
-        raise InputError("the temperature in kelvin must be positive, the pressure not negative")
+        raise table.error("latitude_deg", f"is {latitude:g}; it is not between -90 and 90 degrees")
+    temperature, pressure = table.number("temperature_K", 273.15), table.number("pressure_mmHg", 760.0)
+    try:
+        air = Air(temperature, pressure)
+    except InputError as error:
+        raise InputError(f"[{table.name}] {error.message}", file=table.file) from None
     return Site(
         latitude=math.radians(latitude),
-        longitude_west=math.radians(table.get("longitude_west_deg", 0.0)),
-        elevation=table.get("elevation_m", 0.0),
+        longitude_west=math.radians(table.number("longitude_west_deg", 0.0, low=-360, high=360)),
+        elevation=table.number("elevation_m", 0.0, low=-500, high=100_000),
         air=air,
-        aberration=table["aberration_arcsec"] * ARCSEC if "aberration_arcsec" in table else ABERRATION,
-        number=str(table.get("number", "")),
-        name=str(table.get("name", "")),
+        aberration=table.number("aberration_arcsec", low=0, high=1) * ARCSEC
+        if "aberration_arcsec" in table
+        else ABERRATION,
+        number=table.word("number", ""),
+        name=table.word("name", ""),
     )
+
+
+def pole_arcsec(table: Table, key: str) -> float:
+    """Return a coordinate of the pole, never a second of arc from the mean one; zero where it is missing.
+
+    Raises
+    ------
+    InputError
+        It is something else.
+    """
+    return table.number(key, 0.0, low=-2, high=2)
+
+
+def _range(low: float, high: float) -> str:
+    if math.isinf(low) or math.isinf(high):
+        return f"at least {low:g}" if math.isinf(high) else f"at most {high:g}"
+    return f"between {low:g} and {high:g}"
+
+
+def _shown(value: Any) -> str:
+    """Write a value as it may stand in an error: not the thousand digits of a number."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**_LONGEST:
+        return "a whole number of very many digits"
+    if isinstance(value, bool):
+        return str(value).lower()
+    text = repr(value) if isinstance(value, str | int | float) else str(value)
+    return text if len(text) <= _LONGEST else text[:_LONGEST] + "..."

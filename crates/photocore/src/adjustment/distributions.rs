@@ -46,7 +46,7 @@ pub fn student(t: f64, dof: f64) -> f64 {
 
 /// The value that the absolute value of Student's variable of `dof` degrees of freedom exceeds with `probability`.
 pub fn student_limit(probability: f64, dof: f64) -> f64 {
-    if !(dof > 0.0) {
+    if dof.is_nan() || dof <= 0.0 {
         return f64::NAN;
     }
     quantile(probability, Tail::Upper, |t| student(t, dof))

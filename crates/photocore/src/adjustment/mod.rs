@@ -24,6 +24,7 @@ pub use distributions::{
 pub use loss::Loss;
 pub use options::{Criterion, Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Problem};
+pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
 pub use run::adjust;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};

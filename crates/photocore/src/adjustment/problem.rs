@@ -26,6 +26,12 @@ pub trait Model: Sync {
         false
     }
 
+    /// Local blocks that the iterations have led to where they harm all others: what they say of one kept block is so much more than
+    /// all others say together that rounding takes what these say. Asked after every damped step.
+    fn collapsed(&self, _unknowns: &[f64]) -> Vec<usize> {
+        vec![]
+    }
+
     /// Unknowns that give a datum when they are held at their values, without forcing the observations: one for each degree of freedom
     /// that these leave open. Empty where observations and weights give a datum.
     fn datum(&self, _unknowns: &[f64]) -> Vec<usize> {

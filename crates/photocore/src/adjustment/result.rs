@@ -45,6 +45,9 @@ pub struct Adjustment {
     pub cofactors: Option<Cofactors>,
     /// Why the last values give no cofactors although they were asked for.
     pub undetermined: Option<AdjustError>,
+    /// Local blocks that the last step has led to where they harm all others (see [`super::Model::collapsed`]): the iterations
+    /// have stopped there, for the adjustment to be begun again without them.
+    pub collapsed: Vec<usize>,
     /// The unknowns, none of them local, that a combination moves which is determined so weakly that the sum of squares stood still
     /// while no full step along it lowered it; none where the adjustment ended otherwise.
     pub weak: Vec<usize>,
@@ -74,6 +77,21 @@ impl Adjustment {
     /// For every iteration, the corrections of all unknowns that are not local, in the order of the layout.
     pub fn corrections(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
         self.history.windows(2).map(|pair| pair[0].iter().zip(&pair[1]).map(|(from, to)| to - from).collect())
+    }
+
+    /// Counts what an adjustment of the same observations has done before that this one has begun from.
+    pub(crate) fn go_on_from(&mut self, before: Option<Self>) {
+        let Some(before) = before else { return };
+        let done = before.iterations.len();
+        self.iterations.iter_mut().for_each(|iteration| iteration.number += done);
+        self.iterations.splice(0..0, before.iterations);
+        self.history.splice(0..1, before.history);
+        self.initial_sum_of_squares = before.initial_sum_of_squares;
+        self.formations += before.formations;
+        let (own, earlier) = (&mut self.seconds, before.seconds);
+        own.form += earlier.form;
+        own.factor += earlier.factor;
+        own.solve += earlier.solve;
     }
 
     /// Residuals and test values of a group of observations with the given standard deviations a priori.
@@ -143,4 +161,10 @@ impl From<Stopped> for AdjustError {
             Stopped::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
         }
     }
+}
+
+/// A number of bytes for a message.
+pub(crate) fn gib(bytes: usize) -> String {
+    let gib = bytes as f64 / f64::from(1 << 30);
+    if gib < 0.1 { format!("{:.1} MiB", 1024.0 * gib) } else { format!("{gib:.1} GiB") }
 }

@@ -37,6 +37,7 @@ pub fn adjust<M: Model>(
         datum: vec![],
         curved: false,
         weak: vec![],
+        collapsed: vec![],
     };
     let damping = if matches!(options.criterion, Criterion::Decrease(_)) { FIRST_DAMPING } else { 0.0 };
     let start = run.form(problem.initial.clone(), damping)?;
@@ -117,6 +118,8 @@ pub(super) struct Run<'a, 'w, M: Model> {
     pub curved: bool,
     /// Unknowns that a combination moves which full steps cannot follow (see [`Adjustment::weak`]).
     pub weak: Vec<usize>,
+    /// Local blocks that harm all others (see [`Adjustment::collapsed`]).
+    pub collapsed: Vec<usize>,
 }
 
 impl<'a, M: Model> Run<'a, '_, M> {
@@ -251,6 +254,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             counts: problem.counts(self.datum.len()),
             datum: self.datum,
             weak: self.weak,
+            collapsed: self.collapsed,
             operations: problem.system.symbolic().operations(problem.layout()),
             formations: self.formations,
             seconds: self.seconds,

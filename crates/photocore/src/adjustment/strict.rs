@@ -11,6 +11,9 @@ const ROUNDING: f64 = 1e-12;
 /// it lowers the sum of squares by less than the square of this, which may drown in the rounding errors of the computed
 /// observations (geocentric coordinates are good to a nanometre only).
 const NEGLIGIBLE: f64 = 1e-3;
+/// The sum of squares stands still where three damped steps lower it by less than this multiple of the variance of unit weight: a
+/// hundredth of a standard deviation of the combination of unknowns that they follow.
+const STILL: f64 = 1e-4;
 /// A step that changes the unknowns by more than this multiple of their standard deviations, in the mean, is so long that local
 /// unknowns are better computed afresh than linearized.
 const FAR: f64 = 30.0;
@@ -83,7 +86,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// what it still falls by, damped, no unknown is determined well enough to show.
     fn stands_still(&self, refused: &mut Option<f64>, sum: f64) -> bool {
         let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
-        let least = NEGLIGIBLE * NEGLIGIBLE * (sum / freedom).max(1.0);
+        let least = STILL * (sum / freedom).max(1.0);
         refused.replace(sum).is_some_and(|before| before - sum <= least)
     }
 

@@ -76,6 +76,11 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 let iteration =
                     Iteration { number, sum_of_squares, largest_change: solved.change, damping: used };
                 self.accept(iteration, &unknowns, &trial)?;
+                self.collapsed = self.problem.model.collapsed(&trial);
+                if !self.collapsed.is_empty() {
+                    let status = Status::NotConverged;
+                    return Ok(End { status, unknowns: trial, basis: None, undetermined: None, last: None });
+                }
                 lowest = sum_of_squares;
                 damping.fall(gain);
                 if whole || used <= FIRST_DAMPING && decrease <= fraction * lowest {

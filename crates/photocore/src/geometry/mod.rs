@@ -32,7 +32,7 @@ pub use ellipsoid::{Ellipsoid, local_vertical, local_vertical_with_partials};
 pub use lens::{Displacement, Distortion, Undistorted};
 pub use pointing::{pointing, pointing_angles, pointing_with_partials};
 pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
-pub use rotation::{rotation, rotation_angles, rotation_with_partials};
+pub use rotation::{nearest_turns, rotation, rotation_angles, rotation_with_partials};
 pub use sky::{Air, Standard, Station};
 pub use vector::{Matrix3, Vector3};
 

@@ -44,3 +44,12 @@ pub fn rotation_angles(m: &Matrix3) -> Vector3 {
     let kappa = (so * m[0][2] + co * m[0][1]).atan2(so * m[1][2] + co * m[1][1]);
     [omega, phi, kappa]
 }
+
+/// Angles shifted by whole turns so that they are nearest to known ones (NaN where unknown), with which they are compared.
+pub fn nearest_turns<const N: usize>(angles: [f64; N], known: [f64; N]) -> [f64; N] {
+    const TURN: f64 = std::f64::consts::TAU;
+    std::array::from_fn(|k| {
+        let turns = ((known[k] - angles[k]) / TURN).round();
+        if turns.is_finite() { angles[k] + turns * TURN } else { angles[k] }
+    })
+}

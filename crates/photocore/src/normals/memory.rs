@@ -1,14 +1,19 @@
 //! How much memory an adjustment takes.
 
-use super::symbolic::Supernode;
+use std::collections::HashMap;
+
 use super::system::System;
+use super::workspace::capacity;
 
 /// Of a number.
 const BYTES: usize = size_of::<f64>();
-/// Numbers for each unknown: values, steps, priors and their copies.
-const PER_UNKNOWN: usize = 16;
-/// Numbers for each equation beside its coefficients: observed value, standard deviation, residual, redundancy number.
-const PER_EQUATION: usize = 8;
+/// Numbers for each unknown: values, steps, priors and their copies, cofactors, what is made of them for the caller.
+const PER_UNKNOWN: usize = 40;
+/// Numbers for each equation beside its coefficients: observed value, standard deviation, residual, redundancy number and test value,
+/// as given, as ordered for the adjustment and as handed back.
+const PER_EQUATION: usize = 28;
+/// Bytes for what does not grow with the problem, threads among them.
+const BASE: usize = 8 << 20;
 
 impl System {
     /// Bytes that forming, factoring, solving and inverting take at the most, the problem itself and its results counted: the
@@ -16,37 +21,56 @@ impl System {
     pub fn memory(&self) -> usize {
         let layout = &self.layout;
         let vectors = PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.equations();
-        let cofactors = 2 * layout.locals() * layout.local_dim().pow(2) + 2 * layout.equations();
-        BYTES * (self.symbolic.values() + self.upward().max(self.downward()) + vectors + cofactors)
+        BASE + BYTES * (capacity(self.symbolic.values()) + self.fronts() + vectors)
     }
 
-    /// Numbers in the updates that wait for their parents, when the factorisation goes through the order of elimination.
-    fn upward(&self) -> usize {
+    /// Numbers in the buffers of fronts: the walks up and down the elimination tree take and give back what these do.
+    fn fronts(&self) -> usize {
         let supernodes = self.symbolic.supernodes();
-        let update = |s: &Supernode| s.below() * s.below();
-        let (mut waiting, mut most) = (0, 0);
+        let mut buffers = Buffers::default();
         for s in supernodes {
-            most = most.max(waiting + update(s));
-            waiting += update(s);
-            waiting -= s.children.iter().map(|&child| update(&supernodes[child])).sum::<usize>();
+            buffers.take(s.below().pow(2));
+            s.children.iter().for_each(|&child| buffers.put_back(supernodes[child].below().pow(2)));
         }
-        most
+        for root in supernodes.iter().filter(|s| s.parent.is_none()) {
+            buffers.put_back(root.below().pow(2));
+        }
+        for (index, s) in supernodes.iter().enumerate().rev() {
+            buffers.take(s.height().pow(2));
+            // A front lives until the last child, the first in the order, has taken its part.
+            let parent = s.parent.map(|parent| &supernodes[parent]);
+            if let Some(parent) = parent.filter(|parent| parent.children.first() == Some(&index)) {
+                buffers.put_back(parent.height().pow(2));
+            }
+            let products = [s.below() * s.width, s.width.pow(2)];
+            products.iter().for_each(|&length| buffers.take(length));
+            products.iter().for_each(|&length| buffers.put_back(length));
+            if s.children.is_empty() {
+                buffers.put_back(s.height().pow(2));
+            }
+        }
+        buffers.made
+    }
+}
+
+/// The buffers of a workspace, by capacity.
+#[derive(Default)]
+struct Buffers {
+    spare: HashMap<usize, usize>,
+    /// Numbers in all that were ever made: none is given back to the system.
+    made: usize,
+}
+
+impl Buffers {
+    fn take(&mut self, length: usize) {
+        let capacity = capacity(length);
+        match self.spare.get_mut(&capacity).filter(|spare| **spare > 0) {
+            Some(spare) => *spare -= 1,
+            None => self.made += capacity,
+        }
     }
 
-    /// Numbers in the fronts that wait for their children, when the inversion goes back through it.
-    fn downward(&self) -> usize {
-        let supernodes = self.symbolic.supernodes();
-        let front = |s: &Supernode| s.height() * s.height();
-        let (mut waiting, mut most) = (0, 0);
-        for (index, s) in supernodes.iter().enumerate().rev() {
-            // The front, and two parts of it for the products.
-            most = most.max(waiting + front(s) + s.width * s.height());
-            waiting += if s.children.is_empty() { 0 } else { front(s) };
-            // The first child is the last to take the front of its parent.
-            let parent = s.parent.map(|parent| &supernodes[parent]);
-            let last = parent.filter(|parent| parent.children.first() == Some(&index));
-            waiting -= last.map_or(0, front);
-        }
-        most
+    fn put_back(&mut self, length: usize) {
+        *self.spare.entry(capacity(length)).or_default() += 1;
     }
 }

@@ -1,14 +1,15 @@
 //! Memory that is used again, and that may not be there.
 
+use std::collections::HashMap;
 use std::sync::Mutex;
 
 use super::panels::lock;
 
-/// Spare buffers, by the power of two of their capacity. Fronts come and go by the thousand; fresh pages for each of them, and
+/// Spare buffers, by their capacity (see [`capacity`]). Fronts come and go by the thousand; fresh pages for each of them, and
 /// giving them back, would cost more than the arithmetic.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
-    spare: Mutex<Vec<Vec<Vec<f64>>>>,
+    spare: Mutex<HashMap<usize, Vec<Vec<f64>>>>,
 }
 
 impl Workspace {
@@ -30,20 +31,24 @@ impl Workspace {
     /// Takes a buffer back.
     pub fn put_back(&self, buffer: Vec<f64>) {
         if buffer.capacity() > 0 {
-            let mut spare = lock(&self.spare);
-            let class = buffer.capacity().ilog2() as usize;
-            if spare.len() <= class {
-                spare.resize_with(class + 1, Vec::new);
-            }
-            spare[class].push(buffer);
+            lock(&self.spare).entry(buffer.capacity()).or_default().push(buffer);
         }
     }
 
     fn take(&self, length: usize) -> Result<Vec<f64>, usize> {
-        let capacity = length.next_power_of_two();
-        let found = lock(&self.spare).get_mut(capacity.ilog2() as usize).and_then(Vec::pop);
+        let capacity = capacity(length);
+        let found = lock(&self.spare).get_mut(&capacity).and_then(Vec::pop);
         found.map_or_else(|| reserved(capacity), Ok)
     }
+}
+
+/// Numbers from which on a buffer is not twice as large as it need be.
+const LARGE: usize = 1 << 20;
+
+/// The capacity of a buffer for so many numbers: the next power of two, for large ones the next eighth of it.
+pub(super) fn capacity(length: usize) -> usize {
+    let power = length.next_power_of_two();
+    if length < LARGE { power } else { length.next_multiple_of(power / 8) }
 }
 
 /// An empty vector with room for so many numbers; the bytes that there are not.

@@ -31,9 +31,17 @@ STAGES = {
 }
 
 
-def listing(calibration: Calibration) -> str:
-    """Return the listing of a calibration; pages begin with a form feed, but for the first."""
-    pages = [title_page(calibration)]
+def listing(calibration: Calibration, run_date: str = "") -> str:
+    """Return the listing of a calibration; pages begin with a form feed, but for the first.
+
+    Parameters
+    ----------
+    calibration
+        The calibration.
+    run_date
+        What the title page says of the day of the run; nothing else depends on it.
+    """
+    pages = [title_page(calibration, run_date)]
     pages += [input_page(case) for case in calibration.cases]
     pages += pointing_pages(calibration)
     for case in calibration.cases:

@@ -19,8 +19,8 @@ COLUMNS = 3
 """Readings in a line of the input listing."""
 
 
-def title_page(calibration: Calibration) -> list[str]:
-    """Return the title page: plates, options, remarks."""
+def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
+    """Return the title page: plates, options, problems."""
     session = calibration.session
     left_handed = calibration.cases[0].placed.orientation.left_handed
     lines = centred(f"COMPARATOR CALIBRATION - photogram {_photocore.__version__}")
@@ -37,9 +37,10 @@ def title_page(calibration: Calibration) -> list[str]:
         ("CASE", operators),
         ("OPERATOR NUMBER", named),
         ("DATE OF MEASUREMENT", session.date or "-"),
+        ("DATE OF RUN", run_date or "-"),
     ]
     lines += [f"  {name:<30}{value}" for name, value in settings]
-    lines += ["", "REMARKS"]
+    lines += ["", "PROBLEMS"]
     remarks = [line for message in calibration.messages for line in str(message).splitlines()]
     return lines + [f"  {line}" for line in remarks or ["NONE"]]
 

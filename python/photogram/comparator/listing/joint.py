@@ -66,7 +66,7 @@ def joint_page(calibration: Calibration, joint: JointFit) -> list[str]:
         *centred("JOINT ADJUSTMENT OF CASES, COMPARATOR, POLYNOMIALS AND GRID"),
         f"  STANDARD ERROR OF UNIT WEIGHT {joint.sigma0:.4f}   DEGREES OF FREEDOM {joint.degrees_of_freedom}",
         f"  RANDOM COMPARATOR {joint.random_um:.3f} MICRONS (ESTIMATED)",
-        *(_plate(number_, plate) for number_, plate in joint.plates.items()),
+        *(line for number_, plate in joint.plates.items() for line in _plate(number_, plate)),
         "",
         *linear_lines(
             correction.scale_x, correction.scale_y, correction.nonorthogonality_rad, joint.covariance
@@ -84,10 +84,18 @@ def joint_page(calibration: Calibration, joint: JointFit) -> list[str]:
     return lines
 
 
-def _plate(plate: int, own: JointPlate) -> str:
+def _plate(plate: int, own: JointPlate) -> list[str]:
     how = "ESTIMATED" if own.estimated else "GIVEN"
     ratio = "-" if own.variance_ratio is None else f"{own.variance_ratio:.3f}"
-    return f"  GRID {plate} STANDARD DEVIATION {own.sigma_um:.3f} MICRONS ({how}), VARIANCE RATIO {ratio}"
+    lines = [f"  GRID {plate} STANDARD DEVIATION {own.sigma_um:.3f} MICRONS ({how}), VARIANCE RATIO {ratio}"]
+    if own.test:
+        low, high = own.test.limits
+        verdict = "NOT " if own.test.rejected_high or own.test.rejected_low else ""
+        lines.append(
+            f"    TEST OF ITS STANDARD DEVIATION: VARIANCE RATIO FROM {low:.3f} TO {high:.3f} (95 PERCENT),"
+            f" PROBABILITY {own.test.probability:.4f}: {verdict}ACCEPTED"
+        )
+    return lines
 
 
 def _grid(own: JointPlate) -> list[str]:

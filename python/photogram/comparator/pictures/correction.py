@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.comparator.correction_table import table_nodes
 from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, new_figure, plain
 from photogram.pictures import round_length
 
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["correction_surface", "distorted_grid"]
 
 FINE = 121
-LINES = 9
+MAGNIFICATION = 10_000
+"""Of the net: a micrometre is drawn as 10 mm."""
 
 
 def _range(polynomial: Polynomial) -> tuple[Floats, Floats]:
@@ -36,7 +38,7 @@ def _mesh(polynomial: Polynomial, count: int) -> tuple[Floats, Floats]:
     return places, polynomial.evaluate(places.reshape(-1, 2)).reshape(places.shape)
 
 
-def correction_surface(calibration: Calibration, polynomial: Polynomial) -> Figure:
+def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Figure:
     """Draw the corrections in x and in y as contour maps on one scale, with the places measured."""
     places, values = _mesh(polynomial, FINE)
     measured = np.vstack([fit.residuals.xy_um for fit in calibration.last_fits]) / MM
@@ -57,29 +59,29 @@ def correction_surface(calibration: Calibration, polynomial: Polynomial) -> Figu
     bar = figure.colorbar(filled, ax=axes, shrink=0.9)
     bar.set_label("µm", fontsize=8)
     bar.ax.tick_params(labelsize=7)
-    figure.suptitle("Nonlinear correction; dots are the places measured", fontsize=11)
+    figure.suptitle(f"Nonlinear correction{whose}; dots are the places measured", fontsize=11)
     return figure
 
 
-def distorted_grid(polynomial: Polynomial) -> Figure:
-    """Draw a square net and the same net displaced by the correction, greatly magnified."""
-    low, high = _range(polynomial)
+def distorted_grid(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Figure:
+    """Draw the program's net: lines through its 5 x 5 nodes, displaced 10,000 times the correction.
+
+    Nodes and magnification are always the same, so that calibrations can be compared over the years.
+    """
+    nodes = np.array(table_nodes(calibration.session.centre_um)[::2])[:, ::2]
     figure = new_figure(6.2, 6.0)
     axes = figure.subplots()
-    _, values = _mesh(polynomial, FINE)
-    longest = float(np.hypot(*values.reshape(-1, 2).T).max()) or 1.0
-    spacing = float((high - low).max()) / MM / (LINES - 1)
-    scale = 0.8 * spacing / longest
+    corners = nodes[0, 0], nodes[-1, -1]
     along = np.linspace(0.0, 1.0, FINE)
-    for part in np.linspace(0.0, 1.0, LINES):
+    for part in np.linspace(0.0, 1.0, len(nodes)):
         for line in (np.column_stack([along, along * 0 + part]), np.column_stack([along * 0 + part, along])):
-            places = low + line * (high - low)
-            axes.plot(*(places / MM).T, color=FAINT, linewidth=0.7, linestyle=(0, (3, 2)), zorder=1)
-            moved = places / MM + polynomial.evaluate(places) * scale
-            axes.plot(*moved.T, color=MAIN, linewidth=1.3, zorder=2)
+            places = corners[1] + line * (corners[0] - corners[1])
+            moved = places / MM + polynomial.evaluate(places) * (MAGNIFICATION / MM)
+            axes.plot(*moved.T, color=MAIN, linewidth=1.2, zorder=2)
+    axes.plot(*(nodes.reshape(-1, 2) / MM).T, "*", color=FAINT, markersize=5, zorder=1)
     plain(axes, "x, mm", "y, mm")
-    key([axes], scale, round_length(longest))
+    key([axes], MAGNIFICATION / MM, 1.0)
     axes.set_title(
-        f"Net displaced by the nonlinear correction, {scale * MM:,.0f} times magnified", fontsize=11
+        f"Net displaced by the nonlinear correction{whose}, {MAGNIFICATION:,} times magnified", fontsize=11
     )
     return figure

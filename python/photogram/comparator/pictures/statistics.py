@@ -1,4 +1,4 @@
-"""Ellipses of the pointings, distribution of the residuals, components of the error."""
+"""Distribution of the residuals, components of the error."""
 
 from __future__ import annotations
 
@@ -7,77 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import (
-    ACCENT,
-    FAINT,
-    MAIN,
-    MM,
-    key,
-    new_figure,
-    panels,
-    plain,
-)
-from photogram.pictures import round_length
+from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN, new_figure
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from photogram.adjusted import Floats
     from photogram.comparator.calibration import Calibration
-    from photogram.comparator.pointing import Ellipse
 
-__all__ = ["pointing_ellipses", "residual_histogram", "variance_bars"]
-
-
-def pointing_ellipses(calibration: Calibration) -> Figure:
-    """Draw the 39 percent ellipses of single pointings at the measured places of each case."""
-    count = len(calibration.cases)
-    figure, axes = panels(count)
-    largest = max(
-        (
-            readings.precision.ellipse.major_um
-            for case in calibration.cases
-            for readings in case.placed.readings
-        ),
-        default=0.0,
-    )
-    extent = float(np.ptp(calibration.cases[0].placed.means_um, axis=0).max()) / MM
-    spacing = extent / max(math.sqrt(len(calibration.cases[0].placed.points)) - 1, 1)
-    scale = 0.5 * spacing / largest if largest > 0 else 1.0
-    for panel, case in zip(axes, calibration.cases, strict=True):
-        places = case.placed.means_um / MM
-        ellipses = [readings.precision.ellipse for readings in case.placed.readings]
-        _ellipses(panel, places, ellipses, scale)
-        none = [k for k, ellipse in enumerate(ellipses) if ellipse.major_um == 0.0]
-        panel.plot(*places[none].T, "*", color=ACCENT, markersize=5)
-        sd = case.placed.precision.sd_point_um
-        panel.set_title(f"case {case.number}, pooled {sd:.2f} µm", fontsize=9, loc="left")
-        plain(panel, "x, mm", "y, mm")
-    for panel in axes:
-        panel.label_outer()
-    key(axes, scale, round_length(largest))
-    figure.suptitle("Error ellipses of single pointings (39 percent; * no deviation)", fontsize=11)
-    return figure
-
-
-def _ellipses(axes: Axes, places: Floats, ellipses: list[Ellipse], scale: float) -> None:
-    from matplotlib.collections import EllipseCollection
-
-    axes.plot(*places.T, "+", color=FAINT, markersize=4)
-    axes.add_collection(
-        EllipseCollection(
-            [2 * scale * ellipse.major_um for ellipse in ellipses],
-            [2 * scale * ellipse.minor_um for ellipse in ellipses],
-            [math.degrees(ellipse.angle_rad) for ellipse in ellipses],
-            units="xy",
-            offsets=places,
-            transOffset=axes.transData,
-            facecolor="none",
-            edgecolor=MAIN,
-            linewidth=1.0,
-        )
-    )
+__all__ = ["residual_histogram", "variance_bars"]
 
 
 def residual_histogram(calibration: Calibration) -> Figure:

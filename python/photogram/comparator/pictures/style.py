@@ -32,12 +32,14 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def panels(count: int, *, across: int = 4, side: float = 3.4) -> tuple[Figure, list[Axes]]:
-    """Return a figure of square panels, and its axes."""
+def panels(
+    count: int, *, across: int = 4, side: float = 3.4, shared: bool = True
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of square panels, and its axes; their limits are shared, or each has its own."""
     columns = min(count, across)
     rows = -(-count // columns)
     figure = new_figure(max(side * columns, 5.0), side * rows + 0.6)
-    axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel().tolist()
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=shared, sharey=shared).ravel().tolist()
     for unused in axes[count:]:
         unused.set_visible(False)
     return figure, axes[:count]

@@ -86,26 +86,26 @@ def average_vectors(calibration: Calibration, plate: int) -> Figure:
     averages = result.averages
     grid = calibration.session.grids[plate]
     own = grid.xy_um[grid.rows_of(averages.points)]
-    located = averages.locations is not None and averages.location_um is not None
-    figure, axes = panels(2 if located else 1, side=4.2)
+    figure, axes = panels(1 + len(averages.by_location), side=4.2, shared=False)
     corrections = averages.corrections_um
-    together = corrections
-    if averages.location_um is not None:
-        together = np.vstack([corrections, averages.location_um])
+    together = np.vstack([corrections, averages.location_um])
     scale = magnification(own / MM, together)
     length = round_length(float(np.hypot(*together.T).max()))
     arrows(axes[-1], own, corrections, scale, ACCENT)
     axes[-1].set_title("by grid point: correction of the grid", fontsize=9, loc="left")
     plain(axes[-1], "X of the plate, mm", "Y of the plate, mm")
-    if averages.locations is not None and averages.location_um is not None:
-        # Locations are numbered like the points of a plate with corner 1 nearest the zero.
-        places = exchanged(grid.xy_um[grid.rows_of(averages.locations)], averages.left_handed)
-        arrows(axes[0], places, averages.location_um, scale)
-        axes[0].set_title("by comparator location", fontsize=9, loc="left")
-        plain(axes[0], "x about the middle, mm", "y about the middle, mm")
-    key(axes, scale, length)
+    for panel, place in zip(axes, averages.by_location, strict=False):
+        arrows(panel, place.xy_um, place.residuals_um, scale)
+        panel.set_title(_of_cases("by comparator location", place.cases), fontsize=9, loc="left")
+        plain(panel, "x, mm", "y, mm")
+    for panel in axes:
+        key([panel], scale, length)
     figure.suptitle(f"Average residuals of {len(averages.cases)} cases, plate {plate}", fontsize=11)
     return figure
+
+
+def _of_cases(what: str, cases: tuple[int, ...]) -> str:
+    return f"{what}, cases {', '.join(str(case) for case in cases)}"
 
 
 def joint_grid(calibration: Calibration, plate: int) -> Figure:

@@ -13,7 +13,7 @@ from photogram.giant.checks.editing import Edited, blunder_section, edit
 from photogram.giant.checks.findings import Check, Finding, Section
 from photogram.giant.checks.gross import Suspects, gross
 from photogram.giant.checks.heights import two_ray_heights
-from photogram.giant.checks.orientation import orientation
+from photogram.giant.checks.orientation import orientation, spare_explained
 from photogram.giant.checks.rays import Rays
 from photogram.giant.checks.residuals import residuals
 from photogram.giant.checks.stations import stations
@@ -57,9 +57,22 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
         The project makes no block.
     """
     block = project.to_block(limits)
+    # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _checked(project, block, limits, threads)
+
+
+def _checked(project: Project, block: Block, limits: Limits | None, threads: int | None) -> Check:
     upright, oriented = orientation(block)
     errors, suspects = gross(oriented)
+    if suspects.photos.any():
+        spare_explained(upright, oriented, suspects.photos)
     edited = _edited(project, oriented, suspects, threads)
+    # What the adjustment has explained or disproved.
+    settled = {name for pair in edited.exchanged for name in pair} | set(edited.cleared)
+    errors.findings = [
+        each for each in errors.findings if each.kind != "control-difference" or not settled & {*each.points}
+    ]
     sections = [_input(project, block, limits), structure_section(block, edited.first), upright, errors]
     sections += [edited.section, *_after_adjustment(oriented, edited)]
     return Check(project.title, sections, edited.last)

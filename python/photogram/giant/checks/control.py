@@ -41,6 +41,12 @@ def control(edited: Edited) -> Section:
             " be wrong (lens, film, refraction, curvature of the earth, datum, standard deviations)"
         )
         section.findings.append(Finding("control-system", "grave", text, [], list(edited.control)))
+    for one, other in edited.exchanged:
+        text = (
+            f"the control points {one} and {other} are exchanged: each has the coordinates that the images"
+            " give the other; what follows holds with them exchanged back"
+        )
+        section.findings.append(Finding("exchanged-control", "grave", text, [], [one, other]))
     spoilt = {point for finding in edited.section.findings for point in finding.points}
     for name, findings in edited.control.items():
         section.findings.append(

@@ -18,12 +18,21 @@ from photogram.block import Block
 from photogram.errors import AdjustmentError
 from photogram.giant.checks.findings import Finding, Section
 from photogram.giant.checks.gross import Suspects
+from photogram.giant.checks.predictions import (
+    exchange,
+    exchanged_pair,
+    exchanged_where_rays_meet,
+    freed,
+    tests_of_predictions,
+)
+from photogram.giant.checks.rays import Rays
 from photogram.giant.checks.robust import critical, mad_sd
 from photogram.result import Result
 
 __all__ = ["Edited", "edit"]
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Adjust = Callable[[Block], Result]
 
@@ -38,6 +47,10 @@ COMPARABLE = 0.4
 """Of the largest test value of a round: what is smaller may be its consequence and is judged again."""
 HOPELESS = 5.0
 """Spread of the test values above which photos that did not fit before the adjustment are left out."""
+EXCHANGES = 5
+"""Pairs of control points that are exchanged back, at the most."""
+LOOSE = 0.01
+"""Standard deviation of control that strains no block, as a part of the flying height."""
 BLUNDER = 3.0
 SHOWN = 20
 
@@ -58,6 +71,10 @@ class Edited:
         The blunder list.
     control
         Findings on control, by point: which components were taken out.
+    exchanged
+        Pairs of control points that had each other's coordinates.
+    cleared
+        Control points that were left out as suspects and agree with their predictions.
     asked
         Whether an adjustment was wanted.
     """
@@ -68,6 +85,8 @@ class Edited:
     spread: float
     section: Section
     control: dict[str, list[Finding]] = field(default_factory=dict)
+    exchanged: list[tuple[str, str]] = field(default_factory=list)
+    cleared: list[str] = field(default_factory=list)
     asked: bool = True
 
 
@@ -84,13 +103,15 @@ class _Suspect:
 def edit(block: Block, suspects: Suspects, **options: Any) -> Edited:
     """Adjust a block and take out what does not fit, the largest of a neighbourhood at a time.
 
+    Control points that agree with each other's predictions are exchanged back, and all is done anew.
+
     Parameters
     ----------
     block
         The block, with its orientations right way up.
     suspects
-        Gross errors known already: left out from the beginning. Bad photos are left out when the block does
-        not fit with them.
+        Gross errors known already. Images are left out from the beginning, photos when the block does not fit
+        with them; control is left out until its prediction has judged it.
     options
         Of :func:`photogram.adjust`.
     """
@@ -100,13 +121,116 @@ def edit(block: Block, suspects: Suspects, **options: Any) -> Edited:
         return adjust(changed, **options)
 
     current = kept_images(block, ~suspects.images)
+    left = np.flatnonzero(suspects.control)
+    exchanged: list[tuple[str, str]] = []
     try:
-        first, current = _first(current, suspects, adjusted, section)
-        last, spread, control = _snoop(first, current, adjusted, section)
+        first = _as_it_is(current, adjusted) if left.size else None
+        while True:
+            section = blunder_section()
+            start, fewer = _first(freed(current, left), suspects.photos, adjusted, section)
+            first = first or start
+            if not start.converged and not exchanged:
+                pair = exchanged_where_rays_meet(current)
+                if pair is not None and adjusted(exchange(current, *pair)).converged:
+                    exchanged.append(_names(block, pair))
+                    current, left = exchange(current, *pair), np.setdiff1d(left, pair)
+                    continue
+                left = np.union1d(left, _gross_control(fewer, adjusted))
+                start = adjusted(freed(fewer, left))
+                fewer = start.block
+            last, spread, control = _snoop(start, fewer, adjusted, section)
+            doubtful = np.union1d(left, [block.point_ids.index(name) for name in control]).astype(np.int64)
+            pair = _exchanged(last, current, doubtful, spread, adjusted) if last.converged else None
+            if pair is None or len(exchanged) == EXCHANGES:
+                break
+            exchanged.append(_names(block, pair))
+            current, left = exchange(current, *pair), np.setdiff1d(left, pair)
+        cleared: list[str] = []
+        if left.size and last.converged:
+            last, spread = _judged(last, current, left, spread, adjusted, section, control)
+            cleared = [block.point_ids[point] for point in left if block.point_ids[point] not in control]
     except AdjustmentError as error:
         return Edited(None, None, str(error), float("nan"), section)
     _list(last, spread, section)
-    return Edited(first, last, "", spread, section, control)
+    return Edited(first, last, "", spread, section, control, exchanged, cleared)
+
+
+def _names(block: Block, pair: tuple[int, int]) -> tuple[str, str]:
+    return block.point_ids[pair[0]], block.point_ids[pair[1]]
+
+
+def _as_it_is(block: Block, adjusted: Adjust) -> Result | None:
+    """Adjust with all control, for the record."""
+    try:
+        return adjusted(block)
+    except AdjustmentError:
+        return None
+
+
+def _gross_control(block: Block, adjusted: Adjust) -> Indices:
+    """Return the control points without which a block that does not converge does so with loose control.
+
+    With standard deviations of a hundredth of the flying height, control strains no block, and what is wrong
+    by many times that shows.
+    """
+    rays = Rays.of(block)
+    away = np.linalg.norm(
+        rays.intersect().positions[block.image_points] - rays.centres[block.image_photos], axis=1
+    )
+    if not np.isfinite(away).any():
+        return np.empty(0, dtype=np.int64)
+    loose = LOOSE * float(np.nanmedian(away))
+    per_unit = np.array([block.spheroid.a, block.spheroid.a, 1.0] if block.spheroid else [1.0] * 3)
+    held = np.isfinite(block.point_sd)
+    relaxed = block.replace(point_sd=np.where(held, np.maximum(block.point_sd, loose / per_unit), np.inf))
+    try:
+        _, _, control = _snoop(adjusted(relaxed), relaxed, adjusted, blunder_section())
+    except AdjustmentError:
+        return np.empty(0, dtype=np.int64)
+    return np.array([block.point_ids.index(name) for name in control], dtype=np.int64)
+
+
+def _exchanged(
+    result: Result, given: Block, points: Indices, spread: float, adjusted: Adjust
+) -> tuple[int, int] | None:
+    """Find two of some doubtful control points that are exchanged."""
+    points = points[np.isfinite(given.point_sd[points]).any(axis=1) & result.used_points[points]]
+    if len(points) < 2:
+        return None
+    if np.isfinite(result.block.point_sd[points]).any():
+        try:
+            result = adjusted(freed(result.block, points))
+        except AdjustmentError:
+            return None
+    return exchanged_pair(result, given, points, spread) if result.converged else None
+
+
+def _judged(
+    result: Result,
+    given: Block,
+    points: Indices,
+    spread: float,
+    adjusted: Adjust,
+    section: Section,
+    control: dict[str, list[Finding]],
+) -> tuple[Result, float]:
+    """Hold what agrees with its prediction of the control that was left out, and report the rest."""
+    errors, tests = tests_of_predictions(result, given, points, spread)
+    limit = critical(int(np.isfinite(given.point_sd).sum()))
+    point_sd = result.block.point_sd.copy()
+    for row, error, test in zip(points.tolist(), errors, np.abs(tests), strict=True):
+        for axis in np.flatnonzero(test > limit).tolist():
+            finding = _control_finding(given, row, axis, float(error[axis]), float(test[axis]) * spread)
+            control.setdefault(given.point_ids[row], []).append(finding)
+        fits = test <= limit
+        point_sd[row, fits] = given.point_sd[row, fits]
+    if (point_sd == result.block.point_sd).all():
+        return result, spread
+    held = result.block.replace(point_sd=point_sd)
+    last, spread, more = _snoop(adjusted(held), held, adjusted, section)
+    for name, findings in more.items():
+        control.setdefault(name, []).extend(findings)
+    return last, spread
 
 
 def blunder_section() -> Section:
@@ -141,19 +265,24 @@ def without_photos(block: Block, photos: Mask) -> Block:
     )
 
 
-def _first(block: Block, suspects: Suspects, adjusted: Adjust, section: Section) -> tuple[Result, Block]:
-    """Adjust with all photos, or without the bad ones when the block does not fit with them."""
+def _first(block: Block, bad: Mask, adjusted: Adjust, section: Section) -> tuple[Result, Block]:
+    """Adjust with all photos, or without those bad ones with which the block does not fit."""
     error = None
-    if not suspects.photos.any():
+    if not bad.any():
         return adjusted(block), block
     try:
         result = adjusted(block)
         if result.converged and mad_sd(result.standardized) < HOPELESS:
-            return result, block
+            photos = np.flatnonzero(bad)
+            own = [mad_sd(result.standardized[block.image_photos == photo]) for photo in photos]
+            bad = np.zeros_like(bad)
+            bad[photos[[not size < HOPELESS for size in own]]] = True
+            if not bad.any():
+                return result, block
     except AdjustmentError as caught:
         error = caught
-    fewer = without_photos(block, suspects.photos)
-    names = [name for name, bad in zip(block.photo_ids, suspects.photos.tolist(), strict=True) if bad]
+    fewer = without_photos(block, bad)
+    names = [name for name, of in zip(block.photo_ids, bad.tolist(), strict=True) if of]
     section.lines.append(f"adjusted without the photos that do not fit: {', '.join(names)}")
     if error is not None:
         section.lines.append(f"with them: {error}")
@@ -259,25 +388,26 @@ def _finding(result: Result, suspect: _Suspect) -> Finding:
     if suspect.kind == "image":
         return _image_finding(result, suspect)
     if suspect.kind == "control":
-        return _control_finding(result, suspect)
+        row, axis = suspect.row, suspect.axis
+        error = -float(result.point_differences[row, axis] / result.point_redundancy[row, axis])
+        return _control_finding(result.block, row, axis, error, suspect.test)
     name = result.block.photo_ids[suspect.row]
     what = ("first", "second", "third")[suspect.axis % 3] + (" coordinate" if suspect.axis < 3 else " angle")
     text = f"the {what} of station {name} contradicts its standard deviation (test value {suspect.test:.1f})"
     return Finding("station-misfit", "grave", text, [name], [], {"test_value": suspect.test})
 
 
-def _control_finding(result: Result, suspect: _Suspect) -> Finding:
-    block, row, axis = result.block, suspect.row, suspect.axis
-    error = -float(result.point_differences[row, axis] / result.point_redundancy[row, axis])
+def _control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
+    """Say that a component of control does not fit; `error` is that of the given value."""
     angle = block.geographic and axis < 2
     unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
     component = (("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z"))[axis]
     name = block.point_ids[row]
     text = (
-        f"{component} of control point {name} does not fit (test value {suspect.test:.1f}):"
+        f"{component} of control point {name} does not fit (test value {test:.1f}):"
         f" its error is about {error:.3f} {unit}"
     )
-    values = {"component": float(axis), "test_value": suspect.test, f"error_{unit}": error}
+    values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
     return Finding("control-misfit", "grave", text, [], [name], values)
 
 

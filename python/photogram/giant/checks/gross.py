@@ -38,6 +38,10 @@ CONTROL_GRAVE, CONTROL_LOOK = 12.0, 6.0
 """Control differences that stand out by so many robust standard deviations."""
 FEWEST_CONTROL = 4
 """Control points that a comparison needs."""
+FEWEST_ERRORS, ERRORS_OF_PHOTO = 5, 0.3
+"""So many gross errors, and such a part of its images, condemn a photo as a whole."""
+CANDIDATES = 5
+"""Photos with the largest residuals that are left out on trial."""
 MOST_PHOTOS = 20
 MOST_ON_PHOTO = 30
 
@@ -52,10 +56,13 @@ class Suspects:
         (m,) gross errors.
     photos
         (P,) bad photos.
+    control
+        (n,) control points far from where their rays meet.
     """
 
     images: Mask
     photos: Mask
+    control: Mask
 
 
 def gross(block: Block) -> tuple[Section, Suspects]:
@@ -65,13 +72,39 @@ def gross(block: Block) -> tuple[Section, Suspects]:
         "Large patterned residuals are normal before the adjustment; a break in the pattern is an error.",
     )
     rays, photos = _bad_photos(Rays.of(block), section)
-    images = _broken(rays, section)
-    _control(rays.without(images), section)
-    return section, Suspects(images, photos)
+    findings, images = _broken(rays)
+    while (photo := _overrun(rays, findings)) is not None:
+        # One mistake, not one for each of its points.
+        photos[photo] = True
+        name, count = block.photo_ids[photo], int((rays.used & (block.image_photos == photo)).sum())
+        text = (
+            f"photo {name} does not fit the others: of its {count} points most that other photos check miss"
+            " their rays; look at its station (position, angles), the preprocessing of its plate, and whether"
+            " the points under its name are its own"
+        )
+        section.findings.append(Finding("bad-photo", "grave", text, [name], [], {"points": float(count)}))
+        rays = rays.without(block.image_photos == photo)
+        findings, images = _broken(rays)
+    section.findings += findings
+    control = _control(rays.without(images), section)
+    return section, Suspects(images, photos, control)
+
+
+def _overrun(rays: Rays, findings: list[Finding]) -> int | None:
+    """Return the photo with so many gross errors that it is wrong as a whole, if there is one."""
+    block = rays.block
+    number = {name: index for index, name in enumerate(block.photo_ids)}
+    shares = np.zeros(len(number))
+    for finding in findings:
+        for name in finding.photos:
+            shares[number[name]] += len(finding.points) / len(finding.photos)
+    images = np.bincount(block.image_photos[rays.used], minlength=len(number))
+    overrun = (shares >= FEWEST_ERRORS) & (shares > ERRORS_OF_PHOTO * images)
+    return int(np.argmax(np.where(overrun, shares / np.maximum(images, 1), 0))) if overrun.any() else None
 
 
 def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Mask]:
-    """Leave out the photo with the largest residuals as long as it stands out."""
+    """Leave out the photo without which the others fit best, as long as it stands out from them."""
     block = rays.block
     bad = np.zeros(len(block.photo_ids), dtype=bool)
     for step in range(MOST_PHOTOS + 1):
@@ -82,22 +115,43 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Mask]:
             section.lines.append(f"{'median residual of a photo':<50}{usual:.4f} mm")
         if len(known) < 4 or step == MOST_PHOTOS:
             break
-        logs = np.log(medians[known])
-        excess = logs - np.median(logs)
-        worst = int(excess.argmax())
-        if excess[worst] < max(np.log(BAD_PHOTO), BAD_PHOTO_SD * mad_sd(excess)):
+        worst = _worst(rays, medians, known)
+        if worst is None:
             break
-        photo = int(known[worst])
+        photo, usual, rays = worst
         bad[photo] = True
         name, size = block.photo_ids[photo], float(medians[photo])
         text = (
-            f"photo {name} does not fit the others: median residual {size:.3f} mm against"
-            f" {float(np.exp(np.median(logs))):.3f} mm; look at its station (position, angles), the"
-            " preprocessing of its plate, and whether the points under its name are its own"
+            f"photo {name} does not fit the others: median residual {size:.3f} mm against {usual:.3f} mm"
+            " without it; look at its station (position, angles), the preprocessing of its plate, and whether"
+            " the points under its name are its own"
         )
         section.findings.append(Finding("bad-photo", "grave", text, [name], [], {"median_residual_mm": size}))
-        rays = rays.without(block.image_photos == photo)
     return rays, bad
+
+
+def _worst(rays: Rays, medians: Floats, known: Indices) -> tuple[int, float, Rays] | None:
+    """Return the photo that stands out, the median of the others without it in mm, and the rays without it.
+
+    A bad photo spoils the medians of its neighbours, in a small block those of all. So it is compared with
+    what the others are without it.
+    """
+    block = rays.block
+    doubtful = known[medians[known] > BAD_PHOTO * np.quantile(medians[known], 0.25)]
+    tried = []
+    for photo in doubtful[np.argsort(-medians[doubtful], kind="stable")][:CANDIDATES].tolist():
+        without = rays.without(block.image_photos == photo)
+        others = _medians(block, without.intersect().sizes, without.used)
+        logs = np.log(others[others > 0])
+        if len(logs) >= 3:
+            tried.append((float(logs.mean()), photo, logs, without))
+    if not tried:
+        return None
+    _, photo, logs, without = min(tried, key=lambda each: each[:2])
+    middle = float(np.median(logs))
+    if np.log(medians[photo]) - middle < max(np.log(BAD_PHOTO), BAD_PHOTO_SD * mad_sd(logs - middle)):
+        return None
+    return photo, float(np.exp(middle)), without
 
 
 def _medians(block: Block, sizes: Floats, used: Mask) -> Floats:
@@ -111,7 +165,7 @@ def _medians(block: Block, sizes: Floats, used: Mask) -> Floats:
     return medians
 
 
-def _broken(rays: Rays, section: Section) -> Mask:
+def _broken(rays: Rays) -> tuple[list[Finding], Mask]:
     """Find images that break the pattern of their photo, and say what explains each."""
     block = rays.block
     departure = _departures(rays, rays.intersect().residuals)
@@ -119,16 +173,16 @@ def _broken(rays: Rays, section: Section) -> Mask:
     rows_of = _rows_of(rays, points)
     gross = np.zeros(len(block.image_xy), dtype=bool)
     solver = _Solver(rays)
-    exchanged = _exchanged(solver, rows_of, section)
+    findings, exchanged = _exchanged(solver, rows_of)
     for point, rows in rows_of.items():
         if point in exchanged:
             gross[rows[np.isin(block.image_photos[rows], exchanged[point])]] = True
             continue
         finding, wrong = _explained(solver, point, rows, float(departure[rows].max()))
-        section.findings.append(finding)
+        findings.append(finding)
         if finding.level == "grave":
             gross[wrong] = True
-    return gross
+    return findings, gross
 
 
 def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> tuple[Finding, Indices]:
@@ -223,46 +277,62 @@ class _Solver:
         return self.largest(taken, self.changed(point, [own], [other]))
 
 
-def _exchanged(solver: _Solver, rows_of: dict[int, Indices], section: Section) -> dict[int, list[int]]:
-    """Find pairs of points whose names are exchanged on a photo; returns the photos of each point."""
+def _exchanged(solver: _Solver, rows_of: dict[int, Indices]) -> tuple[list[Finding], dict[int, list[int]]]:
+    """Find pairs of points whose names are exchanged on a photo; with the findings the photos of each point.
+
+    A name stands in one pair of a photo only, that which explains it best.
+    """
     block = solver.rays.block
     on_photo: dict[int, list[int]] = {}
     for rows in rows_of.values():
         for row in rows.tolist():
             on_photo.setdefault(int(block.image_photos[row]), []).append(row)
     before = {point: solver.largest(rows, solver.changed(point, [], [])) for point, rows in rows_of.items()}
+    findings: list[Finding] = []
     found: dict[int, list[int]] = {}
     for photo, images in on_photo.items():
+        pairs = []
         for one, other in combinations(images, 2) if len(images) <= MOST_ON_PHOTO else ():
             a, b = int(block.image_points[one]), int(block.image_points[other])
             after_a = solver.exchanged(a, rows_of[a], one, other)
             after_b = solver.exchanged(b, rows_of[b], other, one)
             if after_a < EXPLAINED * before[a] and after_b < EXPLAINED * before[b]:
-                names, name = [block.point_ids[a], block.point_ids[b]], block.photo_ids[photo]
-                text = (
-                    f"the points {names[0]} and {names[1]} are exchanged on photo {name}:"
-                    " exchanged back, they fit"
-                )
-                values = {"before_mm": max(before[a], before[b]), "after_mm": max(after_a, after_b)}
-                section.findings.append(Finding("exchanged-points", "grave", text, [name], names, values))
-                found.setdefault(a, []).append(photo)
-                found.setdefault(b, []).append(photo)
-    return found
+                pairs.append((max(after_a, after_b), a, b))
+        paired: set[int] = set()
+        for after, a, b in sorted(pairs):
+            if paired & {a, b}:
+                continue
+            paired |= {a, b}
+            names, name = [block.point_ids[a], block.point_ids[b]], block.photo_ids[photo]
+            text = (
+                f"the points {names[0]} and {names[1]} are exchanged on photo {name}:"
+                " exchanged back, they fit"
+            )
+            values = {"before_mm": max(before[a], before[b]), "after_mm": after}
+            findings.append(Finding("exchanged-points", "grave", text, [name], names, values))
+            found.setdefault(a, []).append(photo)
+            found.setdefault(b, []).append(photo)
+    return findings, found
 
 
-def _control(rays: Rays, section: Section) -> None:
-    """Compare held control with the intersected positions; what stands out from the others is named."""
+def _control(rays: Rays, section: Section) -> Mask:
+    """Compare held control with the intersected positions; what stands out from the others is named.
+
+    Returns (n,) the points that are gravely off.
+    """
     block = rays.block
     held = np.isfinite(block.point_sd)
     met = rays.intersect().positions
     control = np.flatnonzero(held.any(axis=1) & np.isfinite(met).all(axis=1))
     if not control.size:
         section.lines.append("no control point is intersected")
-        return
+        return np.zeros(len(block.point_ids), dtype=bool)
     given = np.where(held[control], block.point_positions[control], rays.axes.from_local(met[control]))
     differences = np.where(held[control], met[control] - rays.axes.positions(given), np.nan)
     for axis, name in enumerate(("east", "north", "up") if block.geographic else ("X", "Y", "Z")):
         _control_component(block, control, differences[:, axis], name, section)
+    grave = [each for each in section.findings if each.kind == "control-difference" and each.level == "grave"]
+    return np.isin(block.point_ids, [name for finding in grave for name in finding.points])
 
 
 def _control_component(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram.giant.checks.findings import Finding, Section
 from photogram.giant.checks.rays import frame_radius
-from photogram.giant.checks.robust import critical
+from photogram.giant.checks.robust import critical, normal_of_chi_square
 from photogram.result import Result
 
 __all__ = ["residuals"]
@@ -180,10 +180,4 @@ def _own_pattern(result: Result, rows: Indices, size: float, spread: float) -> f
     observed = (result.residuals[rows] / block.image_sd[rows]).ravel() / spread
     solved = np.linalg.lstsq(design, observed, rcond=None)[0]
     explained = float(((design @ solved) ** 2).sum())
-    return _normal_of_chi_square(explained, design.shape[1])
-
-
-def _normal_of_chi_square(value: float, freedom: int) -> float:
-    """Turn chi-square into a normal value (Wilson and Hilferty, 1931)."""
-    spread = 2 / (9 * freedom)
-    return float(((value / freedom) ** (1 / 3) - (1 - spread)) / math.sqrt(spread))
+    return normal_of_chi_square(explained, design.shape[1])

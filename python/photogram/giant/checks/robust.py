@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["critical", "fit", "mad_sd"]
+__all__ = ["critical", "fit", "mad_sd", "normal_of_chi_square"]
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +30,12 @@ def critical(tests: int, chance: float = 0.01) -> float:
     return NormalDist().inv_cdf(1 - chance / 2 / max(tests, 1))
 
 
+def normal_of_chi_square(value: float, freedom: int) -> float:
+    """Turn chi-square into a normal value (Wilson and Hilferty, 1931)."""
+    spread = 2 / (9 * freedom)
+    return float(((value / freedom) ** (1 / 3) - (1 - spread)) / math.sqrt(spread))
+
+
 def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:
     """Fit by Tukey's biweight from a start by least absolute deviations; returns (k, ...) coefficients.
 
@@ -37,13 +44,16 @@ def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:
     design
         (n, k) with n > k.
     values
-        (n, d); each row is an outlier or not as a whole.
+        (n, d); each row is an outlier or not as a whole. NaN comes back when their squares overflow.
     """
     weights = np.ones(len(values))
     coefficients: Floats = np.zeros((design.shape[1], values.shape[1]))
     for iteration in range(iterations):
         root = np.sqrt(weights)[:, np.newaxis]
-        coefficients = np.asarray(np.linalg.lstsq(design * root, values * root, rcond=None)[0])
+        try:
+            coefficients = np.asarray(np.linalg.lstsq(design * root, values * root, rcond=None)[0])
+        except np.linalg.LinAlgError:  # of numbers whose squares overflow
+            return np.full_like(coefficients, np.nan)
         size = np.linalg.norm(values - design @ coefficients, axis=1)
         middle = max(float(np.median(size)), ROUNDING * float(size.max()))
         if middle == 0:

@@ -21,6 +21,8 @@ Indices = NDArray[np.int64]
 
 LOOK, GRAVE = 8.0, 20.0
 """Departures from the path, in robust standard deviations of all departures of their kind."""
+FEW = 4
+"""So many free departures double what is allowed."""
 MOVED = 10.0
 """The same for the change from the initial to the adjusted station."""
 TINY = 1e-9
@@ -108,10 +110,14 @@ def strips_of(positions: Floats) -> list[Indices]:
 
 @dataclass(frozen=True)
 class _Path:
-    """Departures (k, 5) of the photos of a strip from its path, and their robust spread (5,)."""
+    """Departures (k, 5) of the photos of a strip from its path, and what its fit leaves free of their sizes.
+
+    A robust fit passes through as many photos as it has coefficients; `free` are the other sizes (k - 2, 5),
+    or (k - 3, 5) of a curved path.
+    """
 
     departures: Floats
-    spread: Floats
+    free: Floats
 
 
 def _path(positions: Floats, heights: Floats, cameras: Floats) -> _Path:
@@ -130,14 +136,21 @@ def _path(positions: Floats, heights: Floats, cameras: Floats) -> _Path:
     design = np.vander(t, degree + 1)
     # Each quantity by itself: a wrong height says nothing about kappa.
     columns = [values[:, [k]] - design @ fit(design, values[:, [k]]) for k in range(values.shape[1])]
-    # Made as large as departures from a path that is known would be.
-    departures = np.hstack(columns) * np.sqrt(len(t) / (len(t) - degree - 1))
-    return _Path(departures, MAD_TO_SD * np.median(np.abs(departures), axis=0))
+    departures = np.hstack(columns)
+    departures[:, 2:] = np.angle(np.exp(1j * departures[:, 2:]))
+    return _Path(departures, np.sort(np.abs(departures), axis=0)[degree + 1 :])
+
+
+def _spread(sizes: Floats) -> Floats:
+    spread: Floats = MAD_TO_SD * np.median(sizes, axis=0)
+    return spread
 
 
 def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str, section: Section) -> None:
     """Name the photos that depart from the path far more than photos do on the whole."""
-    usual = MAD_TO_SD * np.median(np.abs(np.vstack([path.departures for path in paths])), axis=0)
+    free = np.vstack([path.free for path in paths])
+    # The spread of few departures is itself uncertain.
+    usual, doubt = _spread(free), 1 + FEW / len(free)
     base = _base(block)
     floor = np.array([SMOOTH_POSITION * base] * 2 + [SMOOTH_ANGLE] * 3)
     units = [block.linear_unit] * 2 + ["deg"] * 3
@@ -145,9 +158,9 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
     for name, spread, unit in zip(QUANTITIES, usual * factors, units, strict=True):
         section.lines.append(f"{f'spread about the path, {name}':<50}{spread:.4f} {unit}")
     for strip, path in zip(strips, paths, strict=True):
-        scale = np.maximum(np.maximum(usual, path.spread), floor)
-        for row, k in np.argwhere(np.abs(path.departures) > LOOK * scale).tolist():
-            size = abs(path.departures[row, k]) / scale[k]
+        scale = np.maximum(np.maximum(usual, _spread(path.free)), floor)
+        for row, k in np.argwhere(np.abs(path.departures) > LOOK * doubt * scale).tolist():
+            size = abs(path.departures[row, k]) / scale[k] / doubt
             departure, photo = float(path.departures[row, k] * factors[k]), block.photo_ids[strip[row]]
             text = (
                 f"station {photo} is off the {which} path of its strip: {QUANTITIES[k]} by {departure:.3f}"

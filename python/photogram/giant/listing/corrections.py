@@ -30,22 +30,21 @@ def correction_pages(
     names, corrections, held
         n points, their (n, 3) corrections (NaN where there is none), and (n, 3) which components are held.
     as_published
-        Whether the corrections of unheld components are the changes of the last iteration, as those of the
-        1987 program, and not adjusted minus supplied.
+        Without the line that says what is listed, and without number and rms of the components that are not
+        held.
     """
-    meaning = "THE CHANGE OF THE LAST ITERATION" if as_published else "ADJUSTED MINUS SUPPLIED VALUE"
-    heading = headed(
-        "CORRECTIONS APPLIED TO GROUND CONTROL",
-        f"ADJUSTED MINUS INPUT; IN PARENTHESES: COMPONENT NOT HELD, {meaning}",
-    )
+    meaning = "ADJUSTED MINUS INPUT; IN PARENTHESES: COMPONENT NOT HELD, ADJUSTED MINUS SUPPLIED VALUE"
+    heading = headed("CORRECTIONS APPLIED TO GROUND CONTROL", *([] if as_published else [meaning]))
     cells = [_cells(space, *row) for row in zip(names, corrections.tolist(), held.tolist(), strict=True)]
     entries = [
         [*("".join(cell[line] for cell in cells[row : row + ACROSS]) for line in range(3)), ""]
         for row in range(0, len(cells), ACROSS)
     ]
     known = np.isfinite(corrections)
-    closing = [*_summary(space, corrections, known & held), "", "COMPONENTS NOT HELD"]
-    return paginate(heading, entries, closing=[*closing, *_summary(space, corrections, known & ~held)])
+    closing = _summary(space, corrections, known & held)
+    if not as_published:
+        closing += ["", "COMPONENTS NOT HELD", *_summary(space, corrections, known & ~held)]
+    return paginate(heading, entries, closing=closing)
 
 
 def _cells(space: Space, name: str, values: Sequence[float], held: Sequence[bool]) -> list[str]:

@@ -14,7 +14,13 @@ TITLE = "CAMERA STATIONS CORRECTIONS"
 
 
 def iteration_pages(
-    space: Space, names: Sequence[str], iterations: Sequence[Iteration], corrections: Floats, notice: str
+    space: Space,
+    names: Sequence[str],
+    iterations: Sequence[Iteration],
+    corrections: Floats,
+    notice: str,
+    *,
+    as_published: bool = False,
 ) -> list[Page]:
     """Return the pages of the iterations.
 
@@ -28,6 +34,8 @@ def iteration_pages(
         k iterations, and (k, P, 6) their corrections of position and attitude (radians).
     notice
         What is said below the last one, if anything.
+    as_published
+        Without the line of the units.
     """
     if not iterations:
         return [[*headed(TITLE), notice]]
@@ -36,8 +44,7 @@ def iteration_pages(
         heading = headed(
             TITLE,
             f"ITERATION {iteration.number}",
-            "",
-            f"POSITION ({space.units}), ATTITUDE (RADIANS)",
+            *([] if as_published else ["", f"POSITION ({space.units}), ATTITUDE (RADIANS)"]),
         )
         closing = [
             "",

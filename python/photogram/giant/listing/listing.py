@@ -56,8 +56,8 @@ def listing(
     result
         The adjustment of the block, whether it converged or not.
     as_published
-        Whether the corrections of control components that are not held are, as in 1987, the changes of the
-        last iteration, and not adjusted minus supplied.
+        Whether every line is one that the program of 1987 printed, and the corrections of control components
+        that are not held are the changes of the last iteration, and not adjusted minus supplied.
     limits
         The limits that the block was made with.
 
@@ -67,13 +67,20 @@ def listing(
     """
     space = Space(block.geographic, block.linear_unit)
     pages = [
-        options_page(project.common, space, block.refraction),
+        options_page(project.common, space, block.refraction, as_published=as_published),
         *_input_pages(project, block, space),
         *warning_pages(error_warnings(project, block, limits)),
     ]
-    notice = NOTICES[result.status]
+    notice = "" if as_published else NOTICES[result.status]
     if not project.common.intersection_only:
-        pages += iteration_pages(space, block.photo_ids, result.iterations, result.photo_corrections, notice)
+        pages += iteration_pages(
+            space,
+            block.photo_ids,
+            result.iterations,
+            result.photo_corrections,
+            notice,
+            as_published=as_published,
+        )
     for page in _result_pages(project, block, result, space, as_published):
         pages.append([notice, *page] if notice else page)
     return printout(block.title, pages)
@@ -108,7 +115,9 @@ def _result_pages(
 ) -> Iterator[Page]:
     common = project.common
     closing = statistics(result.sums_of_squares, result.degrees_of_freedom, result.variance_of_unit_weight)
-    yield from residual_pages(_residuals(block, result), common.residual_limit, closing)
+    yield from residual_pages(
+        _residuals(block, result), common.residual_limit, closing, as_published=as_published
+    )
     # A diverged adjustment may have no covariances.
     used = result.used_points
     propagated = common.error_propagation and bool(

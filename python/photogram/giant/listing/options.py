@@ -16,7 +16,9 @@ UNIT_VARIANCE: dict[UnitVariance, str] = {
 }
 
 
-def options_page(common: Common, space: Space, refraction: Refraction | None) -> Page:
+def options_page(
+    common: Common, space: Space, refraction: Refraction | None, *, as_published: bool = False
+) -> Page:
     """Return the page of the options.
 
     The sample shows one choice of most options only; `docs/giant-listing.md` says which lines are ours.
@@ -29,6 +31,8 @@ def options_page(common: Common, space: Space, refraction: Refraction | None) ->
         The object space and its linear unit.
     refraction
         What is applied, which may be more than COMMON asks for.
+    as_published
+        Without the linear unit of a rectangular job.
     """
     air = refraction is not None and refraction.air is not None
     water = refraction is not None and refraction.water is not None
@@ -46,7 +50,8 @@ def options_page(common: Common, space: Space, refraction: Refraction | None) ->
     lines.append(_residuals(common.residual_limit))
     if common.strip:
         lines.append(f"LEADING '{common.strip}' WILL BE ELIMINATED FROM ALL IDENTIFICATIONS")
-    lines += _lengths(common, space)
+    if space.geographic or not as_published:
+        lines += _lengths(common, space)
     if common.save_points:
         lines.append("TRIANGULATED GROUND COORDINATES WILL BE SAVED")
     if common.save_stations:

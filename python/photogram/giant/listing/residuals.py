@@ -39,7 +39,9 @@ class PointResiduals:
         return limit == 0 or (limit > 0 and bool((abs(self.residuals) > limit).any()))
 
 
-def residual_pages(points: Iterable[PointResiduals], limit: float, closing: Sequence[str]) -> list[Page]:
+def residual_pages(
+    points: Iterable[PointResiduals], limit: float, closing: Sequence[str], *, as_published: bool = False
+) -> list[Page]:
     """Return the pages of the residuals.
 
     Parameters
@@ -50,11 +52,11 @@ def residual_pages(points: Iterable[PointResiduals], limit: float, closing: Sequ
         COMMON columns 41-50.
     closing
         What stands below: :func:`statistics`.
+    as_published
+        Without the line that says what the residuals are.
     """
-    heading = headed(
-        "TRIANGULATED POINTS RESIDUALS",
-        "OBSERVED MINUS COMPUTED, MICROMETERS; X ABOVE Y".center(132).rstrip(),
-    )
+    meaning = "OBSERVED MINUS COMPUTED, MICROMETERS; X ABOVE Y".center(132).rstrip()
+    heading = headed("TRIANGULATED POINTS RESIDUALS", *([] if as_published else [meaning]))
     entries = (entry for point in points if point.listed(limit) for entry in _entries(point))
     return paginate(heading, entries, closing=closing)
 

@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use crate::adjustment::{self, AdjustError, Event, Problem};
+use crate::adjustment::{self, AdjustError, Event, Problem, gib};
 use crate::geometry::{self, ObjectSpace, Refraction, RotationSense, Vector3};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
@@ -26,10 +26,14 @@ pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
 /// A photograph as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
 pub struct Photo {
-    /// Initial (and, where weighted, observed) position in the coordinates of the object space.
+    /// Initial position in the coordinates of the object space; that of fixed components.
     pub position: Vector3,
-    /// Initial (and, where weighted, observed) omega, phi, kappa in radians.
+    /// Initial omega, phi, kappa in radians; those of fixed angles.
     pub attitude: Vector3,
+    /// Observed position; of its components those count that are weighted.
+    pub observed_position: Vector3,
+    /// Observed omega, phi, kappa in radians, whole turns apart; those count that are weighted.
+    pub observed_attitude: Vector3,
     /// Standard deviations of the position: infinite free, zero fixed.
     pub position_sd: Vector3,
     /// Standard deviations of the attitude in radians: infinite free, zero fixed.
@@ -109,10 +113,6 @@ pub struct Options {
     pub memory: Option<usize>,
 }
 
-fn gib(bytes: usize) -> f64 {
-    bytes as f64 / f64::from(1 << 30)
-}
-
 /// Why a block cannot be adjusted. Photographs and points are indices into the block.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum BlockError {
@@ -144,7 +144,7 @@ pub enum BlockError {
         points: Vec<usize>,
     },
     /// The adjustment would take more memory than it may.
-    #[error("the adjustment takes {:.1} GiB of memory, and {:.1} GiB are free", gib(*.needed), gib(*.available))]
+    #[error("the adjustment takes {} of memory, and {} are free", gib(*.needed), gib(*.available))]
     Memory {
         /// Bytes that it would take.
         needed: usize,
@@ -260,9 +260,17 @@ impl Block {
             order,
         };
         let photo_values = |photo: &Photo| [local(photo.position), photo.attitude];
+        let photo_prior = |photo: &Photo| {
+            let mut position = photo.observed_position;
+            if let ObjectSpace::Geographic(_) = self.space {
+                [position[0]] = geometry::nearest_turns([position[0]], [photo.position[0]]);
+            }
+            [local(position), geometry::nearest_turns(photo.observed_attitude, photo.attitude)]
+        };
         let photo_sd = |photo: &Photo| [photo.position_sd, photo.attitude_sd];
         let photos =
             self.photos.iter().map(photo_values).collect::<Vec<_>>().into_flattened().into_flattened();
+        let prior = self.photos.iter().flat_map(photo_prior).flatten();
         let stations = model.photos(&photos);
         let met = model.intersect(&stations);
         self.check_resolution(model.middle_distance(&stations, met.as_deref().ok()))?;
@@ -277,8 +285,8 @@ impl Block {
         Ok(Problem {
             observation_sd: model.images.iter().flat_map(|image| image.sd).collect(),
             system: System::new(layout, options.ordering),
-            initial: [coordinates.into_flattened(), photos.clone()].concat(),
-            prior: [own.into_flattened(), photos].concat(),
+            initial: [coordinates.into_flattened(), photos].concat(),
+            prior: own.into_flattened().into_iter().chain(prior).collect(),
             sd,
             model,
         })

@@ -7,15 +7,17 @@ use crate::geometry::{self, Vector3};
 
 /// The square of a larger coordinate, or the product of its partials, is not a number.
 const LARGEST: f64 = 1e100;
+/// The weight that belongs to a smaller standard deviation is not one either.
+const SMALLEST: f64 = 1e-100;
 
 /// By how much rounding may have changed a number: half its distance from the next one.
 fn rounding(value: f64) -> f64 {
     (value.abs().next_up() - value.abs()) / 2.0
 }
 
-/// Whether a value that counts as an observation is rounded by more than its standard deviation.
+/// Whether a value that counts as an observation is rounded by more than its standard deviation, or that is too small to weight it.
 fn is_coarse(value: f64, sd: f64) -> bool {
-    sd > 0.0 && sd.is_finite() && rounding(value) > sd
+    sd > 0.0 && sd.is_finite() && rounding(value).max(SMALLEST) > sd
 }
 
 impl Block {
@@ -49,10 +51,13 @@ impl Block {
         let angle = smallest.iter().zip(&self.photos).map(|(sd, photo)| sd / photo.principal_distance.abs());
         let angle = angle.fold(f64::INFINITY, f64::min);
         // Coordinates in the units of a length: those of geographic space stand on the ground at their distance from its centre.
-        let length = |value: f64| angle * distance.unwrap_or(f64::INFINITY) < rounding(value);
+        let length = |value: f64| angle * distance.unwrap_or(f64::INFINITY) < rounding(value).max(SMALLEST);
         let position = |coordinates: Vector3| self.space.cartesian(coordinates).into_iter().any(length);
         self.refuse(
-            |photo| position(photo.position) || photo.attitude.iter().any(|&value| angle < rounding(value)),
+            |photo| {
+                position(photo.position)
+                    || photo.attitude.iter().any(|&value| angle < rounding(value).max(SMALLEST))
+            },
             |point| point.held() == [true; 3] && position(point.coordinates),
         )
     }

@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use crate::adjustment::{self, AdjustError, Event, Problem};
+use crate::adjustment::{self, AdjustError, Adjustment, Event, Problem, gib};
 use crate::geometry::{BundlerParameters, BundlerPhoto, Vector3};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
@@ -69,6 +69,8 @@ pub struct Options {
     pub adjustment: adjustment::Options,
     /// How to order the photos.
     pub ordering: Ordering,
+    /// Bytes that the adjustment may take (see [`System::memory`]); None for any number.
+    pub memory: Option<usize>,
 }
 
 /// Why a collection cannot be adjusted, or has no cofactors. Photos and points are indices into the collection.
@@ -89,6 +91,14 @@ pub enum CollectionError {
     /// The initial values put a point into the plane of a projection centre, so that its image is not finite.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
+    /// The adjustment would take more memory than it may.
+    #[error("the adjustment takes {} of memory, and {} are free", gib(*.needed), gib(*.available))]
+    Memory {
+        /// Bytes that it would take.
+        needed: usize,
+        /// Bytes that it may take.
+        available: usize,
+    },
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
@@ -119,7 +129,7 @@ impl Collection {
     /// Adjusts the collection.
     ///
     /// Points with an unknown that is free and images on one photo only are left out, and photos that then have no image stay
-    /// as they are. `watch` is called on the calling thread; when it breaks, the adjustment stops.
+    /// as they are. So are points that run into a station: the adjustment goes on without them from where it was. `watch` is called on the calling thread; when it breaks, the adjustment stops.
     ///
     /// # Errors
     /// A collection that contradicts itself or has nothing to adjust; an interruption.
@@ -134,18 +144,52 @@ impl Collection {
         if let Some(bad) = self.images.iter().position(outside) {
             return Err(CollectionError::Index(bad));
         }
-        let used = self.used();
-        if used.points.is_empty() {
-            return Err(CollectionError::Empty);
+        let mut left_out = vec![false; self.points.len()];
+        let mut reached = self.initial();
+        let mut before: Option<Adjustment> = None;
+        loop {
+            let used = self.used(&left_out);
+            if used.points.is_empty() {
+                return Err(CollectionError::Empty);
+            }
+            let problem = self.problem(options, &used, &reached)?;
+            let needed = problem.system.memory();
+            if let Some(available) = options.memory.filter(|&available| needed > available) {
+                return Err(CollectionError::Memory { needed, available });
+            }
+            let done = before.as_ref().map_or(0, |before| before.iterations.len());
+            let mut adjustment_options = options.adjustment;
+            adjustment_options.max_iterations = options.adjustment.max_iterations.saturating_sub(done);
+            let mut adjusted = adjustment::adjust(&problem, &adjustment_options, pool, watch)
+                .map_err(|error| CollectionError::new(error, &used.points))?;
+            adjusted.go_on_from(before.take());
+            if adjusted.collapsed.is_empty() {
+                let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
+                return Ok(Solution::new(self, &problem, adjusted, &used, collapsed));
+            }
+            adjusted.collapsed.iter().for_each(|&local| left_out[used.points[local]] = true);
+            self.take_over(&mut reached, &used, &adjusted.unknowns);
+            before = Some(adjusted);
         }
-        let problem = self.problem(options, &used)?;
-        let adjusted = adjustment::adjust(&problem, &options.adjustment, pool, watch)
-            .map_err(|error| CollectionError::new(error, &used.points))?;
-        Ok(Solution::new(self, &problem, adjusted, &used))
     }
 
-    /// The points that their images determine, with the images in their order.
-    fn used(&self) -> Used {
+    /// Initial values: of the points, then of the photos.
+    fn initial(&self) -> Values {
+        Values {
+            points: self.points.iter().map(|point| point.position).collect(),
+            photos: self.photos.iter().map(|photo| photo.parameters).collect(),
+        }
+    }
+
+    /// Takes over adjusted unknowns.
+    fn take_over(&self, reached: &mut Values, used: &Used, unknowns: &[f64]) {
+        let (points, photos) = unknowns.split_at(3 * used.points.len());
+        used.points.iter().zip(points.as_chunks().0).for_each(|(&point, &at)| reached.points[point] = at);
+        reached.photos.copy_from_slice(photos.as_chunks().0);
+    }
+
+    /// The points that their images determine, with the images in their order; without those `left_out`.
+    fn used(&self, left_out: &[bool]) -> Used {
         let mut images_of = vec![Vec::new(); self.points.len()];
         for (index, image) in self.images.iter().enumerate() {
             images_of[image.point].push(index);
@@ -159,7 +203,7 @@ impl Collection {
         for (point, own) in images_of.into_iter().enumerate() {
             let Some(&first) = own.first() else { continue };
             let one_photo = own.iter().all(|&image| self.images[image].photo == self.images[first].photo);
-            if one_photo && self.points[point].sd.contains(&f64::INFINITY) {
+            if left_out[point] || one_photo && self.points[point].sd.contains(&f64::INFINITY) {
                 continue;
             }
             own.iter().for_each(|&image| used.images_on[self.images[image].photo] += 1);
@@ -170,17 +214,23 @@ impl Collection {
         used
     }
 
-    /// The least-squares problem: points are local blocks of three, photos kept blocks of nine.
-    fn problem(&self, options: &Options, used: &Used) -> Result<Problem<Bundle>, CollectionError> {
+    /// The least-squares problem, from the given values on: points are local blocks of three, photos kept blocks of nine.
+    fn problem(
+        &self,
+        options: &Options,
+        used: &Used,
+        start: &Values,
+    ) -> Result<Problem<Bundle>, CollectionError> {
         let images: Vec<Image> = used.images.iter().map(|&image| self.images[image]).collect();
         let photo_of = images.iter().map(|image| image.photo as u32).collect();
-        let places = self.photos.iter().map(|photo| BundlerPhoto::new(photo.parameters).centre()).collect();
+        let places = start.photos.iter().map(|&parameters| BundlerPhoto::new(parameters).centre()).collect();
         let layout = Layout::new(2, 3, &vec![9; self.photos.len()], used.start.clone(), photo_of)?
             .with_places(places)?;
         let points = || used.points.iter().map(|&point| &self.points[point]);
-        let positions = points().flat_map(|point| point.position);
-        let initial: Vec<f64> =
-            positions.chain(self.photos.iter().flat_map(|photo| photo.parameters)).collect();
+        let unknowns = |values: &Values| -> Vec<f64> {
+            let positions = used.points.iter().flat_map(|&point| values.points[point]);
+            positions.chain(values.photos.iter().flatten().copied()).collect()
+        };
         // A photo without images stays as it is.
         let photo_sd = self.photos.iter().zip(&used.images_on);
         let photo_sd = photo_sd.flat_map(|(photo, &images)| if images == 0 { [0.0; 9] } else { photo.sd });
@@ -189,12 +239,24 @@ impl Collection {
         Ok(Problem {
             observation_sd: images.iter().flat_map(|image| image.sd).collect(),
             system: System::new(layout, options.ordering),
-            prior: initial.clone(),
-            initial,
+            prior: unknowns(&self.initial()),
+            initial: unknowns(start),
             sd: points().flat_map(|point| point.sd).chain(photo_sd).collect(),
-            model: Bundle { points: used.points.len(), images, images_on: used.images_on.clone(), placed },
+            model: Bundle {
+                points: used.points.len(),
+                images,
+                images_of: used.start.clone(),
+                images_on: used.images_on.clone(),
+                placed,
+            },
         })
     }
+}
+
+/// Values of all points and photos.
+struct Values {
+    points: Vec<Vector3>,
+    photos: Vec<BundlerParameters>,
 }
 
 /// What takes part.

@@ -2,9 +2,13 @@
 
 use super::Image;
 use crate::adjustment::Model;
-use crate::geometry::vector::{apply, difference};
+use crate::geometry::vector::{apply, difference, square};
 use crate::geometry::{BundlerPhoto, Vector3};
 use crate::normals::GroupRows;
+
+/// A point has run into a station when its share in what the station learns is so many times that of the others in the mean: it is
+/// ten thousand times nearer than they are, and rounding leaves eight digits of what they say.
+const NEAR: f64 = 1e8;
 
 /// Images by photos with nine unknowns each.
 #[derive(Debug)]
@@ -13,6 +17,8 @@ pub struct Bundle {
     pub points: usize,
     /// The images, point by point: the groups of observations.
     pub images: Vec<Image>,
+    /// The images of point i are `images[images_of[i]..images_of[i + 1]]`.
+    pub images_of: Vec<usize>,
     /// How many of them each photo has.
     pub images_on: Vec<usize>,
     /// Whether the position of anything is weighted or fixed: then the datum is the user's.
@@ -50,6 +56,31 @@ impl Model for Bundle {
             rows.local[3 * row..][..3].copy_from_slice(&image.point[row]);
             rows.kept[9 * row..][..9].copy_from_slice(&image.photo[row]);
         }
+    }
+
+    /// Points that have run into a station: two rays that meet there ask for it. The image of such a point turns by 1 / distance
+    /// when point or station move; what its station learns from it, and loses again when the point is eliminated, is the square of that.
+    fn collapsed(&self, unknowns: &[f64]) -> Vec<usize> {
+        let photos = self.photos(unknowns);
+        let points = unknowns[..3 * self.points].as_chunks::<3>().0;
+        let centres: Vec<Vector3> = photos.iter().map(BundlerPhoto::centre).collect();
+        let share =
+            |point: usize, image: &Image| square(&difference(&points[point], &centres[image.photo])).recip();
+        let mut shares = vec![0.0; photos.len()];
+        for (point, images) in self.images_of.windows(2).enumerate() {
+            self.images[images[0]..images[1]]
+                .iter()
+                .for_each(|image| shares[image.photo] += share(point, image));
+        }
+        let collapsed = |point: &usize| {
+            self.images[self.images_of[*point]..self.images_of[*point + 1]].iter().any(|image| {
+                let own = share(*point, image);
+                let others = (shares[image.photo] - own).max(0.0)
+                    / (self.images_on[image.photo] as f64 - 1.0).max(1.0);
+                others > 0.0 && own > NEAR * others
+            })
+        };
+        (0..self.points).filter(collapsed).collect()
     }
 
     /// Rotation and translation of the first photo, and the component of a translation that changes most when the scale does.

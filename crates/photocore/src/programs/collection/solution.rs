@@ -48,6 +48,8 @@ pub struct Solution {
     pub degrees_of_freedom: i64,
     /// Variance of unit weight; None where there are no degrees of freedom.
     pub variance_of_unit_weight: Option<f64>,
+    /// The points that were left out because they ran into a station, ascending.
+    pub collapsed: Vec<usize>,
     /// Why there are no cofactors although they were asked for.
     pub undetermined: Option<CollectionError>,
     /// What was held to give the cofactors a datum: photo and parameter.
@@ -63,6 +65,7 @@ impl Solution {
         problem: &Problem<Bundle>,
         mut adjustment: Adjustment,
         used: &Used,
+        collapsed: Vec<usize>,
     ) -> Self {
         let unknowns = std::mem::take(&mut adjustment.unknowns);
         let sum_of_squares = adjustment.reweighted_sum_of_squares(&problem.observation_sd)
@@ -86,6 +89,7 @@ impl Solution {
             degrees_of_freedom,
             variance_of_unit_weight: (degrees_of_freedom > 0)
                 .then(|| sum_of_squares / degrees_of_freedom as f64),
+            collapsed,
             undetermined: adjustment
                 .undetermined
                 .take()

@@ -6,7 +6,7 @@ use super::{ControlPoint, Known, Pose, Resection, ResectionError};
 use crate::geometry::vector::{
     IDENTITY, Vector3, apply, cross, difference, dot, product, square, transposed, unit,
 };
-use crate::geometry::{ObjectSpace, RotationSense, local_vertical, rotation_angles};
+use crate::geometry::{ObjectSpace, RotationSense, local_vertical, nearest_turns, rotation_angles};
 
 /// Points among which triples are formed, and triples that are solved.
 const SPREAD_POINTS: usize = 8;
@@ -96,15 +96,6 @@ impl Resection {
         };
         Pose { position: hold(pose.position, &self.position), attitude: hold(pose.attitude, &self.attitude) }
     }
-}
-
-/// Angles shifted by whole turns so that they are nearest to known ones (NaN where unknown), with which they are compared.
-fn nearest_turns(angles: Vector3, known: Vector3) -> Vector3 {
-    const TURN: f64 = std::f64::consts::TAU;
-    std::array::from_fn(|k| {
-        let turns = ((known[k] - angles[k]) / TURN).round();
-        if turns.is_finite() { angles[k] + turns * TURN } else { angles[k] }
-    })
 }
 
 impl Sight {

@@ -58,13 +58,13 @@ impl fmt::Display for Cause {
     }
 }
 
-/// Counts known components: n = 2 MN + N at least 7, MN at least 2, N at least 3.
+/// Counts known components: seven at least, of these four horizontal (both X and Y among them) and three elevations. That is two
+/// horizontal pairs where they come in pairs (TB 19, section 6), but each coordinate counts by itself.
 pub fn check_counts(stations: &[Station]) -> Result<(), SimilarityError> {
-    let pairs = stations.iter().filter(|station| station.horizontal()).count();
-    let elevations = stations.iter().filter(|station| station.elevation()).count();
-    let known = 2 * pairs + elevations;
-    if known < 7 || pairs < 2 || elevations < 3 {
-        return Err(SimilarityError::Insufficient { known, pairs, elevations });
+    let known = std::array::from_fn(|k| stations.iter().filter(|station| station.known()[k]).count());
+    let [x, y, z] = known;
+    if x + y < 4 || x == 0 || y == 0 || z < 3 {
+        return Err(SimilarityError::Insufficient { known });
     }
     Ok(())
 }
@@ -98,7 +98,7 @@ fn shape(stations: &[Station], similarity: &Similarity, tolerance: f64) -> Optio
         let [length, width, _] = extents(positions);
         width <= tolerance * length
     };
-    let horizontal = chosen(&|station| station.horizontal());
+    let horizontal = chosen(&|station| station.known()[0] || station.known()[1]);
     let elevated = chosen(&|station| station.elevation());
     let all = chosen(&|station| station.known() != [false; 3]);
     let space: Vec<Vector3> = all.iter().map(|&i| stations[i].model).collect();

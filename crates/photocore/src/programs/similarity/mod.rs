@@ -14,6 +14,7 @@ mod published;
 mod solution;
 mod start;
 mod transform;
+mod weights;
 
 use std::ops::ControlFlow;
 
@@ -27,10 +28,12 @@ use crate::normals::{Layout, LayoutError, Ordering, System};
 pub use crout::gauss_crout;
 pub use determinacy::Cause;
 use model::{AsControl, CHANGES};
+pub use published::Trace;
 pub use solution::{AdjustedStation, Solution};
 use start::Chosen;
 pub use start::Started;
 pub use transform::{Matrix7, Parameters, Similarity};
+use weights::Weighted;
 
 /// A station: a point of the model with some of its control coordinates.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +44,7 @@ pub struct Station {
     pub control_sd: Vector3,
     /// Model coordinates x in model units.
     pub model: Vector3,
-    /// Their standard deviations, positive.
+    /// Their standard deviations; zero where those of the control are positive.
     pub model_sd: Vector3,
 }
 
@@ -51,8 +54,8 @@ impl Station {
         std::array::from_fn(|k| self.control[k].is_finite() && self.control_sd[k].is_finite())
     }
 
-    /// Whether the horizontal coordinates take part. They come as a pair.
-    fn horizontal(&self) -> bool {
+    /// Whether both horizontal coordinates take part.
+    fn pair(&self) -> bool {
         let [x, y, _] = self.known();
         x && y
     }
@@ -99,6 +102,8 @@ pub struct Options {
     pub max_iterations: usize,
     /// Fraction of its standard deviation by which no unknown changes any more (rigorous method).
     pub tolerance: f64,
+    /// Whether the cycles of the bulletin keep what they computed on their way.
+    pub trace: bool,
 }
 
 /// Why there is no orientation. Stations are indices.
@@ -106,15 +111,12 @@ pub struct Options {
 pub enum SimilarityError {
     /// Fewer known components than the seven parameters need, or too few of a kind.
     #[error(
-        "insufficient control: {known} known coordinates ({pairs} horizontal pairs, {elevations} elevations)"
+        "insufficient control: {} known coordinates ({} X, {} Y, {} elevations)",
+        known.iter().sum::<usize>(), known[0], known[1], known[2]
     )]
     Insufficient {
-        /// n = 2 pairs + elevations.
-        known: usize,
-        /// MN.
-        pairs: usize,
-        /// N.
-        elevations: usize,
+        /// How many X, Y and Z are known.
+        known: [usize; 3],
     },
     /// The geometry of the control leaves a combination of parameters undetermined.
     #[error("the control does not determine the orientation: {cause}")]
@@ -143,10 +145,6 @@ pub enum SimilarityError {
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }
-
-/// Standard deviation of a model coordinate, as a fraction of the size of the model, to which all are scaled inside at the most: the
-/// criterion of convergence must mean something where the unit weight is arbitrary.
-const INNER_SD: f64 = 1e-7;
 
 /// Finds the seven parameters by least squares.
 ///
@@ -185,8 +183,8 @@ fn adjust(
     if start.scale.is_nan() || start.scale <= 0.0 {
         return Err(SimilarityError::Scale(start.scale));
     }
-    let inner = inner_scale(stations);
-    let problem = problem(stations, &start, inner)?;
+    let weighted = Weighted::new(stations, &chosen)?;
+    let problem = problem(&weighted.stations, &start)?;
     let engine = adjustment::Options {
         criterion: Criterion::Fraction(options.tolerance),
         max_iterations: if cycles.is_some() { 0 } else { options.max_iterations },
@@ -207,24 +205,13 @@ fn adjust(
     if let Some(cycles) = &cycles {
         adjusted.status = if cycles.converged { Status::Converged } else { Status::NotConverged };
     }
-    let solution = Solution::new(stations, &problem, &adjusted, inner, chosen, cycles)?;
+    let solution = Solution::new(&weighted, &problem, &adjusted, chosen, cycles)?;
     let scale = solution.similarity.scale;
     if scale.is_nan() || scale <= 0.0 { Err(SimilarityError::Scale(scale)) } else { Ok(solution) }
 }
 
-/// The factor that all standard deviations get inside.
-fn inner_scale(stations: &[Station]) -> f64 {
-    let mut deviations: Vec<f64> = stations.iter().flat_map(|station| station.model_sd).collect();
-    deviations.sort_unstable_by(f64::total_cmp);
-    (INNER_SD * determinacy::spread(stations) / deviations[deviations.len() / 2]).min(1.0)
-}
-
 /// The least-squares problem: the control coordinates are local blocks of three, the seven parameters one kept block.
-fn problem(
-    stations: &[Station],
-    start: &Similarity,
-    inner: f64,
-) -> Result<Problem<AsControl>, SimilarityError> {
+fn problem(stations: &[Station], start: &Similarity) -> Result<Problem<AsControl>, SimilarityError> {
     let (mut initial, mut prior, mut sd) = (vec![], vec![], vec![]);
     for station in stations {
         let known = station.known();
@@ -233,7 +220,7 @@ fn problem(
         for k in 0..3 {
             initial.push(if known[k] { given[k] } else { carried[k] });
             prior.push(if known[k] { given[k] } else { 0.0 });
-            sd.push(if known[k] { inner * station.control_sd[k] } else { f64::INFINITY });
+            sd.push(if known[k] { station.control_sd[k] } else { f64::INFINITY });
         }
     }
     let [x, y, z] = start.shift;
@@ -246,7 +233,7 @@ fn problem(
     Ok(Problem {
         model: AsControl::new(stations, start),
         system: System::new(layout, Ordering::Input),
-        observation_sd: stations.iter().flat_map(|station| station.model_sd.map(|sd| inner * sd)).collect(),
+        observation_sd: stations.iter().flat_map(|station| station.model_sd).collect(),
         initial,
         prior,
         sd,

@@ -3,9 +3,9 @@
 //! Corrected where the bulletin's program is at fault: angles are kept and not their sines, missing coordinates are known to be
 //! missing, and there is a limit of cycles.
 
-use super::crout::gauss_crout;
+use super::crout::{Normal, gauss_crout};
 use super::determinacy::Cause;
-use super::transform::Similarity;
+use super::transform::{Parameters, Similarity};
 use super::{Method, Options, SimilarityError, Station};
 use crate::geometry::vector::{apply, apply_transposed};
 use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
@@ -19,7 +19,26 @@ pub struct Cycles {
     pub similarity: Similarity,
     /// Largest correction of an angle in each cycle, radians.
     pub corrections: Vec<f64>,
+    /// What each cycle computed on its way, where it was asked for.
+    pub traces: Vec<Trace>,
     pub converged: bool,
+}
+
+/// What one cycle computed on its way: what the text before the suggested program has printed under sense switches.
+#[derive(Debug, Clone)]
+pub struct Trace {
+    /// A as the cycle began (after statement 8).
+    pub rotation: Matrix3,
+    /// Station, component and the eight P-values of every equation (after 27): omega, phi, kappa, s, three translations, constant.
+    pub equations: Vec<(usize, usize, [f64; 8])>,
+    /// Normal equations C (after 29).
+    pub normal: Normal,
+    /// Auxiliary table D (after 33).
+    pub auxiliary: Normal,
+    /// Results of the back solution (after 35): corrections of omega, phi, kappa, s, three translations from the centres.
+    pub results: [f64; 7],
+    /// Corrected parameters (after 36): omega, phi, kappa in radians, s, b1, b2, b3.
+    pub parameters: [f64; 7],
 }
 
 /// Carries out the cycles from given initial values.
@@ -30,34 +49,52 @@ pub fn iterate(
 ) -> Result<Cycles, SimilarityError> {
     let mut angles = start.angles();
     let mut similarity = *start;
-    let mut corrections = Vec::new();
+    let (mut corrections, mut traces) = (Vec::new(), Vec::new());
     while corrections.len() < options.max_iterations {
         let mut normal = [[0.0; 8]; 7];
-        let (_, partials) = rotation_with_partials(angles);
-        for station in stations {
+        let (rotation_before, partials) = rotation_with_partials(angles);
+        let mut equations = Vec::new();
+        for (index, station) in stations.iter().enumerate() {
             let rows = match options.method {
                 Method::FillIn => bulletin_rows(&similarity, &partials, station),
                 Method::Rigorous | Method::Report => misclosure_rows(&similarity, &partials, station),
             };
-            for (row, _) in rows.iter().zip(station.known()).filter(|(_, known)| *known) {
+            let known = station.known();
+            for component in (0..3).filter(|&k| known[k]) {
+                let row = rows[component];
                 for i in 0..7 {
                     (0..8).for_each(|j| normal[i][j] += row[i] * row[j]);
+                }
+                if options.trace {
+                    equations.push((index, component, row));
                 }
             }
         }
         let singular = || SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] };
-        let (_, e) = gauss_crout(&normal).ok_or_else(singular)?;
+        let (auxiliary, e) = gauss_crout(&normal).ok_or_else(singular)?;
         (0..3).for_each(|k| angles[k] += e[k]);
         similarity.rotation = rotation(angles);
         similarity.scale += e[3];
         (0..3).for_each(|k| similarity.shift[k] += e[4 + k]);
         let largest = e[..3].iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         corrections.push(largest);
+        if options.trace {
+            let Parameters { scale, translation: [b1, b2, b3], .. } = similarity.parameters();
+            let [omega, phi, kappa] = angles;
+            traces.push(Trace {
+                rotation: rotation_before,
+                equations,
+                normal,
+                auxiliary,
+                results: e,
+                parameters: [omega, phi, kappa, scale, b1, b2, b3],
+            });
+        }
         if largest <= ANGLE {
-            return Ok(Cycles { similarity, corrections, converged: true });
+            return Ok(Cycles { similarity, corrections, traces, converged: true });
         }
     }
-    Ok(Cycles { similarity, corrections, converged: false })
+    Ok(Cycles { similarity, corrections, traces, converged: false })
 }
 
 /// Rows of the misclosures u = s X - A^T (x - B), constant -u (specification, section 3).

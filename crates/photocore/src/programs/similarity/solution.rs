@@ -2,9 +2,10 @@
 
 use super::determinacy::Cause;
 use super::model::AsControl;
-use super::published::Cycles;
+use super::published::{Cycles, Trace};
 use super::start::{Chosen, Started};
 use super::transform::{Matrix7, Similarity};
+use super::weights::Weighted;
 use super::{SimilarityError, Station, determinacy, misclosures};
 use crate::adjustment::{Adjustment, Iteration, Problem, Status, leading_matrix};
 use crate::geometry::{Matrix3, Vector3};
@@ -43,6 +44,8 @@ pub struct Solution {
     pub iterations: Vec<Iteration>,
     /// Largest correction of an angle in each cycle of the bulletin, radians.
     pub cycles: Option<Vec<f64>>,
+    /// What each of these cycles computed on its way, where it was asked for.
+    pub traces: Vec<Trace>,
     /// Cofactors of the tangent parameters (see [`Similarity`]), a priori unit weight.
     pub tangent_cofactors: Matrix7,
     /// Condition number of the linearized misclosures.
@@ -56,12 +59,11 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Reads the solution out of an adjustment whose standard deviations were multiplied by `inner`.
+    /// Reads the solution out of an adjustment, whose standard deviations are multiplied by `inner`.
     pub(super) fn new(
-        stations: &[Station],
+        Weighted { stations, inner }: &Weighted,
         problem: &Problem<AsControl>,
         adjustment: &Adjustment,
-        inner: f64,
         chosen: Chosen,
         cycles: Option<Cycles>,
     ) -> Result<Self, SimilarityError> {
@@ -69,8 +71,9 @@ impl Solution {
         let singular = || SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] };
         let cofactors = misclosures::tangent_cofactors(stations, &similarity).ok_or_else(singular)?;
         let adjusted =
-            |i: usize| AdjustedStation::new(i, &stations[i], &similarity, &cofactors, adjustment, inner);
+            |i: usize| AdjustedStation::new(i, &stations[i], &similarity, &cofactors, adjustment, *inner);
         let outward = inner * inner;
+        let (cycles, traces) = cycles.map(|cycles| (cycles.corrections, cycles.traces)).unzip();
         let last = adjustment.iterations.last().map(|iteration| iteration.sum_of_squares);
         let iterations = adjustment.iterations.iter().map(|iteration| Iteration {
             sum_of_squares: outward * iteration.sum_of_squares,
@@ -83,12 +86,13 @@ impl Solution {
             started: chosen.started,
             alternatives: chosen.alternatives,
             status: adjustment.status,
-            cycles: cycles.map(|cycles| cycles.corrections),
+            cycles,
+            traces: traces.unwrap_or_default(),
             condition: determinacy::condition(stations, &similarity),
             weakness: determinacy::weakness(stations, &similarity),
             sum_of_squares: outward * last.unwrap_or(adjustment.initial_sum_of_squares),
             iterations: iterations.collect(),
-            tangent_cofactors: cofactors,
+            tangent_cofactors: cofactors.map(|row| row.map(|cofactor| cofactor / outward)),
             stations: (0..stations.len()).map(adjusted).collect(),
         })
     }
@@ -118,7 +122,7 @@ impl AdjustedStation {
             control: std::array::from_fn(control),
             cofactors: own.map(|row| row.map(|cofactor| cofactor / (inner * inner))),
             redundancy,
-            standardized,
+            standardized: standardized.map(|w| inner * w),
         }
     }
 }

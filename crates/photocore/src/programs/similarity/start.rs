@@ -102,7 +102,7 @@ fn report(
     let [first, second, ..] = stations else {
         return Err(SimilarityError::FirstStations("are not there"));
     };
-    if !(first.horizontal() && second.horizontal()) {
+    if !(first.pair() && second.pair()) {
         return Err(SimilarityError::FirstStations("have no horizontal coordinates"));
     }
     let [mut control, mut model] =
@@ -133,7 +133,7 @@ fn report(
         similarity.reduced(&station.model)[j] - scale * apply(&similarity.rotation, &needed)[j]
     };
     similarity.shift = std::array::from_fn(|j| {
-        let counts = |s: &Station| if j < 2 { s.horizontal() } else { s.elevation() };
+        let counts = |s: &Station| if j < 2 { s.pair() } else { s.elevation() };
         known_mean(stations, |station| counts(station).then(|| shift(station, j)))
     });
     Ok(similarity)

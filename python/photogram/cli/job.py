@@ -1,0 +1,238 @@
+"""One job behind every command: it knows what is read and written, guards the inputs, writes the results."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable, Iterable, Mapping
+from enum import Enum
+from functools import wraps
+from inspect import Parameter, signature
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, get_args
+
+import typer
+
+from photogram.cli.console import failures, print_remark
+from photogram.messages import printable
+
+if TYPE_CHECKING:
+    from photogram.writing import OutputSet
+
+__all__ = ["Job", "Reads", "Writes", "roles", "with_job"]
+
+LARGEST = 2**53
+"""What integers of options may be at most: beyond it numbers are not counts."""
+
+
+class Reads(Enum):
+    """What an option or argument names that a command reads."""
+
+    FILE = "file"
+    PROJECT = "directory of a GIANT project"
+
+
+class Writes(Enum):
+    """What an option or argument names that a command writes."""
+
+    FILE = "file"
+    DIRECTORY = "directory of results"
+
+
+class Job:
+    """The inputs and outputs of a run of a command; a context manager around its work.
+
+    On entry, before anything is computed, outputs that would harm an input or one another are refused, and
+    remarks are made on inputs that an interrupted run may have left in disorder. What is known only later is
+    told by :meth:`reads` and :meth:`writes`. Errors become messages and exit codes.
+
+    Parameters
+    ----------
+    files, projects
+        Files, and directories of GIANT projects, that are read.
+    outputs, directories
+        Files, and directories for results, that are written.
+    """
+
+    def __init__(
+        self,
+        files: Iterable[Path] = (),
+        projects: Iterable[Path] = (),
+        outputs: Iterable[Path] = (),
+        directories: Iterable[Path] = (),
+    ) -> None:
+        self._files, self._projects = list(files), list(projects)
+        self._outputs, self._directories = list(outputs), list(directories)
+        self._failures = failures()
+
+    def __enter__(self) -> Job:
+        self._failures.__enter__()
+        try:
+            self._check()
+            self._remark()
+        except Exception as error:
+            # The context is not entered when this raises: its exit would never see the error.
+            self._failures.__exit__(type(error), error, error.__traceback__)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> bool | None:
+        return self._failures.__exit__(kind, error, trace)
+
+    def reads(self, *files: Path) -> None:
+        """Name further files that are read: no result goes over them.
+
+        Raises
+        ------
+        InputError
+            A result was to do so.
+        """
+        self._files += files
+        self._check()
+
+    def writes(self, *files: Path) -> None:
+        """Name further files that are going to be written: they are looked at now.
+
+        Raises
+        ------
+        InputError
+            One of them would harm an input or another result.
+        """
+        self._outputs += files
+        self._check()
+
+    def write(self, *results: Mapping[Path, bytes]) -> None:
+        """Write results: all of them or none, none over an input, and no two to one place.
+
+        Those whose names a user chose are given apart from those that have names of their own.
+        """
+        with self.outputs() as outputs:
+            for files in results:
+                for path, content in files.items():
+                    self._check_projects(path)
+                    outputs.write(path, content)
+
+    def outputs(self) -> OutputSet:
+        """Return a set of files, for results that are written piece by piece."""
+        from photogram.writing import OutputSet
+
+        return OutputSet(self._inputs())
+
+    def _inputs(self) -> list[Path]:
+        inputs = list(self._files)
+        for project in self._projects:
+            if project.is_dir():
+                from photogram.giant.files import present_files
+
+                inputs += [path for found in present_files(project).values() for path in found]
+        return inputs
+
+    def _check(self) -> None:
+        from photogram.errors import InputError
+        from photogram.files import reading
+        from photogram.writing import check_outputs
+
+        for path in [*self._files, *self._projects]:
+            with reading(path):
+                _check_name(path)
+        for path in self._directories:
+            _check_name(path)
+            if path.exists() and not path.is_dir():
+                raise InputError("is not a directory", file=path)
+            if any(
+                path.exists() and project.exists() and path.samefile(project) for project in self._projects
+            ):
+                raise InputError("the results would be written over the input", file=path)
+        inputs = self._inputs()
+        check_outputs(self._outputs, inputs, self._directories)
+        for path in self._outputs:
+            self._check_projects(path)
+
+    def _remark(self) -> None:
+        """Remark on inputs that belong to a set which an interrupted run may have left incomplete."""
+        from photogram.writing.markers import doubtful
+
+        for path, mark in doubtful(self._inputs()).items():
+            told = f"{path}: an interrupted run may have left it out of step with other files: {mark}"
+            print_remark(printable(told))
+
+    def _check_projects(self, path: Path) -> None:
+        """Refuse an output by which a project that is read would have two files of one name."""
+        if not self._projects:
+            return
+        from photogram.errors import InputError
+        from photogram.giant.files import project_name
+
+        name = project_name(path)
+        place = os.path.dirname(os.path.realpath(path))
+        if name and any(os.path.realpath(project) == place for project in self._projects):
+            raise InputError(f"would be taken for the {name} of the project", file=path)
+
+
+def _check_name(path: Path) -> None:
+    """Refuse what no call of the system can look at; that nothing is there is said by who reads it."""
+    try:
+        os.stat(path)
+    except OSError as error:
+        if error.errno not in (errno.ENOENT, errno.ENOTDIR):
+            raise OSError(error.errno, error.strerror, str(path)) from None
+
+
+def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:
+    """Return what the options and arguments of a command name that is read or written.
+
+    Raises
+    ------
+    TypeError
+        One of them is a path, and does not say which.
+    """
+    found: dict[str, Reads | Writes] = {}
+    for parameter in signature(command, eval_str=True).parameters.values():
+        kind, *metadata = get_args(parameter.annotation) or (parameter.annotation,)
+        marks = [each for each in metadata if isinstance(each, Reads | Writes)]
+        if len(marks) == 1:
+            found[parameter.name] = marks[0]
+        elif marks or _holds_path(kind):
+            raise TypeError(f"{command.__name__}: {parameter.name} must be marked as one of Reads or Writes")
+    return found
+
+
+def _holds_path(kind: object) -> bool:
+    return kind is Path or any(_holds_path(part) for part in get_args(kind))
+
+
+def with_job(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command its :class:`Job` as the parameter `job`, made of its options that are marked.
+
+    Raises
+    ------
+    TypeError
+        A path among the parameters is marked neither as read nor as written.
+    """
+    marked = roles(command)
+    own = [
+        parameter.replace(kind=Parameter.KEYWORD_ONLY)
+        for parameter in signature(command, eval_str=True).parameters.values()
+        if parameter.name != "job"
+    ]
+
+    @wraps(command)
+    def with_one(**values: Any) -> None:
+        for name, value in values.items():
+            if isinstance(value, int) and abs(value) > LARGEST:
+                option = "--" + name.replace("_", "-")
+                raise typer.BadParameter("is too large", param_hint=option)
+        found: dict[Reads | Writes, list[Path]] = {each: [] for each in (*Reads, *Writes)}
+        for name, role in marked.items():
+            given = values.get(name)
+            paths = given if isinstance(given, list) else [given]
+            found[role] += [Path(path) for path in paths if path is not None]
+        job = Job(found[Reads.FILE], found[Reads.PROJECT], found[Writes.FILE], found[Writes.DIRECTORY])
+        command(job=job, **values)
+
+    with_one.__dict__["__signature__"] = signature(command).replace(parameters=own)
+    with_one.__annotations__ = {parameter.name: parameter.annotation for parameter in own}
+    return with_one

@@ -1,0 +1,191 @@
+"""Why no stars are found where an attitude says they are: mistakes that are tried one by one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.stellar.cameras import BrownCamera
+from photogram.stellar.catalogue import Catalogue
+from photogram.stellar.identification import identify
+from photogram.stellar.matching import STRETCH
+from photogram.stellar.odds import ACCEPTED
+from photogram.stellar.places import Earth
+from photogram.stellar.pointing import attitude_of, axis_of, roll_of
+from photogram.stellar.skies import Exposure
+from photogram.stellar.sky import Site
+
+__all__ = ["Hint", "Setting", "find_hint"]
+
+Floats = NDArray[np.float64]
+
+_TRIED = 3
+"""Exposures on which the mistakes are tried, those with the most images."""
+_SCALES = tuple(1.1**k for k in range(-6, 7) if k)
+"""Principal distances that are tried, over the given one; each reaches half way to the next."""
+_WIDE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What an exposure is identified with.
+
+    Attributes
+    ----------
+    site, catalogue, frame, camera, earth
+        As for `identify`.
+    attitude_error, tolerance
+        Radians; pixels.
+    """
+
+    site: Site
+    catalogue: Catalogue
+    frame: tuple[float, float]
+    camera: BrownCamera
+    attitude_error: float
+    tolerance: float
+    earth: Earth
+
+    @property
+    def radius(self) -> float:
+        """What the attitude may be off in the image, pixels."""
+        return float(self.camera.values[0]) * math.tan(self.attitude_error)
+
+
+@dataclass(frozen=True)
+class Hint:
+    """A mistake that explains why stars were not found.
+
+    Attributes
+    ----------
+    text
+        What the input seems to have.
+    exposures
+        Those that show stars when it is mended.
+    """
+
+    text: str
+    exposures: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Mistake:
+    """A mistake: what it is called, and how an exposure and its setting look when it is mended."""
+
+    text: str
+    mend: Callable[[Exposure, Setting], tuple[Exposure, Setting]]
+    stretch: float = STRETCH
+
+
+def find_hint(exposures: Sequence[Exposure], names: Sequence[str], setting: Setting) -> Hint | None:
+    """Try mistakes that are often made on exposures that were not identified.
+
+    Parameters
+    ----------
+    exposures, names
+        The exposures and their names.
+    setting
+        What they were identified with.
+
+    Returns
+    -------
+    The mistake that explains most of them, by the odds against chance; None where none does.
+    """
+    order = sorted(range(len(exposures)), key=lambda i: -len(exposures[i].xy))[:_TRIED]
+    mistakes = _mistakes()
+    best: tuple[tuple[int, float], Hint] | None = None
+    for mistake in mistakes:
+        explained, odds, scales = [], 0.0, []
+        for index in order:
+            exposure, mended = mistake.mend(exposures[index], setting)
+            sighting = identify(
+                exposure,
+                mended.camera,
+                mended.site,
+                mended.catalogue,
+                frame=mended.frame,
+                radius=mended.radius + mistake.stretch * max(mended.frame),
+                tolerance=mended.tolerance,
+                earth=mended.earth,
+                stretch=mistake.stretch,
+            )
+            if sighting.match.expected * len(mistakes) < ACCEPTED:
+                explained.append(names[index])
+                odds += math.log(max(sighting.match.expected, 1e-300))
+                scales.append(float(mended.camera.values[0]) / sighting.match.scale)
+        rank = (len(explained), -odds)
+        if explained and (best is None or rank > best[0]):
+            width = 2 * math.degrees(math.atan(setting.frame[0] / 2 / float(np.median(scales))))
+            best = (rank, Hint(mistake.text.format(field=width), tuple(n for n in names if n in explained)))
+    return best and best[1]
+
+
+def _mistakes() -> list[_Mistake]:
+    found = [
+        _Mistake("the images are mirrored: x counts to the left", _flipped(0)),
+        _Mistake("y of the images counts up, not down", _flipped(1)),
+        _Mistake("x and y of the images are exchanged", _exchanged),
+        _Mistake(
+            "azimuth_deg counts from north, not from south", _pointed(lambda a, e, r: (a + math.pi, e, r))
+        ),
+        _Mistake("azimuth_deg counts to the east, not to the west", _pointed(lambda a, e, r: (-a, e, r))),
+        _Mistake(
+            "azimuth_deg counts from north to the west, not from south",
+            _pointed(lambda a, e, r: (math.pi - a, e, r)),
+        ),
+        _Mistake("elevation_deg is the zenith distance", _pointed(lambda a, e, r: (a, math.pi / 2 - e, r))),
+        _Mistake("roll_deg counts counterclockwise", _pointed(lambda a, e, r: (a, e, -r))),
+        _Mistake("the longitude counts to the east, not to the west", _other_longitude),
+    ]
+    found += [
+        _Mistake(f"roll_deg has to be changed by {turn:+d} degrees", _rolled(turn)) for turn in (90, 180, -90)
+    ]
+    found += [
+        _Mistake("the horizontal field of view is about {field:.1f} degrees", _scaled(scale), _WIDE)
+        for scale in _SCALES
+    ]
+    return found
+
+
+def _flipped(axis: int) -> Callable[[Exposure, Setting], tuple[Exposure, Setting]]:
+    def mend(exposure: Exposure, setting: Setting) -> tuple[Exposure, Setting]:
+        xy = exposure.xy.copy()
+        xy[:, axis] = setting.frame[axis] - xy[:, axis]
+        return replace(exposure, xy=xy), setting
+
+    return mend
+
+
+def _exchanged(exposure: Exposure, setting: Setting) -> tuple[Exposure, Setting]:
+    return replace(exposure, xy=np.ascontiguousarray(exposure.xy[:, ::-1])), setting
+
+
+def _pointed(
+    change: Callable[[float, float, float], tuple[float, float, float]],
+) -> Callable[[Exposure, Setting], tuple[Exposure, Setting]]:
+    def mend(exposure: Exposure, setting: Setting) -> tuple[Exposure, Setting]:
+        angles = change(*axis_of(exposure.attitude), roll_of(exposure.attitude))
+        return replace(exposure, attitude=attitude_of(*angles)), setting
+
+    return mend
+
+
+def _rolled(degrees: float) -> Callable[[Exposure, Setting], tuple[Exposure, Setting]]:
+    return _pointed(lambda a, e, r: (a, e, r + math.radians(degrees)))
+
+
+def _other_longitude(exposure: Exposure, setting: Setting) -> tuple[Exposure, Setting]:
+    return exposure, replace(setting, site=replace(setting.site, longitude_west=-setting.site.longitude_west))
+
+
+def _scaled(scale: float) -> Callable[[Exposure, Setting], tuple[Exposure, Setting]]:
+    def mend(exposure: Exposure, setting: Setting) -> tuple[Exposure, Setting]:
+        values = setting.camera.values.copy()
+        values[:2] *= scale
+        return exposure, replace(setting, camera=replace(setting.camera, values=values))
+
+    return mend

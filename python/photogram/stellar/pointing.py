@@ -1,0 +1,50 @@
+"""Where a camera points: azimuth, elevation and roll, and alpha, omega, kappa."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["attitude_of", "axis_of", "roll_of"]
+
+Floats = NDArray[np.float64]
+
+
+def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:
+    """Return alpha, omega, kappa of a camera whose pixels count right and down.
+
+    Parameters
+    ----------
+    azimuth
+        Of the axis, from south, positive west; radians.
+    elevation
+        Of the axis, radians. At 90 degrees exactly, the upper edge points north when the roll is zero.
+    roll
+        By which the camera is turned clockwise, as its user sees it, from a level horizon; radians.
+    """
+    north, east = -math.cos(elevation) * math.cos(azimuth), -math.cos(elevation) * math.sin(azimuth)
+    zenith = math.sin(elevation)
+    alpha, omega = math.atan2(north, zenith), math.asin(max(-1.0, min(1.0, east)))
+    # The third column of the matrix at kappa = 0 is the image of the zenith; of north when that is the axis.
+    up = complex(math.sin(alpha), -math.cos(alpha) * math.sin(omega))
+    if math.hypot(north, east) < 1e-9:
+        up = complex(-math.cos(alpha), 0.0)
+    # Up is minus y; a camera turned clockwise shows it turned counterclockwise.
+    kappa = -math.pi / 2 - roll - math.atan2(up.imag, up.real)
+    return np.array([alpha, omega, math.remainder(kappa, math.tau)])
+
+
+def axis_of(attitude: Floats) -> tuple[float, float]:
+    """Return azimuth (from south, positive west) and elevation of the axis, radians."""
+    alpha, omega = float(attitude[0]), float(attitude[1])
+    north, east = math.sin(alpha) * math.cos(omega), math.sin(omega)
+    zenith = math.cos(alpha) * math.cos(omega)
+    return math.atan2(-east, -north) % math.tau, math.atan2(zenith, math.hypot(north, east))
+
+
+def roll_of(attitude: Floats) -> float:
+    """Return the roll that `attitude_of` takes with the azimuth and elevation of `axis_of`, radians."""
+    level = attitude_of(*axis_of(attitude))
+    return math.remainder(float(level[2] - attitude[2]), math.tau)

@@ -1,0 +1,57 @@
+"""A point that two rays pull into a station is left out and named; the others keep their digits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from photogram import _photocore
+from photogram.collection import adjust, simulate
+
+# A datum of its own: standard deviations depend on it, and without it on where the iterations end.
+FREE = np.full((8, 9), np.inf)
+FREE[0, :6] = FREE[4, 3] = 0
+SOUND = simulate(photos=8, points=60, coarseness=0.2, seed=4).collection.replace(photo_sd=FREE)
+WRONG = 60
+"""The number of the point that is added."""
+
+
+def with_point():
+    """Add a point on two photos one of which sees it at the station of the other: it is to go there."""
+    collection = SOUND
+    photos = adjust(collection, tolerance=1e-14).photo_parameters
+    station = -rotation(photos[0, :3]).T @ photos[0, 3:6]
+    seen = _photocore.bundler_images(photos[[4]], station[np.newaxis])
+    return collection.replace(
+        point_positions=np.vstack([collection.point_positions, station + np.array([0.0, 0.5, 0.0])]),
+        point_sd=np.vstack([collection.point_sd, np.full((1, 3), np.inf)]),
+        image_photos=np.append(collection.image_photos, [0, 4]),
+        image_points=np.append(collection.image_points, [WRONG, WRONG]),
+        image_xy=np.vstack([collection.image_xy, [[40.0, 30.0]], seen]),
+        image_sd=np.vstack([collection.image_sd, np.full((2, 2), 0.5)]),
+    )
+
+
+def rotation(w):
+    """Rotation matrix of an angle-axis vector (Rodrigues)."""
+    angle = np.linalg.norm(w)
+    x, y, z = w / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+@pytest.mark.parametrize(("tolerance", "digits"), [(1e-10, 1e-4), (1e-12, 1e-6)])
+def test_the_others_are_as_if_the_point_were_not_there(tolerance, digits):
+    expected = adjust(SOUND, tolerance=tolerance)
+    result = adjust(with_point(), tolerance=tolerance)
+    assert result.converged
+    assert any(
+        str(m) == f"left out, points that ran into the station of a photo: {WRONG}" for m in result.messages
+    )
+    assert result.point_rays[WRONG] == 0
+    assert np.isnan(result.point_positions[WRONG]).all()
+    np.testing.assert_allclose(result.photo_sd, expected.photo_sd, rtol=digits)
+    np.testing.assert_allclose(result.point_sd[:WRONG], expected.point_sd, rtol=digits)
+    assert result.degrees_of_freedom == expected.degrees_of_freedom
+    numbers = [iteration.number for iteration in result.iterations]
+    assert numbers == list(range(1, len(numbers) + 1))

@@ -1,0 +1,55 @@
+"""Collections that grow beyond what their first line announces are refused piece by piece, packed or not."""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import tracemalloc
+
+import pytest
+
+from photogram import InputError
+from photogram.collection import read
+
+HEAD = b"21 11315 36455\n"
+NUMBERS = 3 + 4 * 36455 + 9 * 21 + 3 * 11315
+
+
+@pytest.mark.parametrize("pack", [bytes, bz2.compress, gzip.compress], ids=["plain", "bzip2", "gzip"])
+@pytest.mark.parametrize(
+    ("filling", "message"),
+    [
+        (b"0 ", f"numbers beyond the {NUMBERS} numbers"),
+        (b"  ", "is far longer than the"),
+        (b"00", "no number"),
+    ],
+)
+def test_a_file_longer_than_its_first_line_says(tmp_path, pack, filling, message):
+    path = tmp_path / "problem"
+    path.write_bytes(pack(HEAD + filling * 6_000_000))
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=message):
+            read(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    # The text has twelve million characters.
+    assert peak < 8_000_000
+
+
+def test_a_first_line_that_announces_too_much(tmp_path):
+    path = tmp_path / "problem"
+    path.write_bytes(b"21 11315 99999999999999\n0 0 1.0 2.0\n")
+    with pytest.raises(InputError, match="ends before 400000000034133 numbers"):
+        read(path)
+
+
+def test_a_line_in_a_later_piece_is_named(tmp_path):
+    rows = [b"%d 0 1.0 2.0" % (row % 2) for row in range(200_000)]
+    rows[150_000] = b"0 0 1.0 x"
+    path = tmp_path / "problem.gz"
+    path.write_bytes(gzip.compress(b"2 1 200000\n" + b"\n".join(rows)))
+    with pytest.raises(InputError) as raised:
+        read(path)
+    assert (raised.value.record, raised.value.text) == (150_002, "0 0 1.0 x")

@@ -1,0 +1,76 @@
+"""Calls of the system that are made to fail, for the modules of the writer."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable
+from contextlib import contextmanager
+
+from photogram.writing import guard, markers, outputs, staging, targets
+
+CALLS = (
+    "open",
+    "write",
+    "fsync",
+    "replace",
+    "mkdir",
+    "link",
+    "unlink",
+    "rmdir",
+    "close",
+    "listdir",
+    "scandir",
+)
+"""Everything that the writer asks of the system to change something, and what it looks for leftovers with."""
+
+
+class Faulty:
+    """The module `os`, of which one call fails, or all calls of a name from one on.
+
+    Parameters
+    ----------
+    at
+        Number of the call that fails, from 1, among those of `CALLS`; 0 for none.
+    lasting
+        Whether later calls of the same name fail too.
+    number
+        The error.
+    """
+
+    def __init__(self, at: int, *, lasting: bool = False, number: int = errno.ENOSPC) -> None:
+        self.at, self.lasting, self.number = at, lasting, number
+        self.calls: list[str] = []
+        self.failed: str | None = None
+
+    def __getattr__(self, name: str) -> object:
+        real = getattr(os, name)
+        return self._watched(name, real) if name in CALLS else real
+
+    def _watched(self, name: str, real: Callable[..., object]) -> Callable[..., object]:
+        def call(*arguments: object, **options: object) -> object:
+            self.calls.append(name)
+            if len(self.calls) == self.at:
+                self.failed = name
+            if len(self.calls) == self.at or (self.lasting and name == self.failed):
+                if name == "close":
+                    # As of the system: the descriptor is closed, and yet there is an error.
+                    real(*arguments)
+                raise OSError(self.number, os.strerror(self.number))
+            if name == "fsync":
+                # The disk has no part in what is asked here, and takes its time.
+                return None
+            return real(*arguments, **options)
+
+        return call
+
+
+@contextmanager
+def faulty(monkeypatch, at, **options):
+    """Let the writer run on a system of which a call fails."""
+    system = Faulty(at, **options)
+    with monkeypatch.context() as patch:
+        for module in (guard, markers, outputs, staging, targets):
+            if hasattr(module, "os"):
+                patch.setattr(module, "os", system)
+        yield system

@@ -1,0 +1,96 @@
+"""Mistakes that are often made, and the hints that name them."""
+
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from photogram import InputError
+from photogram.stellar.cameras import BrownCamera
+from photogram.stellar.night import calibrate_night
+from photogram.stellar.night_file import read_night
+from photogram.stellar.pointing import attitude_of, axis_of, roll_of
+
+EXAMPLE = Path(str(files("photogram") / "examples" / "exposures" / "night.toml"))
+
+
+@pytest.fixture(scope="module")
+def night():
+    """Return two exposures of the example."""
+    night = read_night(EXAMPLE)
+    return replace(night, exposures=night.exposures[:2], names=night.names[:2])
+
+
+def flipped(night, axis):
+    exposures = []
+    for exposure in night.exposures:
+        xy = exposure.xy.copy()
+        xy[:, axis] = night.frame[axis] - xy[:, axis]
+        exposures.append(replace(exposure, xy=xy))
+    return replace(night, exposures=exposures)
+
+
+def pointed(night, change):
+    exposures = [
+        replace(e, attitude=attitude_of(*change(*axis_of(e.attitude), roll_of(e.attitude))))
+        for e in night.exposures
+    ]
+    return replace(night, exposures=exposures)
+
+
+def widened(night, factor):
+    field = np.radians(36.9 * factor)
+    return replace(night, camera=BrownCamera.of_field(*night.frame, field))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "hint"),
+    [
+        (lambda n: flipped(n, 0), "the images are mirrored: x counts to the left"),
+        (lambda n: flipped(n, 1), "y of the images counts up, not down"),
+        (
+            lambda n: pointed(n, lambda a, e, r: (a + np.pi, e, r)),
+            "azimuth_deg counts from north, not from south",
+        ),
+        (lambda n: pointed(n, lambda a, e, r: (-a, e, r)), "azimuth_deg counts to the east, not to the west"),
+        (
+            lambda n: pointed(n, lambda a, e, r: (a, e, r + np.pi / 2)),
+            "roll_deg has to be changed by -90 degrees",
+        ),
+        (
+            lambda n: pointed(n, lambda a, e, r: (a, e, r - np.pi / 2)),
+            r"roll_deg has to be changed by \+90 degrees",
+        ),
+        (lambda n: widened(n, 1.3), "the horizontal field of view is about 3[67]"),
+        (lambda n: widened(n, 0.7), "the horizontal field of view is about 3[67]"),
+    ],
+)
+def test_each_mistake_gets_its_hint(night, spoil, hint):
+    with pytest.raises(InputError, match=f"as it seems, {hint}.*: stars of exposures 1, 2 are found then"):
+        calibrate_night(spoil(night))
+
+
+def test_one_mirrored_exposure_is_left_out_with_its_hint():
+    night = read_night(EXAMPLE)
+    first = flipped(night, 0).exposures[0]
+    result = calibrate_night(replace(night, exposures=[first, *night.exposures[1:]]))
+    texts = [str(message) for message in result.messages]
+    assert texts[0].startswith("as it seems, the images are mirrored")
+    assert texts[1].startswith("exposure 1 is left out: only ")
+    assert result.usable
+
+
+def test_a_field_of_view_that_is_a_little_wrong_is_found_all_the_same():
+    night = read_night(EXAMPLE)
+    result = calibrate_night(widened(night, 1.03))
+    assert result.names == night.names
+    assert result.usable
+
+
+@pytest.mark.parametrize("angles", [(12.0, 52.0, 0.5), (268.0, 5.0, -88.0), (181.0, 89.0, 179.0)])
+def test_roll_comes_back(angles):
+    attitude = attitude_of(*np.radians(angles))
+    found = np.degrees([*axis_of(attitude), roll_of(attitude)])
+    assert found == pytest.approx(angles, abs=1e-9)

@@ -1,0 +1,311 @@
+"""Public functions and input classes with hostile values for every parameter: errors of our own."""
+
+import importlib
+import inspect
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import photogram
+from photogram import InputError, PhotogramError
+from photogram.giant import Project, read_project
+
+SMALL = {"strips": 1, "photos_per_strip": 3, "points_per_photo": 6, "check_points": 1, "control_spacing": 1}
+PACKAGES = (
+    "photogram",
+    "photogram.absolute_orientation",
+    "photogram.collection",
+    "photogram.comparator",
+    "photogram.geometry",
+    "photogram.giant",
+    "photogram.perspective_center",
+    "photogram.refraction",
+    "photogram.robust",
+    "photogram.stellar",
+)
+MADE_BY_THE_LIBRARY = {
+    "photogram": "Iteration Message Orientation Plan Pose Progress Resection Result Simulation",
+    "photogram.absolute_orientation": "Orientation",
+    "photogram.collection": "AdjustedCollection Simulation",
+    "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
+    " Session Simulation collect_cases",
+    "photogram.giant": "Check ErrorWarning Finding ImageFrame Project Section",
+    "photogram.perspective_center": "Cycle PerspectiveCenter Run Stop",
+    "photogram.stellar": "Result",
+    "photogram.robust": "remark loss_row",
+}
+"""Results and what readers make: nobody calls them with values of their own."""
+
+
+def masked():
+    return np.ma.masked_array([1.0, 2.0, 3.0], [False, True, False])
+
+
+def deep():
+    value = []
+    for _ in range(2000):
+        value = [value]
+    return value
+
+
+HOSTILE = {
+    "None": lambda: None,
+    "2^64": lambda: 2**64,
+    "10^400": lambda: 10**400,
+    "-1": lambda: -1,
+    "0": lambda: 0,
+    "1.5": lambda: 1.5,
+    "nan": lambda: math.nan,
+    "inf": lambda: math.inf,
+    "1e300": lambda: 1e300,
+    "a string": lambda: "x",
+    "no string": lambda: "",
+    "half a pair": lambda: "\ud800",
+    "NUL": lambda: "a\0b",
+    "bytes": lambda: b"x",
+    "complex": lambda: 1j,
+    "object": object,
+    "list": list,
+    "dict": dict,
+    "deep": deep,
+    "masked": masked,
+    "objects": lambda: np.array([None, "x", object()], object),
+    "complex array": lambda: np.array([1j, 2.0]),
+    "four dimensions": lambda: np.zeros((1, 2, 3, 4)),
+    "no elements": lambda: np.zeros(0),
+    "nan array": lambda: np.full(3, np.nan),
+    "words": lambda: np.array(["a", "\ud800"]),
+    "True": lambda: True,
+    "a class": lambda: int,
+}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """Return for each public name the arguments of a call that works."""
+    from photogram import absolute_orientation, collection, comparator, perspective_center, stellar
+    from photogram.stellar.plain import read_plain
+
+    folder = tmp_path_factory.mktemp("sound")
+    examples = Path(photogram.__file__).parent / "examples"
+    block = photogram.simulate(**SMALL).block
+    project = Project.from_block(block)
+    photogram.giant.write_project(project, folder / "giant")
+    project = read_project(folder / "giant")
+    adjustable = project.to_block()
+    stations = absolute_orientation.read_csv(examples / "absolute_orientation" / "stations.csv")
+    oriented = photogram.orient(stations)
+    cards = folder / "cards.txt"
+    cards.write_text("0 0 0 0 0 0 0 A\n3 3 3 A\n0 0 0 0 0 0 1\n10 0 0 1 0 0 2\n0 10 0 0 1 0 3\n")
+    photos = collection.simulate(photos=3, points=8, seen=1.0).collection
+    ring = examples / "collection" / "ring.txt"
+    plate = comparator.built_in_grid(1320)
+    session = comparator.simulate_calibration(plate, cases=1, sequence=range(1, 26)).session
+    options = comparator.Options(joint=False, polynomial=False)
+    calibration = comparator.calibrate(session, options)
+    readings, deck, own_grid = folder / "readings.csv", folder / "deck.txt", folder / "grid.csv"
+    readings.write_bytes(comparator.to_csv(session))
+    deck.write_bytes(comparator.to_cards(session))
+    own_grid.write_bytes(plate.to_csv())
+    grid_deck = examples / "perspective_center" / "grid.deck"
+    grid = perspective_center.read_deck(grid_deck)[0]
+    problem = read_plain(examples / "stellar" / "plate.toml")
+    points, places = np.array([[100.0, 200.0, 30.0]]), np.array([[0.0, 0.0, 1000.0]])
+    resected = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 5.0], [0.0, 100.0, 3.0], [100.0, 100.0, 0.0]])
+    seen = photogram.geometry.project(
+        resected, [[50.0, 50.0, 500.0]] * 4, np.zeros((4, 3)), np.full(4, -150.0)
+    )
+    return {
+        "photogram": {
+            "AsPublished": {"percent": 5.0, "max_iterations": 4},
+            "Block": {name: getattr(block, name) for name in photogram.Block.__dataclass_fields__},
+            "Refraction": {"air": "giant", "water": None, "water_level": 0.0, "refractive_index": 1.34},
+            "Spheroid": {"a": 6378137.0, "b": 6356752.0},
+            "adjust": {"block": block},
+            "orient": {"stations": stations},
+            "plan": {"patterns": {"one": block}},
+            "predict": {"block": block},
+            "resect": {"object_points": resected, "image_xy": seen, "principal_distance": -150.0},
+            "simulate": dict(SMALL),
+        },
+        "photogram.absolute_orientation": {
+            "Similarity": {
+                name: getattr(oriented.similarity, name)
+                for name in absolute_orientation.Similarity.__dataclass_fields__
+            },
+            "Stations": {"ids": ["a", "b"], "control": np.eye(2, 3), "model": np.eye(2, 3)},
+            "orient": {"stations": stations},
+            "read_cards": {"path": cards},
+            "read_csv": {"path": examples / "absolute_orientation" / "stations.csv"},
+            "transform_file": {
+                "similarity": oriented.similarity,
+                "source": examples / "absolute_orientation" / "points.csv",
+                "target": folder / "out.csv",
+            },
+        },
+        "photogram.collection": {
+            "Collection": {
+                name: getattr(photos, name) for name in collection.Collection.__dataclass_fields__
+            },
+            "adjust": {"collection": photos},
+            "read": {"path": ring},
+            "simulate": {"photos": 3, "points": 8},
+            "to_bytes": {"collection": photos},
+        },
+        "photogram.comparator": {
+            "Correction": {"scale_x": 1.0, "scale_y": 1.0, "nonorthogonality_rad": 0.0},
+            "Frame": {"centre_um": (0.0, 0.0), "half_range_um": (1e5, 1e5)},
+            "Grid": {"number": 1, "points": np.arange(25), "xy_um": plate.xy_um},
+            "Options": {},
+            "Polynomial": {
+                "frame": comparator.Frame((0.0, 0.0), (1e5, 1e5)),
+                "scaled_um": np.zeros((2, 12)),
+                "scaled_cofactors": np.zeros((12, 12)),
+            },
+            "built_in_grid": {"number": 1320},
+            "calibrate": {"session": session, "options": options},
+            "find_grid": {"name": "1320"},
+            "listing": {"calibration": calibration},
+            "read": {"paths": [readings]},
+            "read_cards": {"path": deck},
+            "read_csv": {"paths": [readings]},
+            "read_grid": {"path": own_grid},
+            "simulate_calibration": {"grid": plate, "cases": 1},
+            "to_cards": {"session": session},
+            "to_csv": {"session": session},
+            "to_json": {"calibration": calibration},
+        },
+        "photogram.geometry": {
+            "Spheroid": {"a": 6378137.0, "b": 6356752.0},
+            "geocentric_to_geographic": {
+                "xyz": [[6378137.0, 0.0, 0.0]],
+                "spheroid": photogram.Spheroid.wgs84(),
+            },
+            "geographic_to_geocentric": {
+                "positions": [[0.0, 0.5, 10.0]],
+                "spheroid": photogram.Spheroid.wgs84(),
+            },
+            "lengths_of_units": {"positions": [[0.0, 0.5, 10.0]], "spheroid": None},
+            "local_frames": {"positions": [[0.0, 0.5, 10.0]]},
+            "project": {
+                "points": points,
+                "positions": places,
+                "attitudes": np.zeros((1, 3)),
+                "principal_distances": [-150.0],
+            },
+            "refraction_shift": {
+                "points": points,
+                "positions": places,
+                "refraction": photogram.Refraction("giant"),
+            },
+            "rotation_angles": {"matrices": np.eye(3)[np.newaxis]},
+            "rotation_matrix": {"angles": np.zeros((1, 3))},
+            "viewing_directions": {"positions": places, "attitudes": np.zeros((1, 3))},
+        },
+        "photogram.giant": {
+            "Camera": {"name": "A", "principal_distance": -152.0},
+            "Common": {},
+            "Frame": {"name": "A", "position": (0.0, 0.0, 0.0), "attitude": (0.0, 0.0, 0.0)},
+            "GroundPoint": {"name": "A", "position": (0.0, 0.0, 0.0)},
+            "Limits": {"stations": 3},
+            "check": {"project": project},
+            "error_warnings": {"project": project, "block": block},
+            "listing": {"project": project, "block": adjustable, "result": photogram.adjust(adjustable)},
+            "read_project": {"directory": folder / "giant"},
+            "write_project": {"project": project, "directory": folder / "written", "overwrite": True},
+        },
+        "photogram.perspective_center": {
+            "Coordinatograph": {"x_scale": 1.0, "y_scale": 1.0, "sine": 0.0},
+            "Grid": {
+                name: getattr(grid, name)
+                for name in ("ids", "plate_xy", "model", "principal_distance", "initial")
+            },
+            "determine": {"grid": grid},
+            "read_deck": {"path": grid_deck},
+            "reduce": {
+                "readings": [np.ones((2, 3))] * len(grid.ids),
+                "ids": grid.ids,
+                "plate_xy": grid.plate_xy,
+                "principal_distance": 150.0,
+            },
+            "run_deck": {"path": grid_deck},
+        },
+        "photogram.refraction": {"Refraction": {"air": "giant"}, "metres_per_unit": {"linear_unit": "m"}},
+        "photogram.robust": {},
+        "photogram.stellar": {
+            "Air": {"temperature": 280.0, "pressure": 760.0},
+            "Axis": {"azimuth": 0.0, "zenith_distance": 0.0, "xy": np.zeros(2), "weight": np.eye(2)},
+            "BrownCamera": {"values": np.r_[9000.0, 9000.0, np.zeros(7)], "covariance": np.zeros((9, 9))},
+            "Options": {},
+            "PlateCamera": {
+                "values": np.zeros(13),
+                "covariance": np.zeros((13, 13)),
+                "mean_error": 1.0,
+                "degrees_of_freedom": 3,
+            },
+            "Problem": {name: getattr(problem, name) for name in stellar.Problem.__dataclass_fields__},
+            "Site": {"latitude": 0.5},
+            "calibrate": {"problem": problem},
+            "default_parameters": {"principal_distance": 0.3},
+            "refraction": {"zenith_distances": [0.5]},
+        },
+    }
+
+
+OF_THE_SIZE = {("photogram", "simulate"), ("photogram.collection", "simulate")}
+"""Numbers of these are sizes: large ones are refused for their memory in tests of their own."""
+BIG = {"1e300", "2^64", "10^400", "inf"}
+
+
+def public():
+    for package in PACKAGES:
+        module = importlib.import_module(package)
+        results = MADE_BY_THE_LIBRARY.get(package, "").split()
+        for name in module.__all__:
+            found = getattr(module, name)
+            error = inspect.isclass(found) and issubclass(found, BaseException)
+            called = inspect.isclass(found) or inspect.isroutine(found) or hasattr(found, "__wrapped__")
+            if called and name not in results and not error:
+                yield package, name
+
+
+@pytest.mark.parametrize(("package", "name"), list(public()))
+def test_hostile_arguments_are_refused_by_errors_of_our_own(package, name, good, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    function = getattr(importlib.import_module(package), name)
+    arguments = good[package][name]
+    function(**arguments)
+    failed = []
+    for parameter in inspect.signature(function).parameters:
+        for what, make in HOSTILE.items():
+            if (package, name) in OF_THE_SIZE and what in BIG:
+                continue
+            if parameter == "progress" and what == "a class":
+                continue  # it can be called: what comes of that is the caller's
+            try:
+                with np.errstate(all="ignore"):
+                    function(**{**arguments, parameter: make()})
+            except (PhotogramError, OSError):
+                pass
+            except BaseException as error:  # panics of the extension are no Exceptions
+                failed.append(f"{parameter} = {what}: {type(error).__name__}: {error}"[:200])
+    assert not failed, "\n".join(failed)
+
+
+def test_every_public_name_is_tried_or_named(good):
+    for package in PACKAGES:
+        assert {name for own, name in public() if own == package} == set(good[package])
+
+
+def test_paths_may_be_strings(tmp_path):
+    photogram.giant.write_project(
+        Project.from_block(photogram.simulate(**SMALL).block), str(tmp_path / "giant")
+    )
+    assert read_project(str(tmp_path / "giant")).frames
+    example = Path(photogram.__file__).parent / "examples" / "absolute_orientation" / "stations.csv"
+    assert len(photogram.absolute_orientation.read_csv(str(example)).ids) > 3
+    for wrong in (None, 3, b"x", "a\0b", "\ud800"):
+        with pytest.raises(InputError, match=r"directory is .* not a path"):
+            read_project(wrong)

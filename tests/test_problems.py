@@ -1,0 +1,177 @@
+"""Reports: what is wrong comes first and has a name; two runs write the same bytes."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from photogram import Block, Result, adjust, simulate
+from photogram.collection import adjust as adjust_collection
+from photogram.collection import simulate as simulate_collection
+from photogram.giant import Project, read_project, write_project
+from photogram.outliers import Observations, outliers
+from photogram.reliability import TESTABLE
+from photogram.statistics import normal_limit
+
+NETWORK: dict[str, Any] = {"strips": 2, "photos_per_strip": 5, "points_per_photo": 40, "control_spacing": 2}
+NONE = re.compile(r"Problems\n-+\nnone\n")
+
+
+def problems(result: Result) -> list[str]:
+    return json.loads(result.to_json())["problems"]
+
+
+def section(report: str) -> list[str]:
+    """Lines under Problems."""
+    return report.split("Problems\n--------\n")[1].split("\n\n")[0].split("\n")
+
+
+def test_a_failed_global_test_comes_first():
+    block = simulate(**NETWORK, seed=1).block
+    assert NONE.search(adjust(block).report())
+    result = adjust(block.replace(image_sd=block.image_sd / 20))
+    assert result.variance_of_unit_weight == pytest.approx(400, rel=0.2)
+    for lines in (section(result.report()), problems(result)):
+        assert lines[0].startswith("the global test fails: residuals are")
+    test = json.loads(result.to_json())["global_test"]
+    assert test["rejected"] == "high"
+    assert test["variance"] == pytest.approx(result.variance_of_unit_weight, rel=1e-12)
+
+
+@pytest.mark.parametrize("unit_variance", ["free", "constrained", "unity"])
+def test_the_global_test_takes_what_the_unit_variance_counts(unit_variance):
+    block = simulate(**NETWORK, position_sd=0.1, seed=1).block
+    result = adjust(block.replace(image_sd=block.image_sd / 20), unit_variance=unit_variance)
+    sums = result.sums_of_squares
+    camera = sums.camera if unit_variance == "constrained" else 0.0
+    assert result.global_test is not None
+    assert result.global_test.weighted_sum_of_squares == pytest.approx(sums.ground + sums.plates + camera)
+    assert result.global_test.degrees_of_freedom == result.degrees_of_freedom
+    assert problems(result)[0].startswith("the global test fails")
+
+
+def test_no_convergence_comes_before_the_global_test():
+    result = adjust(simulate(**NETWORK, seed=1).block, max_iterations=1)
+    assert section(result.report())[0].startswith("the adjustment has not converged")
+    assert section(result.report())[1].startswith("the global test fails")
+
+
+def test_outliers_of_every_kind_are_named():
+    block = simulate(**NETWORK, position_sd=0.05, attitude_sd=1e-4, seed=3).block
+    assert not any("beyond" in line for line in problems(adjust(block)))
+    # Of two images only, either could be wrong.
+    image = int(np.bincount(block.image_points)[block.image_points].argmax())
+    xy = block.image_xy.copy()
+    xy[image, 1] += 0.2
+    [*_, control] = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))
+    positions = block.point_positions.copy()
+    positions[control, 2] += 3.0
+    observed = block.photo_positions_observed.copy()
+    observed[7, 0] += 2.0
+    result = adjust(block.replace(image_xy=xy, point_positions=positions, photo_positions_observed=observed))
+    point, photo = block.point_ids[block.image_points[image]], block.photo_ids[block.image_photos[image]]
+    lines = [line for line in problems(result) if "beyond" in line]
+    assert lines == section(result.report())[1 : 1 + len(lines)]
+    assert [line.split(" have ")[0].split(" ", 3)[3] for line in lines] == [
+        "image coordinates", "components of control", "components of stations"
+    ]  # fmt: skip
+    assert lines[0].endswith(f"is that of y of point {point} on photo {photo}")
+    tested = np.where(result.point_redundancy > TESTABLE, np.abs(result.point_standardized), 0.0)
+    row, axis = np.unravel_index(tested.argmax(), tested.shape)
+    assert row == control
+    assert lines[1].endswith(f"is that of {'XYZ'[axis]} of control point {block.point_ids[control]}")
+    assert lines[2].endswith(f"is that of X of photo {block.photo_ids[7]}")
+    assert f"the largest, {result.point_standardized[control, axis]:.1f}," in lines[1]
+
+
+def test_the_limit_knows_how_many_are_tested():
+    quiet = np.linspace(-1, 1, 999)
+    values = np.append(quiet, 4.0)
+    groups = [Observations("values", values, lambda index: f"value {index[0]}")]
+    assert outliers(groups, normal_limit, "test values") == []  # the limit of a thousand is 4.06
+    values[-1] = -4.2
+    [message] = outliers(groups, normal_limit, "test values")
+    assert str(message) == (
+        "1 of 1000 values have test values beyond 4.06: the largest, -4.2, is that of value 999"
+    )
+    few = [Observations("values", np.array([np.nan, 3.0]), lambda index: f"value {index[0]}")]
+    assert len(outliers(few, normal_limit, "test values")) == 1
+
+
+def test_good_blocks_seldom_have_outliers():
+    named = 0
+    for seed in range(40):
+        result = adjust(simulate(strips=1, photos_per_strip=4, points_per_photo=20, seed=seed).block)
+        named += any("beyond" in line for line in problems(result))
+    assert named <= 7  # 5 percent of 40 are 2; more than 7 have a probability of 0.1 percent
+
+
+def test_collections_name_their_outliers():
+    collection = simulate_collection(photos=8, points=80, seed=2).collection
+    good = adjust_collection(collection)
+    assert not any("beyond" in line for line in section(good.report()))
+    xy = collection.image_xy.copy()
+    xy[50] += 30 * collection.image_sd[50]
+    result = adjust_collection(collection.replace(image_xy=xy))
+    point, photo = collection.image_points[50], collection.image_photos[50]
+    [line] = [line for line in section(result.report()) if "beyond" in line]
+    assert re.search(rf"is that of [xy] of point {point} on photo {photo}$", line)
+    wrong = adjust_collection(collection.replace(image_sd=collection.image_sd / 20))
+    assert section(wrong.report())[0].startswith("the global test fails")
+
+
+# On the command line
+
+
+@pytest.fixture
+def project(run, tmp_path):
+    assert run("simulate", "block", "--strips", 2, "--photos-per-strip", 4, "--seed", 5).exit_code == 0
+    return tmp_path / "block"
+
+
+def test_giant_says_that_the_global_test_fails(run, project):
+    done = run("giant", project)
+    assert done.exit_code == 0, done.output
+    assert done.output.startswith("Problems\n  none")
+    block = read_project(project).to_block()
+    control = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))[0]
+    positions = block.point_positions.copy()
+    positions[control, 2] += 500.0
+    wrong = project.with_name("wrong")
+    write_project(Project.from_block(block.replace(point_positions=positions)), wrong)
+    done = run("giant", wrong)
+    lines = done.output.splitlines()
+    assert lines[1].strip().startswith("the global test fails")
+    for kind in ("image coordinates", "components of control"):
+        assert any(f" {kind} have standardized residuals beyond" in line for line in lines[2:4]), kind
+    assert lines[1].strip() in (project.with_name("wrong-adjusted") / "report.txt").read_text()
+
+
+def test_reports_do_not_differ_from_run_to_run(run, project, tmp_path):
+    reports = []
+    for number, threads in enumerate((1, 2, 1, 4)):
+        assert run("giant", project, "--out", tmp_path / str(number), "--threads", threads).exit_code == 0
+        reports.append({each.name: each.read_bytes() for each in (tmp_path / str(number)).iterdir()})
+    assert all(each == reports[0] for each in reports)
+    assert set(reports[0]) == {"FRAMES", "GROUND", "RESTART", "report.txt"}
+
+
+def test_reports_of_collections_do_not_differ_from_run_to_run(run, tmp_path):
+    texts = []
+    for number, threads in enumerate((1, 2, 1)):
+        report = tmp_path / f"{number}.txt"
+        assert run("collection", "--example", "--report", report, "--threads", threads).exit_code == 0
+        texts.append(report.read_bytes())
+    assert texts[0] == texts[1] == texts[2]
+    assert b"seconds" not in texts[0]
+
+
+def test_seconds_stand_in_the_document():
+    block: Block = simulate(**NETWORK, seed=1).block
+    result = adjust(block)
+    assert "second" not in result.report()
+    assert set(json.loads(result.to_json())["seconds"]) == {"form", "factor", "solve", "invert", "cofactors"}

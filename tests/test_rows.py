@@ -1,0 +1,119 @@
+"""Comma-separated tables of all programs: what a damaged file may hold ends in an error that names it."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from photogram.errors import InputError
+from photogram.messages import MOST_CHARACTERS, Message, quoted
+from photogram.numbers import finite_number, is_whole_number, whole_number
+from photogram.places import Place
+from photogram.rows import LONGEST_RECORD, Table, cells, read_rows
+
+
+def written(tmp_path, text):
+    path = tmp_path / "table.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_rows_hold_cells_and_places(tmp_path):
+    path = written(tmp_path, '# a remark\nID,x\n\n,,\n"a, b", 1.5\nc,\n')
+    table = Table.read(path, comment="#", spelling=str.lower)
+    assert (table.columns, table.head, table.path) == (("id", "x"), Place(path, 2, "ID,x"), path)
+    assert [place.text for place in table.comments] == ["# a remark"]
+    rows = list(table.rows())
+    assert [(row.cells["id"], row.number("x"), row.place.record) for row in rows] == [
+        ("a, b", 1.5, 5),
+        ("c", None, 6),
+    ]
+    assert list(table.rows()) == rows
+
+
+def read_numbers(path):
+    """Read the column x of a table."""
+    table = Table.read(path)
+    table.require("id", "x")
+    return [row.required("x") for row in table.rows()]
+
+
+@pytest.mark.parametrize(
+    ("text", "record", "words"),
+    [
+        ("", None, "holds no table"),
+        (",,\n", None, "holds no table"),
+        ("id,x,id\n1,2,3\n", 1, "the column 'id' is there twice"),
+        ("id,y\n1,2\n", 1, "the column x is missing"),
+        ("id,x\n1,2,3\n", 2, "there are 3 cells under 2 columns"),
+        ("id,x\n1\n", 2, "there are 1 cells under 2 columns"),
+        (f"id,x\n1,{'9' * 140_000}\n", 2, f"a record of 140002 characters; {LONGEST_RECORD} are the most"),
+        (f"id,x\n1,{'9' * 90_000}\n", 2, r"x '9999.*'... \(90000 characters\) is not a number"),
+        (f"id,x{',' * 420_000}\n1,2\n", 1, "a record of 420004 characters"),
+        (f"id,x{',' * 90_000}\n1,2\n", 2, "there are 2 cells under 90002 columns"),
+    ],
+)
+def test_damaged_tables_name_file_and_record(tmp_path, text, record, words):
+    path = written(tmp_path, text)
+    with pytest.raises(InputError, match=words) as caught:
+        read_numbers(path)
+    assert (caught.value.file, caught.value.record) == (path, record)
+    assert len(str(caught.value)) < len(str(path)) + 2 * MOST_CHARACTERS
+
+
+def test_cells_may_be_missing_at_the_end_of_a_ragged_table(tmp_path):
+    rows = read_rows(written(tmp_path, "id,x,y\n1,2\n3\n"), ["id", "x"])
+    assert [row.number("x") for row in rows] == [2.0, None]
+    with pytest.raises(InputError, match=r"record 3: x is blank"):
+        rows[1].required("x")
+
+
+def test_a_limit_of_the_host_is_an_error_of_the_record():
+    before = csv.field_size_limit(10)
+    try:
+        with pytest.raises(InputError, match=r"record 7: cannot be split into cells: field larger than"):
+            cells(Place(Path("a.csv"), 7, "12345678901,2"))
+    finally:
+        csv.field_size_limit(before)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "²", "-1", "1.0", "1e3", "1_000", "١٢", "9223372036854775808", "9" * 5000, "0" * 5000],
+)
+def test_what_is_no_whole_number(text):
+    with pytest.raises(ValueError, match=r"is not (a whole number|from 0 to)") as caught:
+        whole_number(text)
+    assert len(str(caught.value)) < 100
+
+
+def test_whole_numbers():
+    assert [whole_number(text) for text in ("0", "007", "+5", "9223372036854775807")] == [0, 7, 5, 2**63 - 1]
+    assert whole_number("20", highest=20) == 20
+    with pytest.raises(ValueError, match="'21' is not from 1 to 20"):
+        whole_number("21", 1, 20)
+    assert is_whole_number("12")
+    assert not any(map(is_whole_number, ("", "²", "+1", "1.", "١")))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "x", "nan", "inf", "-Infinity", "1_000", "١٢", "1e999", "1 2", "1e", ".", "9" * 1001],
+)
+def test_what_is_no_number(text):
+    with pytest.raises(ValueError, match="is not a number"):
+        finite_number(text)
+
+
+def test_numbers():
+    texts = ("1", "-1.", "+.5", "1.5e3", "2E-3", "9" * 300, "1e-999")
+    assert [finite_number(text) for text in texts] == [1.0, -1.0, 0.5, 1500.0, 0.002, float("9" * 300), 0.0]
+
+
+def test_messages_show_the_beginning_of_a_long_record():
+    text = "a" * 1000
+    shown = str(Message("wrong", Path("f"), 3, text))
+    assert shown == f"f, record 3: wrong\n    |{'a' * MOST_CHARACTERS}... (1000 characters)|"
+    assert str(InputError("wrong", file=Path("f"), record=3, text=text)) == shown
+    assert str(Message("wrong", None, None, "a" * 80)) == f"wrong\n    |{'a' * 80}|"
+    assert quoted("a\x1b") == r"'a\x1b'"
