@@ -73,7 +73,7 @@ class Fuzzer:
         self.seed = seed
         self.place = place
         self.sound: dict[str, list[Files]] = {}
-        self.watch = Watch()
+        self.watch: Watch | None = None
 
     def prepare(self, number: int) -> None:
         """Make the sound inputs of the format of an input, unless they are there."""
@@ -94,6 +94,8 @@ class Fuzzer:
         source.mkdir(parents=True)
         for name, content in files.items():
             (source / name).write_bytes(content)
+        # It stays in the programs: only where inputs are run, in a process of their own.
+        self.watch = self.watch or Watch()
         self.watch.begin()
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import resource
@@ -212,7 +213,8 @@ class _Worker:
     def _work(self, begin: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        # They end the process: the parent sees by which signal.
+        # They end the process: the parent sees by which signal, and nobody needs a trace of it.
+        faulthandler.disable()
         signal.signal(signal.SIGPROF, signal.SIG_DFL)
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         fuzzer = Fuzzer(self.seed, self.place / "case")

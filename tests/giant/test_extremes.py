@@ -149,5 +149,5 @@ def test_what_is_no_directory_is_named(given, sound, tmp_path):
     place = written(tmp_path, sound[0])
     with pytest.raises(InputError, match="directory cannot be read"):
         read_project(place / given)
-    with pytest.raises(InputError, match="directory cannot be read"):
+    with pytest.raises(InputError, match="not a path"):
         read_project(Path("a\0b"))

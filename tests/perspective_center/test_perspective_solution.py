@@ -179,4 +179,4 @@ def test_grids_that_contradict_themselves_are_refused(make_grid):
     with pytest.raises(InputError, match="principal distance"):
         Grid(grid.ids, grid.plate_xy, grid.model, -150.0)
     with pytest.raises(InputError, match="one at least"):
-        Grid(grid.ids, grid.plate_xy, grid.model, 150.0, readings=np.zeros(25))
+        Grid(grid.ids, grid.plate_xy, grid.model, 150.0, readings=np.zeros(25, dtype=int))

@@ -397,5 +397,7 @@ def hours(angle: float) -> str:
 
 
 def _sexagesimal(angle: float, unit: str) -> str:
+    if not math.isfinite(angle):
+        return "-"
     whole, minutes, seconds = degrees_minutes_seconds(angle, 4)
     return f"{'-' if angle < 0 else ''}{whole}{unit} {minutes:02d}m {seconds:07.4f}s"
