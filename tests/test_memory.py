@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from photogram import AdjustmentError, InputError, OutOfMemoryError, adjust, memory
+from photogram import AdjustmentError, InputError, OutOfMemoryError, adjust, memory, simulate
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
 
@@ -109,12 +109,14 @@ def test_a_system_that_does_not_tell(tmp_path):
     assert memory.available_memory(tmp_path) is None
 
 
-def test_a_block_that_does_not_fit_is_refused(small_block, monkeypatch):
+def test_a_block_that_does_not_fit_is_refused(monkeypatch):
+    # More photos than fit anywhere.
+    block = simulate(strips=3, photos_per_strip=40, seed=2).block
     monkeypatch.setattr("photogram.adjustment.available_memory", lambda: 1 << 20)
     with pytest.raises(
         OutOfMemoryError, match=r"takes \d+\.\d MiB of memory, and 1\.0 MiB are free"
     ) as raised:
-        adjust(small_block)
+        adjust(block)
     assert isinstance(raised.value, MemoryError)
     assert isinstance(raised.value, AdjustmentError)
     monkeypatch.setattr("photogram.adjustment.available_memory", lambda: 1 << 25)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 from photogram.errors import OutOfMemoryError
@@ -93,7 +94,18 @@ def _machine(root: Path) -> Iterator[int]:
 
 def _groups(root: Path) -> Iterator[int]:
     """Yield what the control groups of the process, and all around them, may still take."""
-    for line in _text(root / "proc/self/cgroup").splitlines():
+    for limit, usage, stat, spare in _counters(root, _text(root / "proc/self/cgroup")):
+        most = _text(limit).strip()
+        if most.isdecimal() and (used := _text(usage).strip()).isdecimal():
+            counts = dict(line.partition(" ")[::2] for line in _text(stat).splitlines())
+            yield max(int(most) - int(used) + int(counts.get(spare, 0)), 0)
+
+
+@cache
+def _counters(root: Path, groups: str) -> tuple[tuple[Path, Path, Path, str], ...]:
+    """Find the files that count the memory of groups: limits may change, where they stand does not."""
+    found = []
+    for line in groups.splitlines():
         _, _, rest = line.partition(":")
         controllers, _, path = rest.partition(":")
         for controller, tree, limit, usage, spare in GROUPS:
@@ -102,16 +114,11 @@ def _groups(root: Path) -> Iterator[int]:
             # In a container the tree may begin at the group itself, and its path be that of the host.
             group = root / tree / ("" if ".." in path else path.strip("/"))
             for place in (group, *group.parents):
-                yield from _group(place, limit, usage, spare)
+                if (place / limit).exists():
+                    found.append((place / limit, place / usage, place / "memory.stat", spare))
                 if place == root / tree:
                     break
-
-
-def _group(place: Path, limit: str, usage: str, spare: str) -> Iterator[int]:
-    most, used = _text(place / limit).strip(), _text(place / usage).strip()
-    if most.isdecimal() and used.isdecimal():
-        counts = dict(line.partition(" ")[::2] for line in _text(place / "memory.stat").splitlines())
-        yield max(int(most) - int(used) + int(counts.get(spare, 0)), 0)
+    return tuple(found)
 
 
 def _limits(root: Path) -> Iterator[int]:
@@ -121,16 +128,19 @@ def _limits(root: Path) -> Iterator[int]:
     except ImportError:
         # Not on this system.
         return
+    limits = {kind: resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)}
+    if all(soft == resource.RLIM_INFINITY for soft in limits.values()):
+        return
     fields = _text(root / "proc/self/statm").split()
     if len(fields) > 5:
         page = os.sysconf("SC_PAGE_SIZE")
-        for kind, used in ((resource.RLIMIT_AS, fields[0]), (resource.RLIMIT_DATA, fields[5])):
-            soft = resource.getrlimit(kind)[0]
+        for (kind, soft), used in zip(limits.items(), (fields[0], fields[5]), strict=True):
             if soft != resource.RLIM_INFINITY:
                 own = addresses_of_a_thread(root) if kind == resource.RLIMIT_AS else 0
                 yield max(soft - page * int(used) - own, 0)
 
 
+@cache
 def addresses_of_a_thread(root: Path = Path("/")) -> int:
     """Return the addresses that a thread of the core takes; 0 where the cache is not known.
 
@@ -143,8 +153,10 @@ def addresses_of_a_thread(root: Path = Path("/")) -> int:
 
 def threads_that_fit(threads: int, root: Path = Path("/")) -> int:
     """Return how many of some threads half of what a limit of addresses leaves suffices for; one at least."""
-    own, left = addresses_of_a_thread(root), min(_limits(root), default=None)
-    return threads if not own or left is None else max(1, min(threads, left // 2 // own))
+    left = min(_limits(root), default=None)
+    if left is None or not (own := addresses_of_a_thread(root)):
+        return threads
+    return max(1, min(threads, left // 2 // own))
 
 
 def _text(path: Path) -> str:
