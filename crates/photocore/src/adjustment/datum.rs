@@ -100,8 +100,7 @@ fn inverted(b: &Mat<f64>, g: &Mat<f64>) -> Option<Mat<f64>> {
     let scale: Vec<f64> = (0..product.nrows()).map(|k| product[(k, k)].sqrt().recip()).collect();
     let scaled = Mat::from_fn(product.nrows(), product.ncols(), |i, k| product[(i, k)] * scale[i] * scale[k]);
     let least = scaled.self_adjoint_eigenvalues(Side::Lower).ok()?.first().copied()?;
-    // Written so that what is not a number is refused too.
-    if !(least > SEPARABLE) {
+    if least.is_nan() || least <= SEPARABLE {
         return None;
     }
     let inverse = scaled.llt(Side::Lower).ok()?.inverse();
