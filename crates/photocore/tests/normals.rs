@@ -2,11 +2,14 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use std::collections::BTreeSet;
 use std::ops::{ControlFlow, Range};
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
-use photocore::normals::{Equations, GroupRows, Layout, Ordering, Prior, SelectedInverse, Stopped, System};
+use photocore::normals::{
+    Equations, Factor, GroupRows, Layout, Ordering, Prior, SelectedInverse, Stopped, System, Tie, TieRows,
+};
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -41,6 +44,17 @@ impl Equations for Dense {
             }
         }
     }
+
+    fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+        let first = self.layout.groups() * self.layout.rows();
+        let columns: Vec<usize> = self.layout.tie_columns(tie).collect();
+        for (k, row) in self.layout.tie_rows(tie).enumerate() {
+            rows.constant[k] = self.right[first + row];
+            for (value, &column) in rows.coefficients[k * columns.len()..].iter_mut().zip(&columns) {
+                *value = self.matrix[(first + row, column)];
+            }
+        }
+    }
 }
 
 impl Dense {
@@ -51,7 +65,7 @@ impl Dense {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
         };
-        let equations = layout.groups() * layout.rows();
+        let equations = layout.equations();
         let mut matrix = Mat::zeros(equations, layout.unknowns());
         for local in 0..layout.locals() {
             for group in layout.groups_of(local) {
@@ -65,6 +79,13 @@ impl Dense {
                     for row in 0..layout.rows() {
                         matrix[(group * layout.rows() + row, column)] = number();
                     }
+                }
+            }
+        }
+        for tie in 0..layout.ties().len() {
+            for row in layout.tie_rows(tie) {
+                for column in layout.tie_columns(tie) {
+                    matrix[(layout.groups() * layout.rows() + row, column)] = number();
                 }
             }
         }
@@ -114,15 +135,25 @@ const ALL: [Ordering; 6] = [
 ];
 
 /// Random systems: local blocks of 1 to 3 unknowns, kept blocks of 1 to 7, with and without border, several groups of
-/// a local block on the same kept block.
+/// a local block on the same kept block, ties among up to three kept blocks and the border.
 fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
     let shape = (1..4usize, 1..3usize, prop::collection::vec(1..8usize, 1..12), 0..5usize);
     shape
         .prop_flat_map(|(l, rows, kept, border)| {
             let groups = prop::collection::vec(prop::collection::vec(0..kept.len() as u32, 0..5), 1..25);
-            (Just((l, rows, kept, border)), groups, any::<u64>(), prop::sample::select(ALL.to_vec()))
+            let tied = prop::collection::btree_set(0..kept.len() as u32, 0..4);
+            let ties = prop::collection::vec((1..4usize, tied, 0..=border as u32), 0..6);
+            (Just((l, rows, kept, border)), groups, ties, any::<u64>(), prop::sample::select(ALL.to_vec()))
         })
-        .prop_map(|((l, rows, kept, border), locals, seed, ordering)| {
+        .prop_map(|((l, rows, kept, border), locals, ties, seed, ordering)| {
+            let ties = ties.into_iter().filter(|(_, kept, end)| !kept.is_empty() || *end > 0);
+            // Not in the order of the blocks: a tie has an order of its own.
+            let tie = |(rows, kept, end): (usize, BTreeSet<u32>, u32)| Tie {
+                rows,
+                kept: kept.into_iter().rev().collect(),
+                border: end / 2..end,
+            };
+            let ties = ties.map(tie).filter(|tie| !tie.kept.is_empty() || !tie.border.is_empty()).collect();
             let mut ptr = vec![0];
             for groups in &locals {
                 ptr.push(ptr[ptr.len() - 1] + groups.len());
@@ -132,7 +163,7 @@ fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
                 (0..group_kept.len() as u32).map(|g| g % (border as u32 + 1)..border as u32).collect();
             let layout =
                 Layout::new(rows, l, &kept, ptr, group_kept).unwrap().with_border(border, ranges).unwrap();
-            (Dense::new(layout, seed), ordering)
+            (Dense::new(layout.with_ties(ties).unwrap(), seed), ordering)
         })
 }
 
@@ -175,6 +206,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         assert_close(*value, expected[(i, 0)], 1e-9 * expected.norm_max(), "solution");
     }
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
+    compare_columns(dense, &system, &factor, &inverse);
     let found = done(system.invert(&pool, factor, dense, &dense.prior, &mut go));
     let (cofactors, selected) = (found.cofactors, found.selected);
     compare_blocks(layout, &selected, &inverse);
@@ -193,6 +225,30 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     for (k, value) in cofactors.equations.iter().enumerate() {
         let exact: f64 = (0..layout.unknowns()).map(|i| adjusted[(k, i)] * dense.matrix[(k, i)]).sum();
         assert_close(*value, exact, 1e-9, "adjusted equation");
+    }
+}
+
+/// Further right-hand sides: some columns of the inverse, and all of them added up.
+fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Mat<f64>) {
+    let unknowns = system.layout().unknowns();
+    let columns: Vec<usize> = (0..unknowns).step_by(unknowns.div_ceil(20)).collect();
+    let mut rights = vec![0.0; (columns.len() + 1) * unknowns];
+    for (k, column) in columns.iter().enumerate() {
+        rights[k * unknowns + column] = 1.0;
+        rights[columns.len() * unknowns + column] = 1.0;
+    }
+    let pool = pool(2);
+    let solved = done(system.solve_for(&pool, factor, dense, &dense.prior, 0.0, &rights, &mut go));
+    let largest = inverse.norm_max();
+    for i in 0..unknowns {
+        let mut sum = 0.0;
+        for (k, &column) in columns.iter().enumerate() {
+            let scale = (inverse[(i, i)] * inverse[(column, column)]).sqrt();
+            assert_close(solved[k * unknowns + i], inverse[(i, column)], 1e-9 * scale, "column");
+            sum += inverse[(i, column)];
+        }
+        let value = solved[columns.len() * unknowns + i];
+        assert_close(value, sum, 1e-9 * largest * columns.len() as f64, "sum of columns");
     }
 }
 
@@ -252,14 +308,19 @@ fn a_border_of_hundreds_agrees_with_dense_algebra() {
 
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
-    let dense = block(8, 40, 5);
+    let plain = block(8, 40, 5).layout;
+    let tie = |k: u32| Tie { rows: 2, kept: vec![k, k + 40, 7], border: 0..3 };
+    let dense = Dense::new(plain.with_ties((10..30).map(tie).collect()).unwrap(), 3);
+    let rights: Vec<f64> = (0..20 * dense.layout.unknowns()).map(|k| (k % 17) as f64 - 8.0).collect();
     let run = |threads: usize| {
         let pool = pool(threads);
         let system = System::new(dense.layout.clone(), Ordering::Auto);
         let factor = done(system.factor(&pool, &dense, &dense.prior, 0.0, &mut go));
         let solution = done(system.solve(&pool, &factor, &dense, &dense.prior, 0.0, &mut go));
+        let more = done(system.solve_for(&pool, &factor, &dense, &dense.prior, 0.0, &rights, &mut go));
         let cofactors = done(system.invert(&pool, factor, &dense, &dense.prior, &mut go)).cofactors;
-        let numbers = [solution, cofactors.local, cofactors.kept, cofactors.border, cofactors.equations];
+        let numbers =
+            [solution, more, cofactors.local, cofactors.kept, cofactors.border, cofactors.equations];
         numbers.concat().into_iter().map(f64::to_bits).collect::<Vec<u64>>()
     };
     let one = run(1);
@@ -303,5 +364,25 @@ fn layouts_that_contradict_themselves_are_refused() {
     let layout = Layout::new(2, 3, &[6], vec![0, 1], vec![0]).unwrap();
     assert!(layout.clone().with_border(3, std::iter::once(1..4).collect()).is_err());
     assert!(layout.clone().with_border(3, vec![]).is_err());
-    assert!(layout.with_places(vec![]).is_err());
+    assert!(layout.clone().with_places(vec![]).is_err());
+    let refused = |rows, kept: &[u32], border| {
+        layout.clone().with_ties(vec![Tie { rows, kept: kept.to_vec(), border }]).is_err()
+    };
+    assert!(refused(1, &[1], 0..0));
+    assert!(refused(1, &[0, 0], 0..0));
+    assert!(refused(1, &[0], 0..1));
+    assert!(refused(1, &[], 0..0));
+    assert!(refused(0, &[0], 0..0));
+    assert!(!refused(1, &[0], 0..0));
+}
+
+/// Two points at one height, and nothing else that joins two photos: a tie alone holds a network together.
+#[test]
+fn ties_alone_are_a_system() {
+    let layout = Layout::new(1, 1, &[1; 6], vec![0], vec![]).unwrap();
+    let tie = |k: u32| Tie { rows: 1, kept: vec![k, (k + 1) % 6], border: 0..0 };
+    let dense = Dense::new(layout.with_ties((0..6).map(tie).collect()).unwrap(), 9);
+    for ordering in ALL {
+        compare_with_dense(&dense, ordering);
+    }
 }

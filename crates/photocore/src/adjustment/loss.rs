@@ -1,7 +1,5 @@
 //! Robust losses: how much an observation that fits badly counts.
 
-use crate::normals::GroupRows;
-
 /// A robust loss. It takes the place of s, the weighted sum of squares of one group of observations (the coordinates of an image
 /// point), in what is minimised; `scale` is the root of s at which it sets in, in standard deviations a priori.
 ///
@@ -68,20 +66,20 @@ impl Reweighting {
     /// With v the residuals, s = |v|^2, w the slope and c the curvature of the loss, the rows A and l become
     /// sqrt(w) (A - (1 - sqrt(c)) v (v^T A) / s) and sqrt(w / c) l: A^T l is the gradient either way.
     #[inline]
-    pub fn apply(self, rows: &mut GroupRows<'_>) {
-        let square: f64 = rows.constant.iter().map(|v| v * v).sum();
+    pub fn apply(self, constant: &mut [f64], parts: &mut [&mut [f64]]) {
+        let square: f64 = constant.iter().map(|v| v * v).sum();
         let factor = self.loss.weight(square).sqrt();
         let root = if self.curved { self.loss.curvature(square).sqrt() } else { 1.0 };
-        let count = rows.constant.len();
-        for part in [&mut *rows.local, &mut *rows.kept, &mut *rows.border] {
+        let count = constant.len();
+        for part in parts {
             let width = part.len() / count;
             for column in (0..width).filter(|_| root < 1.0) {
-                let along: f64 = (0..count).map(|row| rows.constant[row] * part[row * width + column]).sum();
+                let along: f64 = (0..count).map(|row| constant[row] * part[row * width + column]).sum();
                 let excess = (1.0 - root) * along / square;
-                (0..count).for_each(|row| part[row * width + column] -= excess * rows.constant[row]);
+                (0..count).for_each(|row| part[row * width + column] -= excess * constant[row]);
             }
             part.iter_mut().for_each(|value| *value *= factor);
         }
-        rows.constant.iter_mut().for_each(|value| *value *= factor / root);
+        constant.iter_mut().for_each(|value| *value *= factor / root);
     }
 }

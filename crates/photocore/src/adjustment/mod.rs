@@ -4,6 +4,7 @@
 //! deviation of every observation and of every unknown, from free (infinite) to fixed (zero). [`adjust`] iterates to the
 //! least-squares solution and computes the cofactors of all unknowns and the redundancy numbers of all observations.
 
+mod datum;
 mod distributions;
 mod loss;
 mod options;
@@ -16,6 +17,7 @@ mod strict;
 mod trust_region;
 mod walk;
 
+pub use datum::{Datum, InDatum, in_datum};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
 };

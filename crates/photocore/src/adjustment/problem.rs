@@ -3,7 +3,7 @@
 use rayon::ThreadPool;
 
 use super::loss::Reweighting;
-use crate::normals::{Equations, GroupRows, Layout, Prior, System};
+use crate::normals::{Equations, GroupRows, Layout, Prior, System, TieRows};
 
 /// How observations follow from unknowns.
 pub trait Model: Sync {
@@ -16,6 +16,9 @@ pub trait Model: Sync {
     /// Writes observed minus computed, and the partials of the computed values, of one group of observations of a local
     /// block, in the units of observations and unknowns.
     fn observe(&self, prepared: &Self::Prepared, local: usize, group: usize, rows: &mut GroupRows<'_>);
+
+    /// The same for the observations of a tie. Not called where the layout has no ties.
+    fn observe_tie(&self, _prepared: &Self::Prepared, _tie: usize, _rows: &mut TieRows<'_>) {}
 
     /// Computes the local unknowns afresh from the others, where the model knows how; false where it does not. Far from the
     /// solution this often leads back into the region where linearized steps do.
@@ -43,7 +46,7 @@ pub struct Problem<M> {
     pub model: M,
     /// The unknowns and groups, ordered.
     pub system: System,
-    /// Standard deviation of each observation, in the order of groups and rows.
+    /// Standard deviation of each observation, in the order of groups and rows, then of ties and rows.
     pub observation_sd: Vec<f64>,
     /// Initial value of each unknown.
     pub initial: Vec<f64>,
@@ -130,8 +133,18 @@ impl<'a, M: Model> Linearized<'a, M> {
             }
             sum
         });
+        let tied = self.problem.for_ties(|tie, rows| {
+            self.write_tie(tie, rows);
+            let columns: Vec<f64> = layout.tie_columns(tie).map(|column| step[column]).collect();
+            let rows = rows.constant.iter().zip(rows.coefficients.chunks_exact(columns.len()));
+            let decrease = |(constant, coefficients): (&f64, &[f64])| {
+                let change = dot(coefficients, &columns);
+                change * (2.0 * constant - change)
+            };
+            rows.map(decrease).sum::<f64>()
+        });
         let priors = step.iter().zip(&prior.weight).zip(&prior.right);
-        observed.iter().sum::<f64>()
+        observed.iter().chain(&tied).sum::<f64>()
             + priors.map(|((x, weight), right)| x * (2.0 * right - weight * x)).sum::<f64>()
     }
 }
@@ -141,34 +154,56 @@ impl<M: Model> Equations for Linearized<'_, M> {
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let layout = self.problem.layout();
         self.problem.model.observe(&self.prepared, local, group, rows);
-        let count = layout.rows();
-        for row in 0..count {
-            let sd = self.problem.observation_sd[group * count + row];
-            rows.constant[row] /= sd;
+        let start = layout.border_range().start;
+        let border = layout.border_of(group);
+        let sd = &self.problem.observation_sd[group * layout.rows()..][..layout.rows()];
+        let kept = layout.kept_range(layout.kept_of(group));
+        let mut parts = [&mut *rows.local, &mut *rows.kept, &mut *rows.border];
+        self.weight(sd, rows.constant, &mut parts);
+        if let Some(fixed) = &self.fixed {
+            let columns = [layout.local_range(local), kept, start + border.start..start + border.end];
+            for (part, range) in parts.into_iter().zip(columns) {
+                leave_out(part, sd.len(), range.map(|unknown| fixed[unknown]));
+            }
+        }
+    }
+
+    fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+        let layout = self.problem.layout();
+        self.problem.model.observe_tie(&self.prepared, tie, rows);
+        let first = layout.groups() * layout.rows();
+        let sd = &self.problem.observation_sd[first..][layout.tie_rows(tie)];
+        self.weight(sd, rows.constant, &mut [&mut *rows.coefficients]);
+        if let Some(fixed) = &self.fixed {
+            leave_out(rows.coefficients, sd.len(), layout.tie_columns(tie).map(|unknown| fixed[unknown]));
+        }
+    }
+}
+
+impl<M: Model> Linearized<'_, M> {
+    /// Gives equations unit weight, and less where a loss says so.
+    #[inline(always)]
+    fn weight(&self, sd: &[f64], constant: &mut [f64], parts: &mut [&mut [f64]]) {
+        for (row, sd) in sd.iter().enumerate() {
+            constant[row] /= sd;
             let weight = sd.recip();
-            for part in [&mut *rows.local, &mut *rows.kept, &mut *rows.border] {
-                let width = part.len() / count;
+            for part in &mut *parts {
+                let width = part.len() / constant.len();
                 part[row * width..][..width].iter_mut().for_each(|value| *value *= weight);
             }
         }
         if let Some(reweighting) = self.reweighting {
-            reweighting.apply(rows);
+            reweighting.apply(constant, parts);
         }
-        if let Some(fixed) = &self.fixed {
-            let start = layout.border_range().start;
-            let border = layout.border_of(group);
-            let columns = [
-                (&mut *rows.local, layout.local_range(local)),
-                (&mut *rows.kept, layout.kept_range(layout.kept_of(group))),
-                (&mut *rows.border, start + border.start..start + border.end),
-            ];
-            for (part, range) in columns {
-                let width = range.len();
-                for (k, _) in range.enumerate().filter(|(_, unknown)| fixed[*unknown]) {
-                    (0..count).for_each(|row| part[row * width + k] = 0.0);
-                }
-            }
-        }
+    }
+}
+
+/// Takes the columns of fixed unknowns out of some equations; `fixed` tells of each column whether it is.
+#[inline(always)]
+fn leave_out(part: &mut [f64], rows: usize, fixed: impl Iterator<Item = bool>) {
+    let width = part.len() / rows;
+    for (column, _) in fixed.enumerate().filter(|&(_, fixed)| fixed) {
+        (0..rows).for_each(|row| part[row * width + column] = 0.0);
     }
 }
 

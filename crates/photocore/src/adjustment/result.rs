@@ -36,9 +36,9 @@ pub struct Adjustment {
     pub last_local_corrections: Vec<f64>,
     /// Adjusted unknowns, in the order of the layout.
     pub unknowns: Vec<f64>,
-    /// Observed minus computed, in the order of groups and rows, in the units of the observations.
+    /// Observed minus computed, in the order of groups and rows, then of ties and rows, in the units of the observations.
     pub residuals: Vec<f64>,
-    /// The factor by which a loss has changed the weight of each group of observations; None without a loss.
+    /// The factor by which a loss has changed the weight of each group of observations, then of each tie; None without a loss.
     pub weights: Option<Vec<f64>>,
     /// Cofactors (a priori unit weight, weights as the loss has changed them), when asked for; none where the last values leave
     /// unknowns undetermined.

@@ -297,7 +297,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
 }
 
 /// What the work has ended with.
-fn unless_stopped<T>(flow: ControlFlow<Stopped, T>) -> Result<T, AdjustError> {
+pub(super) fn unless_stopped<T>(flow: ControlFlow<Stopped, T>) -> Result<T, AdjustError> {
     match flow {
         ControlFlow::Continue(found) => Ok(found),
         ControlFlow::Break(stopped) => Err(stopped.into()),

@@ -107,7 +107,13 @@ impl<M: Model> Problem<M> {
             }
             residuals
         });
-        by_local.concat()
+        let by_tie = self.for_ties(|tie, rows| {
+            self.model.observe_tie(&prepared, tie, rows);
+            rows.constant.to_vec()
+        });
+        let mut residuals = by_local.concat();
+        by_tie.iter().for_each(|of_tie| residuals.extend_from_slice(of_tie));
+        residuals
     }
 }
 
@@ -117,11 +123,19 @@ impl<M> Problem<M> {
         residuals.iter().zip(&self.observation_sd).map(|(residual, sd)| (residual / sd).powi(2)).sum()
     }
 
-    /// Weighted sum of squares of each group of the given residuals.
+    /// Weighted sum of squares of each group, then of each tie, of the given residuals.
     pub(super) fn group_squares(&self, residuals: &[f64]) -> impl Iterator<Item = f64> {
-        let rows = self.layout().rows();
-        let groups = residuals.chunks_exact(rows).zip(self.observation_sd.chunks_exact(rows));
-        groups.map(|(residuals, sd)| residuals.iter().zip(sd).map(|(v, sd)| (v / sd).powi(2)).sum())
+        let layout = self.layout();
+        let (rows, first) = (layout.rows(), layout.groups() * layout.rows());
+        let groups = (0..layout.groups()).map(move |group| group * rows..(group + 1) * rows);
+        let ties = (0..layout.ties().len()).map(move |tie| {
+            let range = layout.tie_rows(tie);
+            first + range.start..first + range.end
+        });
+        groups.chain(ties).map(|range| {
+            let pairs = residuals[range.clone()].iter().zip(&self.observation_sd[range]);
+            pairs.map(|(v, sd)| (v / sd).powi(2)).sum()
+        })
     }
 
     /// Weighted sum of squares of observed minus computed unknowns.

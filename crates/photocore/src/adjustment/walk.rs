@@ -4,7 +4,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::problem::Problem;
-use crate::normals::{GroupRows, Layout};
+use crate::normals::{GroupRows, Layout, TieRows};
 
 /// Room for the rows of one group.
 #[derive(Default)]
@@ -44,5 +44,18 @@ impl<M: Sync> Problem<M> {
     ) -> Vec<T> {
         let locals = (0..self.layout().locals()).into_par_iter().with_min_len(AT_LEAST);
         pool.install(|| locals.map_init(Buffers::default, each).collect())
+    }
+
+    /// What `each` makes of every tie, in their order: few beside the local blocks.
+    pub(super) fn for_ties<T>(&self, mut each: impl FnMut(usize, &mut TieRows<'_>) -> T) -> Vec<T> {
+        let layout = self.layout();
+        let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
+        let visit = |tie: usize| {
+            let rows = layout.ties()[tie].rows;
+            constant.resize(rows, 0.0);
+            coefficients.resize(rows * layout.tie_columns(tie).count(), 0.0);
+            each(tie, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients })
+        };
+        (0..layout.ties().len()).map(visit).collect()
     }
 }

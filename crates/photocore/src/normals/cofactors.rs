@@ -11,6 +11,7 @@ use super::invert::SelectedInverse;
 use super::layout::Layout;
 use super::stack::{Slot, Stack, dot};
 use super::system::System;
+use super::ties::TieEquations;
 use super::vectorised::{Kernel, run, size};
 use super::watch::Control;
 use super::workspace::zeros;
@@ -26,7 +27,7 @@ pub struct Cofactors {
     pub border: Vec<f64>,
     /// Of each kept block with the border (its unknowns x those of the border, row by row), one after the other.
     pub kept_border: Vec<f64>,
-    /// a Q a^T of each equation a x = l, in the order of groups and rows: the share of the equation that its own
+    /// a Q a^T of each equation a x = l, in the order of groups and rows, then of ties and rows: the share of the equation that its own
     /// unknowns take up. One minus it is the redundancy number of an observation.
     pub equations: Vec<f64>,
 }
@@ -42,7 +43,8 @@ impl Cofactors {
         let layout = &system.layout;
         let (rows, l) = (layout.rows(), layout.local_dim());
         let mut local = control.allocated(zeros(layout.locals() * l * l))?;
-        let mut equations = control.allocated(zeros(layout.groups() * rows))?;
+        let mut equations = control.allocated(zeros(layout.equations()))?;
+        let (of_groups, of_ties) = equations.split_at_mut(layout.groups() * rows);
         for (index, at_home) in found.iter().enumerate() {
             let mut values = at_home.equations.chunks_exact(rows.max(1));
             let blocks = at_home.local.chunks_exact(l * l);
@@ -51,8 +53,14 @@ impl Cofactors {
                 for (&group, values) in
                     system.incidence.groups_of(layout, block as usize).iter().zip(&mut values)
                 {
-                    equations[group as usize * rows..][..rows].copy_from_slice(values);
+                    of_groups[group as usize * rows..][..rows].copy_from_slice(values);
                 }
+            }
+            let mut values = &at_home.ties[..];
+            for &tie in system.ties.at(index) {
+                let (own, rest) = values.split_at(layout.ties()[tie as usize].rows);
+                of_ties[layout.tie_rows(tie as usize)].copy_from_slice(own);
+                values = rest;
             }
         }
         let blocks = 0..layout.kept();
@@ -67,9 +75,12 @@ impl Cofactors {
 }
 
 /// The cofactors of the local blocks at home in one supernode, and of their equations, in the order of the incidence.
+#[derive(Default)]
 pub(super) struct AtHome {
     local: Vec<f64>,
     equations: Vec<f64>,
+    /// Of the equations of the ties at home there, in their order.
+    ties: Vec<f64>,
     /// Time that it took.
     pub seconds: f64,
 }
@@ -92,13 +103,13 @@ impl AtHome {
         let layout = &system.layout;
         let stacks = system.incidence.stacks_at(index);
         let part = |stacks: Stacks<'_>| {
-            let (mut stack, mut ties) = (Stack::default(), Ties::default());
-            let mut part = Self { local: Vec::new(), equations: Vec::new(), seconds: 0.0 };
+            let (mut stack, mut others) = (Stack::default(), Others::default());
+            let mut part = Self::default();
             for run in stacks.iter().take_while(|_| !control.stopped()) {
                 stack.gather(system, equations, run);
                 stack.eliminate(layout, prior, 0.0);
-                ties.gather(&stack, front, height, system.border_row(index));
-                ties.cofactors(&stack, layout, &mut part);
+                others.gather(&stack, front, height, system.border_row(index));
+                others.cofactors(&stack, layout, &mut part);
                 control.count(run.len());
             }
             part
@@ -107,21 +118,42 @@ impl AtHome {
             part(stacks)
         } else {
             let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map(part).collect();
-            let empty = Self { local: Vec::new(), equations: Vec::new(), seconds: 0.0 };
-            parts.into_iter().fold(empty, |mut all, part| {
+            parts.into_iter().fold(Self::default(), |mut all, part| {
                 all.local.extend(part.local);
                 all.equations.extend(part.equations);
                 all
             })
         };
+        found.ties = ties_at_home(system, index, equations, front, height);
         found.seconds = start.elapsed().as_secs_f64();
         found
     }
 }
 
+/// a Q a^T of the equations of the ties at home in a supernode.
+fn ties_at_home<E: Equations>(
+    system: &System,
+    index: usize,
+    equations: &E,
+    front: &[f64],
+    height: usize,
+) -> Vec<f64> {
+    let (mut tie, mut found) = (TieEquations::default(), Vec::new());
+    for &each in system.ties.at(index) {
+        tie.gather(system, equations, index, each as usize);
+        found.extend(tie.rows().map(|(coefficients, _)| {
+            let at = || tie.columns().iter().zip(coefficients);
+            let by_column =
+                |&column: &usize| at().map(|(&row, value)| front[column * height + row] * value).sum::<f64>();
+            at().map(|(column, value)| value * by_column(column)).sum::<f64>()
+        }));
+    }
+    found
+}
+
 /// Everything that the local blocks of a stack are tied to: kept blocks in the order of the slots, then segments of the border.
 #[derive(Default)]
-struct Ties {
+struct Others {
     /// The first row in the front, the first row here and the width of each.
     parts: Vec<(usize, usize, usize)>,
     width: usize,
@@ -133,7 +165,7 @@ struct Ties {
     hq: Vec<f64>,
 }
 
-impl Ties {
+impl Others {
     /// Collects the inverse over everything that a stack is tied to; it stays as it is where the last stack was tied to the same.
     fn gather(&mut self, stack: &Stack, front: &[f64], height: usize, border: usize) {
         let slots = stack.slots.iter().map(|slot| (slot.row, slot.dim));
@@ -164,7 +196,7 @@ impl Ties {
     /// With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and
     /// a Q a^T for each equation.
     fn cofactors(&mut self, stack: &Stack, layout: &Layout, found: &mut AtHome) {
-        run(layout, Find { ties: self, stack, rows: layout.rows(), found });
+        run(layout, stack.kept_dim(), Find { others: self, stack, rows: layout.rows(), found });
     }
 
     #[inline(always)]
@@ -275,7 +307,7 @@ impl Ties {
 }
 
 struct Find<'a> {
-    ties: &'a mut Ties,
+    others: &'a mut Others,
     stack: &'a Stack,
     rows: usize,
     found: &'a mut AtHome,
@@ -285,7 +317,7 @@ impl Kernel for Find<'_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
         for t in 0..self.stack.locals.len() {
-            self.ties.cofactors_of::<R, L, D>(self.stack, t, self.rows, self.found);
+            self.others.cofactors_of::<R, L, D>(self.stack, t, self.rows, self.found);
         }
     }
 }

@@ -8,6 +8,18 @@ use super::layout::Layout;
 pub trait Equations: Sync {
     /// Writes the equations of one group of a local block, every element of `rows`.
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>);
+
+    /// Writes the equations of one tie, every element of `rows`. Not called where the layout has no ties.
+    fn write_tie(&self, _tie: usize, _rows: &mut TieRows<'_>) {}
+}
+
+/// The rows of one tie, to be filled in.
+#[derive(Debug)]
+pub struct TieRows<'a> {
+    /// Right-hand sides l (rows).
+    pub constant: &'a mut [f64],
+    /// Coefficients, row by row: those of its kept blocks in their order, then those of its range of the border.
+    pub coefficients: &'a mut [f64],
 }
 
 /// The rows of one group of equations, to be filled in. Matrices are row by row.

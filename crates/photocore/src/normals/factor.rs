@@ -16,6 +16,7 @@ use super::panels::{Handover, Panels, lock};
 use super::stack::Stack;
 use super::symbolic::Symbolic;
 use super::system::System;
+use super::ties::TieEquations;
 use super::watch::{Between, Control, Stopped, watched};
 
 /// The Cholesky factor L of the reduced normal equations.
@@ -187,7 +188,8 @@ impl<E: Equations> Formation<'_, E> {
                 self.system.workspace.put_back(update.matrix);
             }
         }
-        let sums = self.assemble(&mut front, index);
+        let mut sums = self.assemble(&mut front, index);
+        sums.sum_of_squares += self.add_ties(&mut front, index);
         self.add_prior(&mut front, index);
         let formation = start.elapsed().as_secs_f64();
         let first = symbolic.first_unknown(index);
@@ -256,6 +258,20 @@ impl<E: Equations> Formation<'_, E> {
         let starts: Vec<usize> = own.chain(s.row_offset[..s.rows.len()].iter().copied()).collect();
         let few = starts.len().div_ceil(8 * rayon::current_num_threads());
         starts.into_iter().step_by(few).collect()
+    }
+
+    /// Adds the ties at home in a supernode; returns the sum of squares of their right-hand sides.
+    fn add_ties(&self, front: &mut Front<'_>, index: usize) -> f64 {
+        let mut sum_of_squares = 0.0;
+        let mut tie = TieEquations::default();
+        for &each in self.system.ties.at(index) {
+            tie.gather(self.system, self.equations, index, each as usize);
+            for (coefficients, constant) in tie.rows() {
+                front.add_equation(tie.columns(), coefficients, constant);
+                sum_of_squares += constant * constant;
+            }
+        }
+        sum_of_squares
     }
 
     /// Adds the priors and the damping of the own blocks of a supernode.

@@ -30,6 +30,23 @@ impl<'a> Front<'a> {
         Self { width, height, panel, update, right: vec![0.0; height], diagonal: vec![0.0; height] }
     }
 
+    /// Adds one equation: coefficients in some rows and columns of the front, ascending, and the right-hand side.
+    pub fn add_equation(&mut self, columns: &[usize], coefficients: &[f64], constant: f64) {
+        let below = self.height - self.width;
+        for (k, (&column, &value)) in columns.iter().zip(coefficients).enumerate() {
+            self.right[column] += value * constant;
+            self.diagonal[column] += value * value;
+            let (target, shift) = if column < self.width {
+                (&mut self.panel[column * self.height..][..self.height], 0)
+            } else {
+                (&mut self.update[(column - self.width) * below..][..below], self.width)
+            };
+            for (&row, other) in columns[k..].iter().zip(&coefficients[k..]) {
+                target[row - shift] += value * other;
+            }
+        }
+    }
+
     /// All columns.
     pub fn columns(&mut self) -> Columns<'_> {
         Columns {

@@ -1,10 +1,10 @@
-//! Which kept blocks share a local block.
+//! Which kept blocks share a local block or a tie.
 
 use std::collections::{HashMap, VecDeque};
 
 use super::layout::Layout;
 
-/// Which kept blocks share a local block: an undirected graph in compressed form, neighbours ascending.
+/// Which kept blocks share a local block or a tie: an undirected graph in compressed form, neighbours ascending.
 #[derive(Debug, Clone)]
 pub struct Graph {
     ptr: Vec<usize>,
@@ -12,9 +12,13 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Joins every two kept blocks that share a local block.
+    /// Joins every two kept blocks that share a local block or a tie.
     pub fn new(layout: &Layout) -> Self {
         let kept = layout.kept();
+        let mut ties_of = vec![Vec::new(); kept];
+        for (index, tie) in layout.ties().iter().enumerate() {
+            tie.kept.iter().for_each(|&block| ties_of[block as usize].push(index));
+        }
         let mut locals_of = vec![Vec::new(); kept];
         for local in 0..layout.locals() {
             for group in layout.groups_of(local) {
@@ -30,14 +34,17 @@ impl Graph {
         for (block, locals) in locals_of.iter().enumerate() {
             seen_by[block] = block;
             let start = neighbours.len();
-            for &local in locals {
-                for group in layout.groups_of(local) {
-                    let other = layout.kept_of(group);
-                    if seen_by[other] != block {
-                        seen_by[other] = block;
-                        neighbours.push(other as u32);
-                    }
+            let mut join = |other: usize| {
+                if seen_by[other] != block {
+                    seen_by[other] = block;
+                    neighbours.push(other as u32);
                 }
+            };
+            for &local in locals {
+                layout.groups_of(local).for_each(|group| join(layout.kept_of(group)));
+            }
+            for &tie in &ties_of[block] {
+                layout.ties()[tie].kept.iter().for_each(|&other| join(other as usize));
             }
             neighbours[start..].sort_unstable();
             ptr.push(neighbours.len());
@@ -55,7 +62,7 @@ impl Graph {
         self.len() == 0
     }
 
-    /// The blocks that share a local block with `block`.
+    /// The blocks that share a local block or a tie with `block`.
     pub fn neighbours(&self, block: usize) -> impl Iterator<Item = usize> + '_ {
         self.neighbours[self.ptr[block]..self.ptr[block + 1]].iter().map(|&other| other as usize)
     }

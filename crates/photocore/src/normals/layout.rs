@@ -1,25 +1,40 @@
-//! Which unknowns there are, and which group of equations touches which of them.
+//! Which unknowns there are, and which equations touch which of them.
 
 use std::ops::Range;
 
 use thiserror::Error;
 
-/// The unknowns and the groups of equations of a system.
+/// The unknowns and the equations of a system.
 ///
 /// The vector of unknowns is `[local blocks | kept blocks | border]`. A group of `rows` equations touches one local
 /// block, one kept block and a (possibly empty) range of the border; the groups of a local block are consecutive.
+/// A [`Tie`] touches any kept blocks and a range of the border, but no local block.
 #[derive(Debug, Clone)]
 pub struct Layout {
     rows: usize,
     local_dim: usize,
     locals: usize,
     kept_offset: Vec<usize>,
-    common_kept_dim: Option<usize>,
     border_dim: usize,
     group_ptr: Vec<usize>,
     group_kept: Vec<u32>,
     group_border: Vec<Range<u32>>,
+    ties: Vec<Tie>,
+    /// Where the equations of each tie start among those of all ties; one more at the end.
+    tie_ptr: Vec<usize>,
     places: Option<Vec<[f64; 3]>>,
+}
+
+/// Equations among kept blocks and common unknowns: a distance between two points that are kept, a relative pose of two
+/// photographs, an observation of common unknowns alone.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Tie {
+    /// How many equations.
+    pub rows: usize,
+    /// The kept blocks that they touch, each once, in any order.
+    pub kept: Vec<u32>,
+    /// The part of the border that they touch, counted from its start; may be empty.
+    pub border: Range<u32>,
 }
 
 /// A layout that contradicts itself.
@@ -58,6 +73,12 @@ pub enum LayoutError {
         end: usize,
         /// Size of the border.
         border: usize,
+    },
+    /// A tie without equations or unknowns, or one that names a block twice or unknowns that do not exist.
+    #[error("tie {tie} has no equations or unknowns, or names a block twice or one that does not exist")]
+    Tie {
+        /// The tie.
+        tie: usize,
     },
 }
 
@@ -101,14 +122,12 @@ impl Layout {
             local_dim,
             locals,
             kept_offset,
-            common_kept_dim: kept_dims
-                .first()
-                .copied()
-                .filter(|first| kept_dims.iter().all(|dim| dim == first)),
             border_dim: 0,
             group_ptr,
             group_kept,
             group_border,
+            ties: Vec::new(),
+            tie_ptr: vec![0],
             places: None,
         })
     }
@@ -134,6 +153,27 @@ impl Layout {
         }
         self.border_dim = dim;
         self.group_border = ranges;
+        Ok(self)
+    }
+
+    /// Adds ties; after the border, which they may touch.
+    pub fn with_ties(mut self, ties: Vec<Tie>) -> Result<Self, LayoutError> {
+        let sound = |tie: &Tie| {
+            let mut kept = tie.kept.clone();
+            kept.sort_unstable();
+            let border = tie.border.start <= tie.border.end && tie.border.end as usize <= self.border_dim;
+            let exist = kept.last().is_none_or(|&last| (last as usize) < self.kept());
+            let once = kept.windows(2).all(|pair| pair[0] < pair[1]);
+            tie.rows > 0 && border && exist && once && !(kept.is_empty() && tie.border.is_empty())
+        };
+        if let Some(tie) = ties.iter().position(|tie| !sound(tie)) {
+            return Err(LayoutError::Tie { tie });
+        }
+        self.tie_ptr.truncate(1);
+        for tie in &ties {
+            self.tie_ptr.push(self.tie_ptr[self.tie_ptr.len() - 1] + tie.rows);
+        }
+        self.ties = ties;
         Ok(self)
     }
 
@@ -167,11 +207,6 @@ impl Layout {
         self.kept_offset[j + 1] - self.kept_offset[j]
     }
 
-    /// Unknowns of every kept block, where all have the same number.
-    pub(super) fn common_kept_dim(&self) -> Option<usize> {
-        self.common_kept_dim
-    }
-
     /// Size of the border.
     pub fn border_dim(&self) -> usize {
         self.border_dim
@@ -180,6 +215,29 @@ impl Layout {
     /// Number of groups of equations.
     pub fn groups(&self) -> usize {
         self.group_kept.len()
+    }
+
+    /// The ties.
+    pub fn ties(&self) -> &[Tie] {
+        &self.ties
+    }
+
+    /// The equations of a tie, counted from the first of all ties.
+    pub fn tie_rows(&self, tie: usize) -> Range<usize> {
+        self.tie_ptr[tie]..self.tie_ptr[tie + 1]
+    }
+
+    /// Number of equations: those of all groups, then those of all ties.
+    pub fn equations(&self) -> usize {
+        self.groups() * self.rows + self.tie_ptr[self.ties.len()]
+    }
+
+    /// The unknowns that a tie touches, block by block in its order, the border last: the columns of its coefficients.
+    pub fn tie_columns(&self, tie: usize) -> impl Iterator<Item = usize> + '_ {
+        let Tie { kept, border, .. } = &self.ties[tie];
+        let start = self.border_range().start;
+        let common = start + border.start as usize..start + border.end as usize;
+        kept.iter().flat_map(|&block| self.kept_range(block as usize)).chain(common)
     }
 
     /// Number of unknowns.

@@ -20,7 +20,7 @@ impl System {
     /// factor, the fronts that wait for each other, and vectors.
     pub fn memory(&self) -> usize {
         let layout = &self.layout;
-        let vectors = PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.groups() * layout.rows();
+        let vectors = PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.equations();
         BASE + BYTES * (capacity(self.symbolic.values()) + self.fronts() + vectors)
     }
 

@@ -174,11 +174,17 @@ impl Stack {
         coupling
     }
 
+    /// Unknowns of every kept block that the local blocks are tied to, where all have the same number: kernels are chosen by it.
+    pub fn kept_dim(&self) -> Option<usize> {
+        let dim = self.slots.first()?.dim;
+        self.slots.iter().all(|slot| slot.dim == dim).then_some(dim)
+    }
+
     /// Eliminates the unknowns of the local blocks. `damping` is added to the diagonal of each as a fraction of it.
     pub fn eliminate(&mut self, layout: &Layout, prior: &Prior, damping: f64) {
         (self.sum_of_squares, self.decrease) = (0.0, 0.0);
         self.deficient.clear();
-        run(layout, Eliminate { stack: self, layout, prior, damping });
+        run(layout, self.kept_dim(), Eliminate { stack: self, layout, prior, damping });
     }
 
     #[inline(always)]
@@ -252,7 +258,7 @@ impl Stack {
 
     /// Adds what the elimination leaves to columns of the front of the home; `border` is the first row of the border there.
     pub fn add_to(&self, columns: &mut Columns<'_>, layout: &Layout, border: usize) {
-        run(layout, AddTo { stack: self, columns, rows: layout.rows(), border });
+        run(layout, self.kept_dim(), AddTo { stack: self, columns, rows: layout.rows(), border });
     }
 
     #[inline(always)]
@@ -344,7 +350,7 @@ impl Stack {
     /// Solves for the local blocks with the others in place: N x = A^T (l - A_other x_other). `others` are the unknowns that are
     /// not local, in the order of elimination; the solutions are added to `found`, one after the other.
     pub fn solve(&self, system: &System, prior: &Prior, damping: f64, others: &[f64], found: &mut Vec<f64>) {
-        run(&system.layout, Solve { stack: self, system, prior, damping, others, found });
+        run(&system.layout, self.kept_dim(), Solve { stack: self, system, prior, damping, others, found });
     }
 
     #[inline(always)]

@@ -6,6 +6,7 @@ use super::incidence::Incidence;
 use super::layout::Layout;
 use super::ordering::Ordering;
 use super::symbolic::Symbolic;
+use super::ties::Ties;
 use super::tree::Tree;
 use super::workspace::Workspace;
 
@@ -15,6 +16,7 @@ pub struct System {
     pub(super) layout: Layout,
     pub(super) symbolic: Arc<Symbolic>,
     pub(super) incidence: Incidence,
+    pub(super) ties: Ties,
     pub(super) tree: Tree,
     pub(super) workspace: Workspace,
 }
@@ -24,13 +26,14 @@ impl System {
     pub fn new(layout: Layout, ordering: Ordering) -> Self {
         let symbolic = Arc::new(Symbolic::new(&layout, ordering));
         let incidence = Incidence::new(&layout, &symbolic);
+        let ties = Ties::new(&layout, &symbolic);
         let work = |(index, supernode): (usize, &super::symbolic::Supernode)| {
             let formation =
                 incidence.locals_at(index).iter().map(|&local| formation_work(&layout, local as usize));
             supernode.operations() + formation.sum::<f64>()
         };
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());
-        Self { layout, symbolic, incidence, tree, workspace: Workspace::default() }
+        Self { layout, symbolic, incidence, ties, tree, workspace: Workspace::default() }
     }
 
     /// The unknowns and groups.

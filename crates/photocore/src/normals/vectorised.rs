@@ -15,9 +15,9 @@ pub(super) trait Kernel {
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S);
 }
 
-/// Runs a kernel for the sizes of a layout.
-pub(super) fn run(layout: &Layout, kernel: impl Kernel) {
-    Arch::new().dispatch(Sized { layout, kernel });
+/// Runs a kernel for the sizes of a layout; `kept_dim` is that of all kept blocks concerned, where they have the same.
+pub(super) fn run(layout: &Layout, kept_dim: Option<usize>, kernel: impl Kernel) {
+    Arch::new().dispatch(Sized { layout, kept_dim, kernel });
 }
 
 /// Runs a kernel that does not depend on sizes.
@@ -33,6 +33,7 @@ pub(super) fn size<const N: usize>(at_run_time: usize) -> usize {
 
 struct Sized<'a, K> {
     layout: &'a Layout,
+    kept_dim: Option<usize>,
     kernel: K,
 }
 
@@ -41,7 +42,7 @@ impl<K: Kernel> WithSimd for Sized<'_, K> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        match (self.layout.rows(), self.layout.local_dim(), self.layout.common_kept_dim()) {
+        match (self.layout.rows(), self.layout.local_dim(), self.kept_dim) {
             (2, 3, Some(6)) => self.kernel.run::<S, 2, 3, 6>(simd),
             (2, 3, Some(9)) => self.kernel.run::<S, 2, 3, 9>(simd),
             (_, 3, _) => self.kernel.run::<S, 0, 3, 0>(simd),

@@ -1,0 +1,241 @@
+//! Networks with ties: a trilateration in the plane, free, in any datum, against dense algebra.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::ops::ControlFlow;
+
+use faer::{Mat, Side};
+use photocore::adjustment::{Criterion, Datum, Loss, Model, Options, Problem, Status, adjust, in_datum};
+use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Points in the plane; distances from kept points to local ones are groups, those between kept points ties.
+struct Trilateration {
+    layout: Layout,
+    lengths: Vec<f64>,
+    held: Vec<usize>,
+}
+
+impl Trilateration {
+    /// Observed minus computed, and the partials by the first point; those by the second are the opposite.
+    fn distance(&self, values: &[f64], observation: usize, from: usize, to: usize) -> (f64, [f64; 2]) {
+        let difference = [values[from] - values[to], values[from + 1] - values[to + 1]];
+        let length = difference[0].hypot(difference[1]);
+        (self.lengths[observation] - length, difference.map(|value| value / length))
+    }
+}
+
+impl Model for Trilateration {
+    type Prepared = Vec<f64>;
+
+    fn prepare(&self, unknowns: &[f64]) -> Vec<f64> {
+        unknowns.to_vec()
+    }
+
+    fn observe(&self, values: &Vec<f64>, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let (point, station) =
+            (self.layout.local_range(local).start, self.layout.kept_range(self.layout.kept_of(group)).start);
+        let (left, partials) = self.distance(values, group, point, station);
+        rows.constant[0] = left;
+        rows.local.copy_from_slice(&partials);
+        rows.kept.copy_from_slice(&partials.map(|value| -value));
+    }
+
+    fn observe_tie(&self, values: &Vec<f64>, tie: usize, rows: &mut TieRows<'_>) {
+        let kept = &self.layout.ties()[tie].kept;
+        let [from, to] = [0, 1].map(|end| self.layout.kept_range(kept[end] as usize).start);
+        let (left, partials) = self.distance(values, self.layout.groups() + tie, from, to);
+        rows.constant[0] = left;
+        rows.coefficients[..2].copy_from_slice(&partials);
+        rows.coefficients[2..].copy_from_slice(&partials.map(|value| -value));
+    }
+
+    fn datum(&self, _unknowns: &[f64]) -> Vec<usize> {
+        self.held.clone()
+    }
+}
+
+const SD: f64 = 0.01;
+
+/// Noise that does not depend on a library: a number between -1 and 1 for each index.
+fn noise(index: usize) -> f64 {
+    ((index as f64 * 12.9898).sin() * 43758.5453).fract()
+}
+
+/// A grid of 4 x 3 kept points and 8 local ones among them, each local one seen from four kept points.
+fn network(held: Vec<usize>) -> Problem<Trilateration> {
+    let kept: Vec<[f64; 2]> = (0..12).map(|k| [100.0 * (k % 4) as f64, 120.0 * (k / 4) as f64]).collect();
+    let local: Vec<[f64; 2]> =
+        (0..8).map(|k| [40.0 + 33.0 * k as f64, 60.0 + 70.0 * noise(k).abs()]).collect();
+    let (mut ptr, mut seen) = (vec![0], Vec::new());
+    for k in 0..8 {
+        seen.extend([k, k + 1, k + 3, k + 4].map(|station| station as u32 % 12));
+        ptr.push(seen.len());
+    }
+    let pairs: Vec<[u32; 2]> =
+        (0..12).flat_map(|k| [[k, (k + 1) % 12], [k, (k + 4) % 12], [(k + 5) % 12, k]]).collect();
+    let ties = pairs.iter().map(|pair| Tie { rows: 1, kept: pair.to_vec(), border: 0..0 }).collect();
+    let layout = Layout::new(1, 2, &[2; 12], ptr.clone(), seen.clone()).unwrap().with_ties(ties).unwrap();
+    let truth: Vec<f64> = local.iter().chain(&kept).flatten().copied().collect();
+    let distance = |a: usize, b: usize| (truth[a] - truth[b]).hypot(truth[a + 1] - truth[b + 1]);
+    let of_groups = (0..seen.len()).map(|g| distance(g / 4 * 2, 16 + 2 * seen[g] as usize));
+    let of_ties = pairs.iter().map(|pair| distance(16 + 2 * pair[0] as usize, 16 + 2 * pair[1] as usize));
+    let lengths: Vec<f64> =
+        of_groups.chain(of_ties).enumerate().map(|(i, length)| length + SD * noise(100 + i)).collect();
+    let initial: Vec<f64> = truth.iter().enumerate().map(|(i, x)| x + 0.5 * noise(500 + i)).collect();
+    let unknowns = layout.unknowns();
+    Problem {
+        observation_sd: vec![SD; lengths.len()],
+        model: Trilateration { layout: layout.clone(), lengths, held },
+        system: System::new(layout, Ordering::Auto),
+        prior: initial.clone(),
+        initial,
+        sd: vec![f64::INFINITY; unknowns],
+    }
+}
+
+fn pool() -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(2).build().unwrap()
+}
+
+fn options() -> Options {
+    Options { criterion: Criterion::Decrease(1e-14), max_iterations: 100, covariance: true, loss: None }
+}
+
+fn go<T>(_: T) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// Design matrix divided by the standard deviations, at the given values.
+fn design(problem: &Problem<Trilateration>, values: &[f64]) -> Mat<f64> {
+    let layout = problem.layout();
+    let mut a = Mat::zeros(layout.equations(), layout.unknowns());
+    let ends = (0..layout.groups())
+        .map(|g| [layout.local_range(g / 4).start, layout.kept_range(layout.kept_of(g)).start]);
+    let tied =
+        layout.ties().iter().map(|tie| [0, 1].map(|end| layout.kept_range(tie.kept[end] as usize).start));
+    for (row, [from, to]) in ends.chain(tied).enumerate() {
+        let (_, partials) = problem.model.distance(values, row, from, to);
+        for k in 0..2 {
+            a[(row, from + k)] = partials[k] / SD;
+            a[(row, to + k)] = -partials[k] / SD;
+        }
+    }
+    a
+}
+
+/// Shifts along both axes, and a rotation about the origin.
+fn null_vectors(values: &[f64]) -> Vec<Vec<f64>> {
+    let of = |each: &dyn Fn(f64, f64) -> [f64; 2]| {
+        values.chunks_exact(2).flat_map(|point| each(point[0], point[1])).collect::<Vec<f64>>()
+    };
+    vec![of(&|_, _| [1.0, 0.0]), of(&|_, _| [0.0, 1.0]), of(&|x, y| [-y, x])]
+}
+
+/// The inverse over the rows that the null vectors leave: (N + G G^T)^-1 - G (G^T G)^-2 G^T is the pseudo-inverse.
+fn pseudo_inverse(a: &Mat<f64>) -> Mat<f64> {
+    let eigen = (a.transpose() * a).self_adjoint_eigen(Side::Lower).unwrap();
+    let (values, vectors) = (eigen.S(), eigen.U());
+    let largest = values[values.dim() - 1];
+    let scaled = Mat::from_fn(vectors.nrows(), vectors.ncols(), |i, k| {
+        if values[k] > 1e-10 * largest { vectors[(i, k)] / values[k] } else { 0.0 }
+    });
+    scaled * vectors.transpose()
+}
+
+fn kept_block(problem: &Problem<Trilateration>, cofactors: &[f64], kept: usize, q: &Mat<f64>) -> f64 {
+    let range = problem.layout().kept_range(kept);
+    let scale = q[(range.start, range.start)].max(q[(range.start + 1, range.start + 1)]);
+    (0..4)
+        .map(|k| (cofactors[4 * kept + k] - q[(range.start + k / 2, range.start + k % 2)]).abs() / scale)
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn inner_constraints_over_everything_are_the_pseudo_inverse() {
+    // One point and the direction to another are held.
+    let problem = network(vec![16, 17, 19]);
+    let pool = pool();
+    let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+    assert_eq!(found.status, Status::Converged);
+    let all: Vec<usize> = (0..problem.layout().unknowns()).collect();
+    let datum = Datum { vectors: null_vectors(&found.unknowns), carriers: all };
+    let free = in_datum(&problem, &found, &datum, &problem.initial, &pool, &mut go).unwrap();
+    let a = design(&problem, &found.unknowns);
+    let q = pseudo_inverse(&a);
+    for kept in 0..12 {
+        assert!(kept_block(&problem, &free.cofactors.kept, kept, &q) < 1e-9);
+    }
+    for local in 0..8 {
+        for k in 0..4 {
+            let (i, j) = (2 * local + k / 2, 2 * local + k % 2);
+            let scale = (q[(i, i)] * q[(j, j)]).sqrt();
+            assert!((free.cofactors.local[4 * local + k] - q[(i, j)]).abs() < 1e-9 * scale);
+        }
+    }
+    // The carriers move least: what they have moved has no part along the null vectors.
+    for vector in null_vectors(&found.unknowns) {
+        let along: f64 =
+            vector.iter().zip(&free.unknowns).zip(&problem.initial).map(|((g, x), x0)| g * (x - x0)).sum();
+        let length = vector.iter().map(|g| g * g).sum::<f64>().sqrt();
+        assert!((along / length).abs() < 1e-9);
+    }
+    // Distances do not know of a datum.
+    let redundancy = found.redundancy.unwrap();
+    for (row, r) in redundancy.iter().enumerate() {
+        let share: f64 = (0..a.ncols())
+            .flat_map(|i| (0..a.ncols()).map(move |j| (i, j)))
+            .map(|(i, j)| a[(row, i)] * q[(i, j)] * a[(row, j)])
+            .sum();
+        assert!((1.0 - share - r).abs() < 1e-9);
+    }
+    let sum: f64 = redundancy.iter().sum();
+    assert!((sum - found.counts.degrees_of_freedom() as f64).abs() < 1e-8);
+}
+
+#[test]
+fn a_datum_does_not_depend_on_where_the_network_comes_from() {
+    let pool = pool();
+    let in_datum_of = |held: Vec<usize>| {
+        let problem = network(held);
+        let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+        // Carried by three kept points only.
+        let datum = Datum { vectors: null_vectors(&found.unknowns), carriers: (20..26).collect() };
+        in_datum(&problem, &found, &datum, &problem.initial, &pool, &mut go).unwrap()
+    };
+    let one = in_datum_of(vec![16, 17, 19]);
+    let other = in_datum_of(vec![38, 39, 30]);
+    for (a, b) in one.cofactors.kept.iter().zip(&other.cofactors.kept) {
+        assert!((a - b).abs() < 1e-7 * SD * SD, "{a} {b}");
+    }
+    assert_eq!(one.cofactors.equations.len(), 32 + 36);
+}
+
+#[test]
+fn too_few_carriers_are_refused() {
+    let problem = network(vec![16, 17, 19]);
+    let pool = pool();
+    let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+    // One point carries shifts, but no rotation about itself.
+    let origin: Vec<f64> = found
+        .unknowns
+        .chunks_exact(2)
+        .flat_map(|p| [p[0] - found.unknowns[16], p[1] - found.unknowns[17]])
+        .collect();
+    let datum = Datum { vectors: null_vectors(&origin), carriers: vec![16, 17] };
+    assert!(in_datum(&problem, &found, &datum, &problem.initial, &pool, &mut go).is_err());
+}
+
+#[test]
+fn a_loss_takes_the_weight_of_a_wrong_tie() {
+    let mut problem = network(vec![16, 17, 19]);
+    let wrong = problem.layout().groups() + 5;
+    problem.model.lengths[wrong] += 3.0;
+    let robust = Options { loss: Some(Loss::Huber(1.5)), covariance: false, ..options() };
+    let found = adjust(&problem, &robust, &pool(), &mut go).unwrap();
+    let weights = found.weights.unwrap();
+    assert_eq!(weights.len(), 32 + 36);
+    let least = (0..weights.len()).min_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap();
+    assert_eq!(least, wrong);
+    assert!(weights[wrong] < 0.1);
+}
