@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Criterion, Event, Options as AdjustmentOptions, Phase};
-use photocore::programs::block::{Block, BlockError as Failure, Image, Options, Photo, Point, UnitVariance};
+use photocore::programs::block::{Block, Image, Options, Photo, Point, UnitVariance};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -15,7 +15,7 @@ use crate::arrays::{check_lengths, indices, numbers, rows};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
 use crate::memory;
 use crate::options::{named_loss, named_ordering, unknown};
-use crate::solution::{BlockSolution, iteration_row};
+use crate::solution::{BlockSolution, failure, iteration_row};
 
 create_exception!(
     _photocore,
@@ -217,22 +217,4 @@ fn phase_name(phase: Phase) -> &'static str {
         Phase::Solve => "solve",
         Phase::Invert => "invert",
     }
-}
-
-/// Kind, message, and the photos and points concerned.
-pub type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>);
-
-/// A failure as Python sees it.
-pub fn failure(error: &Failure) -> FailureRow {
-    let (kind, photos, points) = match error {
-        Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
-        Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
-        Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
-        Failure::Coarse { photos, points } => ("coarse", vec![photos.clone()], points.clone()),
-        Failure::Empty => ("empty", vec![], vec![]),
-        Failure::NotFinite => ("not finite", vec![], vec![]),
-        Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
-        Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
-    };
-    (kind, error.to_string(), photos, points)
 }

@@ -2,12 +2,11 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use photocore::adjustment::{Adjustment, Iteration, Observed, Status};
-use photocore::programs::block::Solution;
+use photocore::programs::block::{BlockError as Failure, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{squares, table};
-use crate::block::{FailureRow, failure};
 
 /// Number, weighted sum of squares, largest change in standard deviations, damping.
 pub type IterationRow = (usize, f64, f64, f64);
@@ -252,4 +251,22 @@ pub fn image_table<'py>(
 pub fn image_weights<'py>(py: Python<'py>, images: &[Option<Observed<2>>]) -> Bound<'py, PyArray1<f64>> {
     let weights = images.iter().map(|image| image.map_or(f64::NAN, |image| image.weight));
     PyArray1::from_vec(py, weights.collect())
+}
+
+/// Kind, message, and the photos and points concerned.
+pub type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>);
+
+/// A failure as Python sees it.
+pub fn failure(error: &Failure) -> FailureRow {
+    let (kind, photos, points) = match error {
+        Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
+        Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
+        Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
+        Failure::Coarse { photos, points } => ("coarse", vec![photos.clone()], points.clone()),
+        Failure::Empty => ("empty", vec![], vec![]),
+        Failure::NotFinite => ("not finite", vec![], vec![]),
+        Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
+        Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted => ("input", vec![], vec![]),
+    };
+    (kind, error.to_string(), photos, points)
 }

@@ -11,7 +11,7 @@ use super::invert::SelectedInverse;
 use super::layout::Layout;
 use super::stack::{Slot, Stack, dot};
 use super::system::System;
-use super::ties::TieEquations;
+use super::tie_equations::TieEquations;
 use super::vectorised::{Kernel, run, size};
 use super::watch::Control;
 use super::workspace::zeros;

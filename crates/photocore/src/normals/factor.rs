@@ -16,7 +16,7 @@ use super::panels::{Handover, Panels, lock};
 use super::stack::Stack;
 use super::symbolic::Symbolic;
 use super::system::System;
-use super::ties::TieEquations;
+use super::tie_equations::TieEquations;
 use super::watch::{Between, Control, Stopped, watched};
 
 /// The Cholesky factor L of the reduced normal equations.

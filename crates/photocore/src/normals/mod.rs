@@ -30,6 +30,7 @@ mod solve_for;
 mod stack;
 mod symbolic;
 mod system;
+mod tie_equations;
 mod ties;
 mod tree;
 mod triangle;
