@@ -45,6 +45,8 @@ def make(section: str) -> None:
     lines = ended.stdout.splitlines()
     if section == "nist":  # cargo's own lines are not meant
         lines = [line for line in lines if line.startswith("|")]
+    if section == "stars":  # a night a line
+        lines = [f"* {line}" for line in lines]
     write_section(PAGE, section, [f"On {machine()}.", "", *(line.rstrip() for line in lines)])
 
 

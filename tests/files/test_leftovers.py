@@ -175,7 +175,12 @@ def test_a_signal_that_ends_a_command_leaves_nothing(tmp_path, number):
         "    os.kill(os.getpid(), int(sys.argv[1]))\n"
     )
     command = [sys.executable, "-c", program, str(int(number))]
-    done = subprocess.run(command, capture_output=True, cwd=tmp_path, check=False)
+
+    def heed():
+        # Shells start what runs in the background with SIGINT ignored, and what is ignored stays ignored.
+        signal.signal(number, signal.SIG_DFL)
+
+    done = subprocess.run(command, capture_output=True, cwd=tmp_path, check=False, preexec_fn=heed)
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, b"", b"")
     assert list(tmp_path.rglob("*")) == [tmp_path / "old"]
     assert (tmp_path / "old").read_bytes() == b"old"

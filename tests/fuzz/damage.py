@@ -14,7 +14,8 @@ from .sound import Files
 
 __all__ = ["damaged"]
 
-NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?(?![\w.])")
+# Possessive: cells of 140,000 digits would be tried in all ways to divide them.
+NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d++\.?+\d*+|\.\d++)(?:[EeDd][-+]?\d++)?+(?![\w.])")
 _PACKERS = {b"BZh": (bz2.decompress, bz2.compress), b"\x1f\x8b": (gzip.decompress, gzip.compress)}
 UNITS = (1000.0, 0.001, 0.3048, math.pi / 180, 180 / math.pi, 1 / 3600, 200 / math.pi, 1e6, 1e-6, 10.0, 0.1)
 EXTREME = (
