@@ -150,7 +150,8 @@ def adjust(
     checked(block)
     truth_value("covariance", covariance)
     truth_value("fix_photos", fix_photos)
-    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, threads, progress)
+    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, progress)
+    processors = core_threads(threads)
     row = loss_row(loss, scale)
     if row and as_published:
         raise InputError("the 1987 program has no robust loss: as_published or loss")
@@ -189,7 +190,7 @@ def adjust(
             loss=row,
             ordering=ordering,
             unit_variance=unit_variance,
-            threads=core_threads(threads),
+            threads=processors,
             memory=None if _fits_anywhere(block) else available_memory(),
             progress=None if progress is None else teller(progress),
         )
@@ -237,7 +238,6 @@ def _check_options(
     max_iterations: int,
     tolerance: float,
     as_published: AsPublished | None,
-    threads: int | None,
     progress: object,
 ) -> None:
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
@@ -248,13 +248,12 @@ def _check_options(
         raise InputError("there must be one iteration at least")
     if not number("the criterion", as_published.percent if as_published else tolerance) > 0:
         raise InputError("the criterion of convergence must be positive")
-    core_threads(threads)
     if progress is not None and not callable(progress):
         raise InputError(f"progress is no function: {shown(progress)}")
 
 
 def core_threads(threads: int | None) -> int:
-    """Return the number of threads as the core takes it, 0 for all processors; it takes few at the most.
+    """Return the number of threads for the core: all processors when None, a few for each at the most.
 
     Raises
     ------
