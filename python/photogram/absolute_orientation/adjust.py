@@ -16,12 +16,12 @@ from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.oriented import Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
-from photogram.adjusted import Iteration
-from photogram.arrays import names as names_of
-from photogram.arrays import number, one_of, truth_value, whole_number
+from photogram.arguments.arrays import names as names_of
+from photogram.arguments.arrays import number, one_of, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
-from photogram.statistics import externally_studentized, global_test
+from photogram.results.adjusted import Iteration
+from photogram.statistics.limits import externally_studentized, global_test
 
 __all__ = ["Method", "Start", "UnitVariance", "orient"]
 

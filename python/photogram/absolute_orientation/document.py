@@ -14,8 +14,8 @@ from photogram import _photocore
 from photogram.absolute_orientation.oriented import OrientedModel
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.errors import InputError
-from photogram.files import read_bytes
-from photogram.statistics import GlobalTest
+from photogram.io.files import read_bytes
+from photogram.statistics.limits import GlobalTest
 
 __all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.absolute_orientation.oriented import OrientedModel
-from photogram.pictures import round_length
+from photogram.show.pictures import round_length
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

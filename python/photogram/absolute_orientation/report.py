@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.cards import restart_record, transformation_records
 from photogram.absolute_orientation.oriented import OrientedModel
-from photogram.angles import ARCSEC
-from photogram.sections import Section, composed, headline
+from photogram.show.angles import ARCSEC
+from photogram.show.sections import Section, composed, headline
 
 __all__ = ["report", "summary"]
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
-from photogram.arrays import number, numbers, shaped
+from photogram.arguments.arrays import number, numbers, shaped
 from photogram.errors import InputError
-from photogram.geometry import rotation_angles
+from photogram.network.geometry import rotation_angles
 
 __all__ = ["Similarity"]
 

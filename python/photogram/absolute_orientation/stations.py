@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arrays import frozen, names, numbers, text
+from photogram.arguments.arrays import frozen, names, numbers, text
 from photogram.errors import InputError
 
 if TYPE_CHECKING:

@@ -18,12 +18,12 @@ from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
 from photogram.errors import InputError
-from photogram.files import reading
+from photogram.io.files import reading
+from photogram.io.numbers import finite_number
+from photogram.io.places import Place
+from photogram.io.rows import LONGEST_RECORD, cells
+from photogram.io.writing import OutputSet
 from photogram.messages import quoted
-from photogram.numbers import finite_number
-from photogram.places import Place
-from photogram.rows import LONGEST_RECORD, cells
-from photogram.writing import OutputSet
 
 if TYPE_CHECKING:
     import pandas as pd

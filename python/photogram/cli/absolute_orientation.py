@@ -18,8 +18,8 @@ from photogram.cli.options import JsonFile, Quiet
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity, Stations
+    from photogram.io.writing import OutputSet
     from photogram.messages import Message
-    from photogram.writing import OutputSet
 
 __all__ = ["absolute_orientation", "transform"]
 
@@ -255,7 +255,7 @@ def _former(path: Path) -> Similarity:
     """Read a former result in either of its forms."""
     from photogram.absolute_orientation.cards import read_transformation
     from photogram.absolute_orientation.document import read_similarity
-    from photogram.files import read_lines
+    from photogram.io.files import read_lines
 
     document = any(line.lstrip().startswith("{") for line in read_lines(path)[:1])
     return read_similarity(path, usable=True) if document else read_transformation(path)

@@ -38,7 +38,7 @@ def check(
     """
     with job:
         from photogram.giant import Limits, read_project
-        from photogram.giant.checks import check as check_project
+        from photogram.giant import check as check_project
 
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None

@@ -16,7 +16,7 @@ from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threa
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
-    from photogram import robust
+    from photogram.adjustment import robust
 
 __all__ = ["collection"]
 

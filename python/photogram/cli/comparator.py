@@ -191,8 +191,8 @@ def _place(folder: Path, number: int, count: int) -> Path:
 def _run_date(date: str | None) -> str:
     """Return the date of the run: as it is said, as the environment says, or today (UTC)."""
     from photogram.errors import InputError
+    from photogram.io.numbers import whole_number
     from photogram.messages import quoted
-    from photogram.numbers import whole_number
 
     if date is not None:
         return date if date.isprintable() else repr(date)

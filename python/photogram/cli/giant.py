@@ -120,7 +120,7 @@ def giant(
     with job, ExitStack() as resources:
         from photogram.errors import AdjustmentError
         from photogram.giant import Limits, read_project
-        from photogram.report import summary
+        from photogram.results.report import summary
 
         if directory is None:
             directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))

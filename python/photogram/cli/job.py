@@ -18,7 +18,7 @@ from photogram.cli.console import failures, print_remark
 from photogram.messages import printable
 
 if TYPE_CHECKING:
-    from photogram.writing import OutputSet
+    from photogram.io.writing import OutputSet
 
 __all__ = ["Job", "Reads", "Writes", "roles", "with_job"]
 
@@ -117,7 +117,7 @@ class Job:
 
     def outputs(self) -> OutputSet:
         """Return a set of files, for results that are written piece by piece."""
-        from photogram.writing import OutputSet
+        from photogram.io.writing import OutputSet
 
         return OutputSet(self._inputs())
 
@@ -132,8 +132,8 @@ class Job:
 
     def _check(self) -> None:
         from photogram.errors import InputError
-        from photogram.files import reading
-        from photogram.writing import check_outputs
+        from photogram.io.files import reading
+        from photogram.io.writing import check_outputs
 
         for path in [*self._files, *self._projects]:
             with reading(path):
@@ -153,7 +153,7 @@ class Job:
 
     def _remark(self) -> None:
         """Remark on inputs that belong to a set which an interrupted run may have left incomplete."""
-        from photogram.writing.markers import doubtful
+        from photogram.io.writing.markers import doubtful
 
         for path, mark in doubtful(self._inputs()).items():
             told = f"{path}: an interrupted run may have left it out of step with other files: {mark}"

@@ -88,7 +88,7 @@ def plan(
 
 def _simulated(*networks: NetworkOptions) -> dict[str, Block]:
     """Simulate networks: their true positions, nothing measured."""
-    from photogram.simulation import simulate
+    from photogram.network.simulation import simulate
 
     patterns = {_name(network): simulate(check_points=0, **network.arguments()).truth for network in networks}
     if len(patterns) < len(networks):
@@ -119,8 +119,8 @@ def _check_alone(network: NetworkOptions, against: Control, *others: float | Non
 def _adjusted(projects: list[Path]) -> dict[str, Block]:
     """Read projects; what stands in their files is adjusted first, so that all points have positions."""
     from photogram import adjust
+    from photogram.adjustment.prediction import at_adjusted
     from photogram.giant import read_project
-    from photogram.prediction import at_adjusted
 
     patterns = {}
     for name, directory in _names(projects).items():
@@ -145,7 +145,7 @@ def _names(projects: list[Path]) -> dict[str, Path]:
 def _documents(made: Plan, json: Path | None, plot: Path | None) -> dict[Path, bytes]:
     documents = {json: made.to_json()} if json else {}
     if plot:
-        from photogram.pictures import drawn
+        from photogram.show.pictures import drawn
 
         documents[plot] = drawn(made.plot(), plot)
     return documents

@@ -14,9 +14,9 @@ from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.simulated import NetworkOptions, takes_network
 
 if TYPE_CHECKING:
-    from photogram.block import Block
     from photogram.giant.common import Common
-    from photogram.simulation import Simulation
+    from photogram.network.block import Block
+    from photogram.network.simulation import Simulation
 
 __all__ = ["simulate"]
 
@@ -55,7 +55,7 @@ def simulate(
     with job:
         from photogram.giant import Project
         from photogram.giant.project import project_files
-        from photogram.simulation import simulate as make
+        from photogram.network.simulation import simulate as make
 
         simulation = make(
             check_points=check_points,
@@ -81,8 +81,8 @@ def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[
     """Return a simulated block as files can state it, and the job: no initial value is free in them."""
     import numpy as np
 
-    from photogram.geometry import lengths_of_units
     from photogram.giant.common import Common
+    from photogram.network.geometry import lengths_of_units
 
     weighted = [np.isfinite(sd).all() for sd in (block.photo_position_sd, block.photo_attitude_sd)]
     if not any(weighted):

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.adjusted import Iteration
-from photogram.arrays import standard_deviations
+from photogram.arguments.arrays import standard_deviations
 from photogram.collection.collection import Collection, Floats, Indices
 from photogram.messages import Message
+from photogram.results.adjusted import Iteration
 
 __all__ = ["AdjustedCollection"]
 

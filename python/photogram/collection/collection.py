@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arrays import indices, shaped
+from photogram.arguments.arrays import indices, shaped
 from photogram.errors import InputError
 
 __all__ = ["PARAMETERS", "Collection"]

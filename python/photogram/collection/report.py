@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.collection.collection import PARAMETERS
-from photogram.outliers import Observations, outliers
-from photogram.reliability import TESTABLE
-from photogram.sections import Section, composed, headline, problems
-from photogram.statistics import externally_studentized, global_test, studentized_limit
+from photogram.show.sections import Section, composed, headline, problems
+from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
+from photogram.statistics.outliers import Observations, outliers
+from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     from photogram.collection.adjusted import AdjustedCollection

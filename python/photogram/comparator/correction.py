@@ -13,11 +13,11 @@ import orjson
 
 from photogram.comparator.polynomial import Frame, Polynomial, design
 from photogram.errors import InputError
-from photogram.files import read_bytes
+from photogram.io.files import read_bytes
 from photogram.messages import quoted
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.results.adjusted import Floats
 
 __all__ = ["Correction"]
 

@@ -21,14 +21,14 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import COUNT, Frame, Polynomial
 from photogram.comparator.residuals import Residuals
 from photogram.errors import AdjustmentError
-from photogram.statistics import GlobalTest, global_test
+from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
     from photogram.comparator.combined import CombinedLinear
     from photogram.comparator.grid import Grid
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers
+    from photogram.results.adjusted import Floats
 
 __all__ = ["JointCase", "JointFit", "JointPlate", "Weights", "adjust_jointly"]
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.angles import ARCSEC
 from photogram.giant.fields import MOST_ANGLE, format_angle, format_deviations, format_real
+from photogram.show.angles import ARCSEC
 
 __all__ = ["Columns", "angle_fields", "deviation_fields", "position_fields", "real_fields", "texts"]
 

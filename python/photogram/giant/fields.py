@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable
 from decimal import Decimal
 
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 
 __all__ = [
     "MOST_ANGLE",

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.io.records import Record, Source
 from photogram.messages import Message
 from photogram.perspective_center.formats import CardFormat
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Coordinatograph, Grid, reduce
-from photogram.records import Record, Source
 
 __all__ = ["OUT_OF_ORDER", "Deck", "Job", "read_deck"]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arrays import names, number, shaped
+from photogram.arguments.arrays import names, number, shaped
 from photogram.errors import InputError
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "reduce"]

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from photogram.errors import InputError
-from photogram.pictures import drawn, round_length
+from photogram.show.pictures import drawn, round_length
 
 if TYPE_CHECKING:
     from photogram.perspective_center.solution import Floats, PerspectiveCenter

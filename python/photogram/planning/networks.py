@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import orjson
 
 from photogram import _photocore
-from photogram.adjustment import Progress
-from photogram.arguments import check_arguments
-from photogram.block import Block
+from photogram.adjustment.adjustment import Progress
+from photogram.adjustment.prediction import predict
+from photogram.arguments.annotations import check_arguments
 from photogram.errors import InputError, RankError
+from photogram.network.block import Block
 from photogram.planning.pattern import Pattern
 from photogram.planning.text import report
-from photogram.prediction import predict
-from photogram.reliability import TESTABLE, noncentrality
+from photogram.statistics.reliability import TESTABLE, noncentrality
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram import geometry
-from photogram.block import Block
+from photogram.adjustment.prediction import image_depths
+from photogram.network import geometry
+from photogram.network.block import Block
 from photogram.planning.locations import locations
 from photogram.planning.statistics import (
     ControlQuality,
@@ -19,8 +20,7 @@ from photogram.planning.statistics import (
     photo_quality,
     point_quality,
 )
-from photogram.prediction import image_depths
-from photogram.result import Result
+from photogram.results.result import Result
 
 __all__ = ["Pattern"]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.adjusted import AdjustedBlock
 from photogram.planning.locations import LOCATIONS
-from photogram.reliability import TESTABLE, largest_effect, minimal_detectable_error
+from photogram.results.adjusted import AdjustedBlock
+from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
 __all__ = [
     "ControlQuality",

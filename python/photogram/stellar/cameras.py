@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.errors import InputError
-from photogram.files import read_bytes
+from photogram.io.files import read_bytes
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.sky import TAU
 from photogram.stellar.transformation import transformed_angles

@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
 from photogram.errors import InputError
-from photogram.rows import Row, read_rows
+from photogram.io.rows import Row, read_rows
+from photogram.show.angles import ARCSEC
 
 __all__ = ["Catalogue"]
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
 from photogram.errors import InputError
+from photogram.show.angles import ARCSEC
 from photogram.stellar.cards import Card, Cards
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, NAMES

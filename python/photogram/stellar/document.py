@@ -10,7 +10,7 @@ import numpy as np
 import orjson
 
 from photogram import _photocore
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar.comparator_frame import comparator_frame
 from photogram.stellar.curves import (
     distortion_curves,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.neighbours import mutually_nearest
+from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import STRETCH, Match, match

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.neighbours import mutually_nearest
+from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CROWDED, expected_false
 
 __all__ = ["Match", "match"]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from photogram.errors import InputError
 from photogram.messages import Message, listed
-from photogram.statistics import GlobalTest, global_test
+from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.comparison import held_out

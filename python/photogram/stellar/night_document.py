@@ -9,7 +9,7 @@ import numpy as np
 import orjson
 
 from photogram import _photocore
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.night import CalibratedNight
 from photogram.stellar.pointing import axis_of

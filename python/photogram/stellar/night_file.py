@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
 from photogram.errors import InputError
-from photogram.rows import Row, read_rows
+from photogram.io.rows import Row, read_rows
+from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.night import Night

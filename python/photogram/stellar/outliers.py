@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from photogram.errors import AdjustmentError
 from photogram.messages import listed
-from photogram.statistics import externally_studentized, normal_limit, studentized_limit
+from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
 
 if TYPE_CHECKING:
     from photogram.stellar.problem import Problem

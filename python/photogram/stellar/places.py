@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
 from photogram.errors import InputError
+from photogram.show.angles import ARCSEC
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.sky import Site
 from photogram.stellar.transformation import pole_matrix, terrestrial

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
 from photogram.errors import InputError
+from photogram.io.rows import Row, read_rows
 from photogram.messages import listed
-from photogram.rows import Row, read_rows
+from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes
 from photogram.stellar.drawing import COLOURS, band, bell, new_figure, png, vectors
 from photogram.stellar.parameters import GROUPS

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.messages import Message
-from photogram.statistics import GlobalTest, global_test
+from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.counts import Counts
 from photogram.stellar.moved import Movement
 from photogram.stellar.parameters import INDEX, NAMES

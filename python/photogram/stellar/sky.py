@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
-from photogram.angles import ARCSEC
-from photogram.arrays import shaped
+from photogram.arguments.arrays import shaped
 from photogram.errors import InputError
+from photogram.show.angles import ARCSEC
 
 __all__ = ["ABERRATION", "TAU", "Air", "Site", "refraction"]
 

@@ -8,7 +8,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC, degrees_minutes_seconds
+from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.stellar.comparator_frame import comparator_frame
 from photogram.stellar.curves import (
     distortion_curves,

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.angles import degrees_minutes_seconds
+from photogram.show.angles import degrees_minutes_seconds
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
     from photogram.comparator.calibration import CaseResult
+    from photogram.results.adjusted import Floats
 
 __all__ = ["angle", "centred", "nearest", "number", "triangle"]
 

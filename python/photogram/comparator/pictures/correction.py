@@ -8,14 +8,14 @@ import numpy as np
 
 from photogram.comparator.correction_table import table_nodes
 from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, new_figure, plain
-from photogram.pictures import round_length
+from photogram.show.pictures import round_length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from photogram.adjusted import Floats
     from photogram.comparator.calibration import Calibration
     from photogram.comparator.polynomial import Polynomial
+    from photogram.results.adjusted import Floats
 
 __all__ = ["correction_surface", "distorted_grid"]
 

@@ -10,15 +10,15 @@ import numpy as np
 
 from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN, MM, key, new_figure, panels, plain
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
-from photogram.pictures import round_length
+from photogram.show.pictures import round_length
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from photogram.adjusted import Floats
     from photogram.comparator.calibration import Calibration
     from photogram.comparator.pointing import Ellipse, Precision
+    from photogram.results.adjusted import Floats
 
 __all__ = ["operator_ellipses", "pointing_ellipses", "pooled_ellipses", "total_ellipses"]
 

@@ -19,13 +19,13 @@ from photogram.comparator.pictures.style import (
     panels,
     plain,
 )
-from photogram.pictures import round_length
+from photogram.show.pictures import round_length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from photogram.adjusted import Floats
     from photogram.comparator.calibration import Calibration
+    from photogram.results.adjusted import Floats
 
 __all__ = ["average_vectors", "comparator_vectors", "grid_vectors", "joint_grid"]
 
