@@ -22,8 +22,6 @@ FLOORS = (
     ("messages",),
 )
 """From the top down, as CONTRIBUTING has them: a file knows its own folder and floors below."""
-SHARED = {("stellar", "giant")}
-"""Programs that use another: the fields of cards, by the rules of FORTRAN."""
 
 
 def modules():
@@ -67,6 +65,6 @@ def test_arrows_point_down():
         for other in arrows:
             own, foreign = name.split(".")[1], other.split(".")[1]
             seen |= {own, foreign}
-            if own != foreign and (own, foreign) not in SHARED:
+            if own != foreign:
                 assert floor[own] < floor[foreign], f"{name} imports {other}"
     assert seen == set(floor)
