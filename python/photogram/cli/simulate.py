@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from photogram.cli.console import output, print_remark
 from photogram.cli.job import Job, Writes, with_job
+from photogram.cli.options import Quiet
 from photogram.cli.simulated import NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def simulate(
     out: Annotated[
         Path,
         Writes.DIRECTORY,
-        typer.Argument(metavar="OUT", help="Directory for the project; it is made if need be."),
+        typer.Argument(metavar="DIR", help="Directory for the project; it is made if need be."),
     ],
     network: NetworkOptions,
     check_points: Annotated[int, typer.Option(help="Points with known positions that are not held.")] = 20,
@@ -43,6 +44,7 @@ def simulate(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a project that is there already.")
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write a simulated block as a GIANT project, and the truth behind it as truth.json.
 
@@ -71,10 +73,11 @@ def simulate(
         job.write(written)
         for message in project.messages:
             print_remark(message)
-        output.print(
-            f"{escape(str(out))}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
-            f" {len(block.image_xy)} image points"
-        )
+        if not quiet:
+            output.print(
+                f"{escape(str(out))}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
+                f" {len(block.image_xy)} image points"
+            )
 
 
 def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[Block, Common]:
