@@ -319,7 +319,8 @@ def adjust_block(
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
     threads
-        Number of threads, no more than four for each processor; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
+        the calling thread, larger work has all processors.
     memory
         Bytes that the adjustment may take; None for any number.
     progress
@@ -785,7 +786,7 @@ def orient_model(
     tolerance
         Fraction of its standard deviation by which no unknown changes any more (rigorous method).
     threads
-        Number of threads; 0 for all processors.
+        Number of threads; 0 leaves it to the core (see `adjust_block`).
     trace
         Whether the report's methods keep what each cycle computed on its way.
 
@@ -1187,7 +1188,8 @@ def adjust_collection(
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     threads
-        Number of threads, no more than four for each processor; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
+        the calling thread, larger work has all processors.
     memory
         Bytes that the adjustment may take; None for any number.
     progress

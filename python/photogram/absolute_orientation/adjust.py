@@ -50,8 +50,6 @@ IN_A_PLANE = 3.0
 """Points are in a plane as far as can be told when they are off it by less than this many rms residuals."""
 ROUNDING = 1e-9
 """Residuals below this fraction of the size of the model are rounding."""
-SHARED = 10_000
-"""Stations from which more than one thread is worth its start."""
 
 
 def orient(
@@ -139,7 +137,7 @@ def orient(
                 "trace": False,
                 **options,
             },
-            threads=1 if len(rows) < SHARED else 0,
+            threads=0,
         )
 
     try:

@@ -122,8 +122,9 @@ def adjust(
         approximate minimum degree, by nested dissection across their positions, or across their ties alone.
         `auto` takes the one with the least predicted work.
     threads
-        Number of threads, no more than four for each processor; all processors when None. The result does not
-        depend on it, to the last bit.
+        Number of threads, no more than four for each processor. When None, a block of a few thousand image
+        points stays on the calling thread, to which others would only be a burden; a larger one has all
+        processors. The result does not depend on it, to the last bit.
     progress
         Called now and then with what is going on; an exception it raises stops the adjustment.
 
@@ -253,7 +254,7 @@ def _check_options(
 
 
 def core_threads(threads: int | None) -> int:
-    """Return the number of threads for the core: all processors when None, a few for each at the most.
+    """Return the number of threads for the core, a few for each processor at most; 0 leaves it to the core.
 
     Raises
     ------
@@ -261,7 +262,9 @@ def core_threads(threads: int | None) -> int:
         It is no number, or not positive.
     """
     if threads is None:
-        return threads_that_fit(os.cpu_count() or 1)
+        processors = os.cpu_count() or 1
+        fit = threads_that_fit(processors)
+        return 0 if fit == processors else fit
     if whole_number("threads", threads) < 1:
         raise InputError(f"threads must be positive, not {threads}")
     return threads_that_fit(min(threads, 4 * (os.cpu_count() or 1)))
