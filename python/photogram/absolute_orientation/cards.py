@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number, whole_number
@@ -30,7 +30,6 @@ __all__ = [
     "transformation_records",
 ]
 
-Floats = NDArray[np.float64]
 MISSING = ("", "-")
 
 

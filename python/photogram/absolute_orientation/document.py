@@ -8,18 +8,16 @@ from typing import Any
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.absolute_orientation.oriented import OrientedModel
 from photogram.absolute_orientation.similarity import Similarity
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.statistics.limits import GlobalTest
 
 __all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
-
-Floats = NDArray[np.float64]
 
 
 def to_json(result: OrientedModel) -> bytes:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.absolute_orientation.oriented import OrientedModel
+from photogram.arguments.types import Floats
 from photogram.show.pictures import round_length
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["plot"]
 
-Floats = NDArray[np.float64]
 
 LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
 
 from photogram.absolute_orientation.csv_files import header
 from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CHUNK", "Document", "decimals_for", "transform_file"]
 
-Floats = NDArray[np.float64]
 
 CHUNK = 100_000
 """Points transformed at a time."""

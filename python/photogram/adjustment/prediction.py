@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram.adjustment.adjustment import Ordering, Progress, adjust
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.network import geometry
@@ -21,9 +21,6 @@ from photogram.network.block import Block, checked
 from photogram.results.result import Result
 
 __all__ = ["at_adjusted", "image_depths", "predict"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 def predict(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import (
@@ -25,6 +25,7 @@ from photogram.arguments.arrays import (
     truth_value,
     whole_number,
 )
+from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 from photogram.network.geometry import Spheroid
@@ -32,7 +33,6 @@ from photogram.results.adjusted import Iteration
 
 __all__ = ["Pose", "Resection", "resect"]
 
-Floats = NDArray[np.float64]
 
 REASONS = {
     "too few points": "fewer than three points do not determine a pose",

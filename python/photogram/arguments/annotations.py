@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 
 __all__ = ["check_arguments", "path"]
@@ -26,14 +27,7 @@ Check = Callable[[str, Any], Any]
 """Takes the name of an argument and its value; returns the value, converted where it must be, or raises."""
 _MARK = "_checks_arguments"
 """An attribute of functions that check their arguments: names of several packages are checked once."""
-_ARRAYS = {
-    "NDArray": NDArray,
-    "np": np,
-    "Floats": NDArray[np.float64],
-    "Indices": NDArray[np.int64],
-    "Integers": NDArray[np.int64],
-    "Bools": NDArray[np.bool_],
-}
+_ARRAYS = {"NDArray": NDArray, "np": np, "Floats": Floats, "Indices": Indices, "Bools": Bools}
 """What arrays are called in annotations, where the names are imported for type checking only."""
 
 

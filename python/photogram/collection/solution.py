@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.arrays import standard_deviations
-from photogram.collection.collection import Collection, Floats, Indices
+from photogram.arguments.types import Floats, Indices
+from photogram.collection.collection import Collection
 from photogram.messages import Message
 from photogram.results.adjusted import Iteration
 

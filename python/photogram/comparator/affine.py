@@ -12,8 +12,8 @@ from photogram.comparator.residuals import Residuals
 from photogram.errors import AdjustmentError
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.readings import Integers
-    from photogram.results.adjusted import Floats
 
 __all__ = ["AffineFit", "fit_affine"]
 

@@ -12,11 +12,11 @@ import numpy as np
 from photogram.comparator.orientation import exchanged, locations
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers
     from photogram.comparator.residuals import Residuals
-    from photogram.results.adjusted import Floats
 
 __all__ = ["LocationAverages", "PlateAverages", "average_residuals"]
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.readings import Case
     from photogram.messages import Message
-    from photogram.results.adjusted import Floats
 
 __all__ = ["Closeout", "close_out"]
 

@@ -17,8 +17,8 @@ from photogram.comparator.residuals import Residuals
 from photogram.comparator.rigid import RigidFit, fit_rigid
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.placed import PlacedCase
-    from photogram.results.adjusted import Floats
 
 __all__ = ["CombinedLinear", "CombinedPolynomial", "SinglePolynomial", "combine_linear", "combine_polynomial"]
 

@@ -17,7 +17,7 @@ from photogram.io.files import read_bytes
 from photogram.messages import quoted
 
 if TYPE_CHECKING:
-    from photogram.results.adjusted import Floats
+    from photogram.arguments.types import Floats
 
 __all__ = ["Correction"]
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.polynomial import Polynomial
-    from photogram.results.adjusted import Floats
 
 __all__ = ["STEP_UM", "inside", "table_nodes", "table_values"]
 

@@ -18,7 +18,7 @@ from photogram.io.numbers import is_whole_number, whole_number
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photogram.results.adjusted import Floats
+    from photogram.arguments.types import Floats
 
 __all__ = ["BUILT_IN", "Grid", "built_in_grid", "find_grid", "read_grid"]
 

@@ -24,11 +24,11 @@ from photogram.errors import AdjustmentError
 from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.combined import CombinedLinear
     from photogram.comparator.grid import Grid
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers
-    from photogram.results.adjusted import Floats
 
 __all__ = ["JointCase", "JointFit", "JointPlate", "Weights", "adjust_jointly"]
 

@@ -12,8 +12,8 @@ from photogram.comparator.readings import Case
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.messages import Message
-    from photogram.results.adjusted import Floats
 
 __all__ = ["LegPoint", "intersect_legs", "reduce_legs"]
 

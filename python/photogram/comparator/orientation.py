@@ -12,9 +12,9 @@ from photogram.errors import InputError
 from photogram.network.neighbours import mutually_nearest
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.readings import Integers
-    from photogram.results.adjusted import Floats
 
 __all__ = ["Orientation", "detect_orientation", "exchanged", "locations"]
 

@@ -31,10 +31,10 @@ from photogram.statistics.limits import externally_studentized, studentized_limi
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Case
-    from photogram.results.adjusted import Floats
 
     Bools = NDArray[np.bool_]
 

@@ -14,11 +14,11 @@ from photogram.comparator.pointing import PointReadings, pool, read_points
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.pointing import Precision
     from photogram.comparator.readings import Case, Integers
     from photogram.messages import Message
-    from photogram.results.adjusted import Floats
 
 __all__ = ["PlacedCase", "place_case"]
 

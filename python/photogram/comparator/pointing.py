@@ -12,8 +12,8 @@ import numpy as np
 from photogram.comparator.grouping import group
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.readings import Integers
-    from photogram.results.adjusted import Floats
 
 __all__ = [
     "CONFIDENCE_FACTORS",

@@ -16,8 +16,8 @@ from photogram.messages import Message
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
-    from photogram.results.adjusted import Floats
 
     Integers = NDArray[np.int64]
 

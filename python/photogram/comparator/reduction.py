@@ -24,9 +24,9 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import Frame, design
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers
-    from photogram.results.adjusted import Floats
 
 __all__ = ["GridErrors", "Reduction"]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.readings import Integers
-    from photogram.results.adjusted import Floats
 
 __all__ = ["Residuals"]
 

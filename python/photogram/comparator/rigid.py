@@ -12,8 +12,8 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.residuals import Residuals
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.readings import Integers
-    from photogram.results.adjusted import Floats
 
 __all__ = ["RigidFit", "fit_rigid"]
 

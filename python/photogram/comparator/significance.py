@@ -18,8 +18,8 @@ import numpy as np
 from photogram.comparator.polynomial import TERMS
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.combined import CombinedLinear, CombinedPolynomial
-    from photogram.results.adjusted import Floats
 
 __all__ = ["CaseVarianceTest", "PolynomialTest", "TermTest", "compare_case_variances", "polynomial_tests"]
 

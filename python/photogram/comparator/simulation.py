@@ -18,9 +18,9 @@ from photogram.errors import InputError
 from photogram.io.places import Place
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.readings import Integers
-    from photogram.results.adjusted import Floats
 
 __all__ = ["Simulation", "simulate_calibration"]
 

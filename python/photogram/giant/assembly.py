@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.frames import ATTITUDE_SD, Frame
 from photogram.giant.images import IMAGE_SD, ImageFrame
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["assemble", "job_refraction"]
 
-Floats = NDArray[np.float64]
 
 LONGEST_METRES = 1e7
 """No semi-major axis in metres is longer than this; in feet all are."""

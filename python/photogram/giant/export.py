@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["adjusted_frames", "adjusted_ground", "adjusted_records", "block_files"]
 
-Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 

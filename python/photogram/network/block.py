@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.arrays import indices, length, names, shaped, shown, text, truth_value
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Refraction, metres_per_unit
 
 __all__ = ["Block"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 RECTANGULAR_COLUMNS = ("X", "Y", "Z")
 GEOGRAPHIC_COLUMNS = ("longitude_deg", "latitude_deg", "height")

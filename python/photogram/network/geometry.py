@@ -10,11 +10,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import length, shaped
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.refraction import Refraction
 
@@ -30,8 +31,6 @@ __all__ = [
     "rotation_matrix",
     "viewing_directions",
 ]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

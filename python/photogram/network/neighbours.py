@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from photogram.arguments.types import Floats, Indices
 
 __all__ = ["mutually_nearest"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 def mutually_nearest(points: Floats, predicted: Floats, limit: float) -> Indices:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.arrays import number, one_of, shaped, shown, truth_value, whole_number
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.memory import available_memory
 from photogram.network import geometry
@@ -26,8 +27,6 @@ from photogram.network.refraction import Refraction
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _HUGE = 1e12
 _TINY = 1e-3

@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from photogram.arguments.types import Indices
 
 __all__ = ["Overflow", "Structure", "structure"]
-
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

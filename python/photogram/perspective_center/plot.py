@@ -16,7 +16,8 @@ from photogram.errors import InputError
 from photogram.show.pictures import drawn, round_length
 
 if TYPE_CHECKING:
-    from photogram.perspective_center.solution import Floats, PerspectiveCenter
+    from photogram.arguments.types import Floats
+    from photogram.perspective_center.solution import PerspectiveCenter
 
 __all__ = ["draw", "figure"]
 

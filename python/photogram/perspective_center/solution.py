@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.arrays import one_of, shaped
+from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, listed
 from photogram.network.geometry import rotation_matrix
@@ -25,7 +26,6 @@ from photogram.statistics.limits import externally_studentized, studentized_limi
 
 __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]
 
-Floats = NDArray[np.float64]
 Weights = Literal["equal", "readings", "deviations"]
 
 MOST_CYCLES = 6

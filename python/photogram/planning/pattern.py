@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.adjustment.prediction import image_depths
+from photogram.arguments.types import Floats
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.planning.locations import locations
@@ -23,8 +24,6 @@ from photogram.planning.statistics import (
 from photogram.results.result import Result
 
 __all__ = ["Pattern"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

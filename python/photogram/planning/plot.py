@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.errors import PhotogramError
 
 if TYPE_CHECKING:
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from photogram.planning.pattern import Pattern
 
 __all__ = ["figure"]
-
-Floats = NDArray[np.float64]
 
 
 _PANEL = 6.0

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.arrays import standard_deviations
+from photogram.arguments.types import Floats
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.statistics.limits import GlobalTest, global_test
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from photogram import _photocore
 
 __all__ = ["AdjustedBlock", "Iteration", "SumsOfSquares"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from photogram import _photocore
 from photogram.results.report import problems_of
 
 if TYPE_CHECKING:
-    from photogram.results.adjusted import AdjustedBlock, Floats
+    from photogram.arguments.types import Floats
+    from photogram.results.adjusted import AdjustedBlock
 
 __all__ = ["to_json"]
 

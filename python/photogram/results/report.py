@@ -16,7 +16,8 @@ from photogram.statistics.outliers import Observations, outliers
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
-    from photogram.results.adjusted import AdjustedBlock, Floats
+    from photogram.arguments.types import Floats
+    from photogram.results.adjusted import AdjustedBlock
 
 __all__ = ["bandwidths", "problems_of", "report", "summary"]
 

@@ -15,7 +15,8 @@ import pandas as pd
 from photogram.network.block import ATTITUDE_COLUMNS, position_columns
 
 if TYPE_CHECKING:
-    from photogram.results.adjusted import AdjustedBlock, Floats
+    from photogram.arguments.types import Floats
+    from photogram.results.adjusted import AdjustedBlock
 
 __all__ = ["check_table", "control_table", "image_table", "photo_table", "point_table", "station_table"]
 

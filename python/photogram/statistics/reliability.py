@@ -21,13 +21,13 @@ import math
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 
 __all__ = ["ROUNDING", "TESTABLE", "largest_effect", "minimal_detectable_error", "noncentrality"]
 
-Floats = NDArray[np.float64]
 
 TESTABLE = 0.01
 """With less redundancy a gross error hides in the unknowns, and the test value repeats that of another

@@ -12,6 +12,7 @@ import orjson
 from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["BrownCamera", "PlateCamera", "camera_document"]
 
-Floats = NDArray[np.float64]
 
 _INTERIOR = NAMES[9:22]
 _BROWN = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")

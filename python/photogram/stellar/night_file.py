@@ -7,8 +7,8 @@ from collections.abc import Set
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.show.angles import ARCSEC
@@ -23,7 +23,6 @@ from photogram.stellar.tomlfile import Document, Table, pole_arcsec, read_docume
 
 __all__ = ["inputs", "read_night"]
 
-Floats = NDArray[np.float64]
 
 _TABLES = {
     "labels": ("title",),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.messages import listed
@@ -22,8 +23,6 @@ from photogram.stellar.rejection import rejected
 from photogram.stellar.tomlfile import Document, Table, pole_arcsec, read_document, site
 
 __all__ = ["inputs", "read_plain"]
-
-Floats = NDArray[np.float64]
 
 
 _OPTIONS: dict[str, Callable[[Table, str], Any]] = {

@@ -11,8 +11,8 @@ import numpy as np
 from photogram.show.angles import degrees_minutes_seconds
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import CaseResult
-    from photogram.results.adjusted import Floats
 
 __all__ = ["angle", "centred", "nearest", "number", "triangle"]
 

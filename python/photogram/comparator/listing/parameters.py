@@ -13,9 +13,9 @@ from photogram.comparator.polynomial import TERMS
 from photogram.show.angles import ARCSEC
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration, CaseResult
     from photogram.comparator.combined import SinglePolynomial
-    from photogram.results.adjusted import Floats
 
 __all__ = [
     "case_linear_page",

@@ -13,9 +13,9 @@ from photogram.show.pictures import round_length
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
     from photogram.comparator.polynomial import Polynomial
-    from photogram.results.adjusted import Floats
 
 __all__ = ["correction_surface", "distorted_grid"]
 

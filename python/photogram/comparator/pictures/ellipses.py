@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
     from photogram.comparator.pointing import Ellipse, Precision
-    from photogram.results.adjusted import Floats
 
 __all__ = ["operator_ellipses", "pointing_ellipses", "pooled_ellipses", "total_ellipses"]
 

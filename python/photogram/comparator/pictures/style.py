@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from photogram.results.adjusted import Floats
+    from photogram.arguments.types import Floats
 
 __all__ = ["ACCENT", "FAINT", "MAIN", "arrows", "key", "new_figure", "panels", "plain"]
 

@@ -24,8 +24,8 @@ from photogram.show.pictures import round_length
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
-    from photogram.results.adjusted import Floats
 
 __all__ = ["average_vectors", "comparator_vectors", "grid_vectors", "joint_grid"]
 

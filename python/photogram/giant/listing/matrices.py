@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import exponential
-from photogram.results.adjusted import Floats
 
 __all__ = ["MATRIX", "matrix_rows"]
 

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import VALUE, Space
 from photogram.giant.listing.matrices import MATRIX, matrix_rows
 from photogram.giant.listing.pages import Page, headed, paginate
 from photogram.giant.listing.summaries import counts_and_rms
-from photogram.results.adjusted import Floats
 
 __all__ = ["point_pages", "propagated_point_pages"]
 
