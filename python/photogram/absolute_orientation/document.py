@@ -14,6 +14,7 @@ from photogram.absolute_orientation.oriented import OrientedModel
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io import json
 from photogram.io.files import read_bytes
 from photogram.statistics.limits import GlobalTest
 
@@ -22,13 +23,12 @@ __all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
 
 def to_json(result: OrientedModel) -> bytes:
     """Return the whole result as JSON (UTF-8); its points are the stations without control."""
-    return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}"])
+    return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}\n"])
 
 
 def without_points(result: OrientedModel) -> Iterator[bytes]:
     """Return the document up to the first of its points, so that any number of them can follow."""
-    head = orjson.dumps(_head(result), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
-    yield head.removesuffix(b"\n}")
+    yield json.to_json(_head(result)).removesuffix(b"\n}\n")
     yield b',\n  "points": ['
 
 

@@ -126,7 +126,7 @@ def transform_file(
         if not done:
             raise InputError("holds no points", file=source)
         if json:
-            json.write(b"\n  ]\n}")
+            json.write(b"\n  ]\n}\n")
     return done
 
 

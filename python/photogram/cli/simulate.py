@@ -101,7 +101,8 @@ def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[
 def _truth(simulation: Simulation) -> bytes:
     """Make the document of what is true in a simulated block."""
     import numpy as np
-    import orjson
+
+    from photogram.io import json
 
     truth, blunders = simulation.truth, simulation.blunders
     degrees = np.array([math.degrees(1), math.degrees(1), 1.0]) if truth.geographic else np.ones(3)
@@ -138,4 +139,4 @@ def _truth(simulation: Simulation) -> bytes:
             for row, amount in zip(blunders.images.tolist(), blunders.amounts.tolist(), strict=True)
         ],
     }
-    return orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+    return json.to_json(document)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import orjson
 
 from photogram import _photocore
 from photogram.collection.collection import PARAMETERS
 from photogram.collection.solution import CollectionSolution
+from photogram.io import json
 
 __all__ = ["to_json"]
 
 
 def to_json(result: CollectionSolution) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""
-    return orjson.dumps(_document(result), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
+    return json.to_json(_document(result))
 
 
 def _document(result: CollectionSolution) -> dict[str, Any]:

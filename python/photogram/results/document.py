@@ -6,9 +6,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import orjson
 
 from photogram import _photocore
+from photogram.io import json
 from photogram.results.report import problems_of
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ __all__ = ["to_json"]
 
 def to_json(result: AdjustedBlock) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""
-    return orjson.dumps(_document(result), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
+    return json.to_json(_document(result))
 
 
 def _document(result: AdjustedBlock) -> dict[str, Any]:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN, MM, key, new_figure, panels, plain
+from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN, MM, key, panels, plain
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
-from photogram.show.pictures import round_length
+from photogram.show.pictures import new_figure, round_length
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,11 +15,10 @@ from photogram.comparator.pictures.style import (
     arrows,
     key,
     magnification,
-    new_figure,
     panels,
     plain,
 )
-from photogram.show.pictures import round_length
+from photogram.show.pictures import new_figure, round_length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
