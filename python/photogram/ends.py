@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["behind", "rounded", "undetermined"]
 
-NOTABLE_EXCESS = 1e-4
+NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
 
 
