@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjusted import Iteration
-from photogram.adjustment import Ordering, Progress, core_threads, teller
+from photogram.adjustment.adjustment import Ordering, Progress, core_threads, teller
+from photogram.adjustment.ends import rounded
+from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
-from photogram.ends import rounded
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory
 from photogram.messages import Message, listed
-from photogram.robust import Loss, loss_row, remark
+from photogram.results.adjusted import Iteration
 
 __all__ = ["adjust"]
 

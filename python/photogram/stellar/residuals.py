@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Bools, Floats
 from photogram.stellar.problem import Problem
 from photogram.stellar.reduction import Reduced, log_determinant
 from photogram.stellar.state import Solved
 
 __all__ = ["complete"]
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 def complete(
