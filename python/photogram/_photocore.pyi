@@ -423,6 +423,13 @@ class BlockSolution:
         """
 
     @property
+    def redundancy_excess(self) -> float | None:
+        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
+
+        None without cofactors, and with a loss.
+        """
+
+    @property
     def weak(self) -> list[tuple[int, int]]:
         """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
 
@@ -1297,6 +1304,13 @@ class CollectionSolution:
     @property
     def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
         """Why there are no cofactors although they were asked for, as in :class:`CollectionError`."""
+
+    @property
+    def redundancy_excess(self) -> float | None:
+        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
+
+        None without cofactors, and with a loss.
+        """
 
     @property
     def counts(self) -> tuple[int, int, int]:

@@ -137,6 +137,7 @@ fn redundancy_numbers_sum_to_the_degrees_of_freedom_from_free_to_fixed() {
         assert_eq!(adjusted.status, Status::Converged);
         let counts = adjusted.counts;
         let fixed = if sd == 0.0 { DATUM.len() } else { 0 };
+        assert!(adjusted.redundancy_excess.unwrap().abs() < 1e-9);
         assert_eq!(counts.observations, 2 * POINTS * FRAMES);
         assert_eq!((counts.weighted, counts.unknowns), (6 - fixed, UNKNOWNS - fixed));
         let redundancy = adjusted.redundancy.unwrap().iter().sum::<f64>()

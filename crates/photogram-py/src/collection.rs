@@ -258,6 +258,11 @@ impl CollectionSolution {
     }
 
     #[getter]
+    fn redundancy_excess(&self) -> Option<f64> {
+        self.solution.adjustment.redundancy_excess
+    }
+
+    #[getter]
     fn counts(&self) -> (usize, usize, usize) {
         let counts = self.solution.adjustment.counts;
         (counts.observations, counts.weighted, counts.unknowns)

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.ends import behind, undetermined
+from photogram.adjustment.ends import behind, rounded, undetermined
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
@@ -276,7 +276,8 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     for point, reason in solution.dropped:
         by_reason.setdefault(reason, []).append(block.point_ids[point])
     error = None if solution.undetermined is None else _named(block, *solution.undetermined)
-    messages = undetermined(block, solution, error) + behind(block, solution)
+    messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
+    messages += behind(block, solution)
     messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
     held = np.isfinite(block.point_sd) & (solution.point_rays > 0)[:, np.newaxis]
     if not held.any() and not (block.photo_position_sd == 0).all():

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from photogram import _photocore
     from photogram.errors import AdjustmentError
 
-__all__ = ["behind", "undetermined"]
+__all__ = ["behind", "rounded", "undetermined"]
+
+NOTABLE_EXCESS = 1e-5
+"""Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
 
 
 def undetermined(
@@ -37,6 +40,25 @@ def undetermined(
             )
         )
     return messages
+
+
+def rounded(excess: float | None) -> list[Message]:
+    """Remark on cofactors and redundancy numbers that rounding has reached.
+
+    Parameters
+    ----------
+    excess
+        Sum of all redundancy numbers minus the degrees of freedom; None where it is not known.
+    """
+    if excess is None or abs(excess) <= NOTABLE_EXCESS:
+        return []
+    return [
+        Message(
+            f"the redundancy numbers sum to the degrees of freedom only within {abs(excess):.1g}: the network"
+            " holds together so weakly that standard deviations and test values lose digits to rounding, and"
+            " are about as wrong"
+        )
+    ]
 
 
 def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:

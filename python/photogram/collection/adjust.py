@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Ordering, Progress, core_threads, teller
+from photogram.adjustment.ends import rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
@@ -150,6 +151,7 @@ def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
     if solution.undetermined is not None:
         error = _named(*solution.undetermined)
         messages.append(Message(f"there are no covariances: {error}"))
+    messages += rounded(solution.redundancy_excess)
     if (solution.photo_images == 0).any():
         messages.append(
             Message(f"left as they are, photos without image points: {_numbers(solution.photo_images == 0)}")
