@@ -247,6 +247,7 @@ impl Collection {
                 images,
                 images_of: used.start.clone(),
                 images_on: used.images_on.clone(),
+                free: points().map(|point| point.sd == [f64::INFINITY; 3]).collect(),
                 placed,
             },
         })
