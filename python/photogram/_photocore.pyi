@@ -1111,7 +1111,10 @@ class StellarProblem:
         """Right ascension and declination (m, 2) of every image at the initial values."""
 
 class CollectionError(Exception):
-    """A collection cannot be adjusted: (kind, message, photos of each combination, points)."""
+    """A collection cannot be adjusted: (kind, message, photos of each combination, points).
+
+    The kinds are those of :class:`BlockError`, without `no intersection`.
+    """
 
 def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     """Read the numbers of a text, separated by white space, up to the first word that is not a finite number.

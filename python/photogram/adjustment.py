@@ -14,7 +14,7 @@ from photogram import _photocore
 from photogram.adjusted import Iteration
 from photogram.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.block import Block, checked
-from photogram.ends import behind, undetermined
+from photogram.ends import behind, too_coarse, undetermined
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory, threads_that_fit, turned
 from photogram.messages import Message, listed
@@ -312,20 +312,10 @@ def _named(
     if kind == "no intersection":
         return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
     if kind == "coarse":
-        return _coarse([block.photo_ids[i] for i in photos[0]], point_names)
+        return too_coarse([block.photo_ids[i] for i in photos[0]], point_names)
     if kind == "memory":
         return OutOfMemoryError(message)
     return AdjustmentError(message)
-
-
-def _coarse(photos: list[str], points: list[str]) -> AdjustmentError:
-    """Name photos and points whose values double precision rounds too coarsely."""
-    parts = [f"{kind} {listed(names)}" for kind, names in (("photos", photos), ("points", points)) if names]
-    return AdjustmentError(
-        f"coordinates or angles of the {' and the '.join(parts)} are so large that double precision rounds"
-        " them by more than their standard deviations, or than image coordinates show: count from an origin"
-        " nearby (a standard deviation of 0 fixes a value)"
-    )
 
 
 def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankError:

@@ -1,4 +1,4 @@
-"""How an adjustment of a block ended, where a reader must be careful: remarks with the names concerned."""
+"""How an adjustment ended, where a reader must be careful: remarks and errors with the names concerned."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.block import ATTITUDE_COLUMNS, Block, position_columns
+from photogram.errors import AdjustmentError
 from photogram.messages import Message, listed
 
 if TYPE_CHECKING:
     from photogram import _photocore
-    from photogram.errors import AdjustmentError
 
-__all__ = ["behind", "undetermined"]
+__all__ = ["behind", "too_coarse", "undetermined"]
 
 
 def undetermined(
@@ -49,3 +49,13 @@ def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     count = "1 image point has its" if len(images) == 1 else f"{len(images)} image points have their"
     text = f"{count} point behind the camera: points {listed(points)} on photos {listed(photos)}"
     return [Message(text)]
+
+
+def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:
+    """Name photos and points whose values double precision rounds too coarsely."""
+    parts = [f"{kind} {listed(names)}" for kind, names in (("photos", photos), ("points", points)) if names]
+    return AdjustmentError(
+        f"coordinates or angles of the {' and the '.join(parts)} are so large that double precision rounds"
+        " them by more than their standard deviations, or than image coordinates show: count from an origin"
+        " nearby (a standard deviation of 0 fixes a value)"
+    )

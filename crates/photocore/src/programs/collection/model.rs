@@ -11,7 +11,8 @@ use crate::normals::GroupRows;
 const NEAR: f64 = 1e8;
 /// A point a hundred times nearer than the others is on its way there,
 const ON_ITS_WAY: f64 = 1e4;
-/// when no other photo tells it from the station: their images there are closer than so many standard deviations.
+/// when no other photo tells it from the station: their images there, before and after a step, are closer than so many standard
+/// deviations.
 const SAME_PLACE: f64 = 3.0;
 
 /// Images by photos with nine unknowns each.
@@ -73,14 +74,17 @@ impl Bundle {
         (0..self.points).flat_map(of_point).collect()
     }
 
-    /// Whether nothing but its image on that photo tells a point from the station it is near to.
-    fn is_same_place(&self, near: &Approach, stations: &Stations) -> bool {
-        let centre = stations.photos[near.photo].centre();
+    /// Whether nothing but its image on that photo tells a point from the station it is near to, a step having changed nothing in that.
+    fn is_same_place(&self, near: &Approach, before: &Stations, after: &Stations) -> bool {
         let is_same = |image: &Image| {
-            let photo = &stations.photos[image.photo];
-            let (own, station) =
-                (photo.linearize(&stations.points[near.point]).xy, photo.linearize(&centre).xy);
-            (0..2).all(|k| (own[k] - station[k]).abs() < SAME_PLACE * image.sd[k])
+            let images = [before, after].map(|stations| {
+                let places = [stations.points[near.point], stations.photos[near.photo].centre()];
+                places.map(|place| stations.photos[image.photo].linearize(&place).xy)
+            });
+            let [.., station] = images[1];
+            let is_close =
+                |xy: &[f64; 2]| (0..2).all(|k| (xy[k] - station[k]).abs() < SAME_PLACE * image.sd[k]);
+            images.as_flattened().iter().all(is_close)
         };
         let mut elsewhere =
             self.images_of(near.point).iter().filter(|image| image.photo != near.photo).peekable();
@@ -115,24 +119,16 @@ impl Model for Bundle {
         }
     }
 
-    /// Points that have run into a station, or are on their way there before and after the step: two rays that meet there ask for it.
+    /// Points that have run into a station, or are on their way there: two rays that meet there ask for it.
     fn collapsed(&self, before: &[f64], after: &[f64]) -> Vec<usize> {
         let stations = self.prepare(after);
-        let near = self.approaches(&stations);
-        if near.is_empty() {
-            return vec![];
+        let mut near = self.approaches(&stations);
+        if !near.is_empty() {
+            let stations_before = self.prepare(before);
+            near.retain(|near| near.share > NEAR || self.is_same_place(near, &stations_before, &stations));
         }
-        let stations_before = self.prepare(before);
-        let near_before = self.approaches(&stations_before);
-        let has_been_near = |now: &Approach| {
-            let is_same = |then: &Approach| (then.point, then.photo) == (now.point, now.photo);
-            near_before.iter().any(|then| is_same(then) && self.is_same_place(then, &stations_before))
-        };
-        let is_lost =
-            |now: &&Approach| now.share > NEAR || self.is_same_place(now, &stations) && has_been_near(now);
-        let mut lost: Vec<usize> = near.iter().filter(is_lost).map(|now| now.point).collect();
-        lost.dedup();
-        lost
+        near.dedup_by_key(|near| near.point);
+        near.iter().map(|near| near.point).collect()
     }
 
     /// Rotation and translation of the first photo, and the component of a translation that changes most when the scale does.
