@@ -597,6 +597,10 @@ class ResectionSolution:
         """(n, 2, 6) partials of x and y with respect to position and attitude, at the solution."""
 
     @property
+    def points_behind(self) -> _Indices:
+        """Indices of the points that stand behind the camera, ascending."""
+
+    @property
     def sum_of_squares(self) -> float:
         """Weighted sum of squares."""
 

@@ -13,7 +13,7 @@ from photogram.messages import Message, listed
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["behind", "too_coarse", "undetermined"]
+__all__ = ["behind", "hidden", "too_coarse", "undetermined"]
 
 
 def undetermined(
@@ -40,15 +40,28 @@ def undetermined(
 
 
 def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Remark on image points whose point stands behind the camera: no ray can have made them."""
+    """Remark on image points whose point stands behind the camera."""
     images = solution.images_behind
-    if not images.size:
-        return []
     points = [block.point_ids[point] for point in np.unique(block.image_points[images])]
     photos = [block.photo_ids[photo] for photo in np.unique(block.image_photos[images])]
-    count = "1 image point has its" if len(images) == 1 else f"{len(images)} image points have their"
-    text = f"{count} point behind the camera: points {listed(points)} on photos {listed(photos)}"
-    return [Message(text)]
+    return hidden(len(images), points, photos)
+
+
+def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:
+    """Remark on image points whose point stands behind the camera: no ray can have made them.
+
+    Parameters
+    ----------
+    images
+        How many there are; zero for no remark.
+    points, photos
+        Names of what is concerned; no photos where there is one only.
+    """
+    if not images:
+        return []
+    count = "1 image point has its" if images == 1 else f"{images} image points have their"
+    on = f" on photos {listed(photos)}" if photos else ""
+    return [Message(f"{count} point behind the camera: points {listed(points)}{on}")]
 
 
 def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:

@@ -67,7 +67,7 @@ def test_a_point_that_other_photos_tell_from_the_station_stays():
     extra = [0, 3, 4, 5]
     others = collection.image_points != WRONG
     known = collection.replace(
-        point_positions=np.vstack([collection.point_positions[:WRONG], near + [0.01, 0.01, 0.01]]),
+        point_positions=np.vstack([collection.point_positions[:WRONG], near + 0.01]),
         image_photos=np.append(collection.image_photos[others], extra),
         image_points=np.append(collection.image_points[others], [WRONG] * 4),
         image_xy=np.vstack(

@@ -58,9 +58,9 @@ def test_all_values_large_against_what_images_show_are_named():
     parameters[:, :3] = 0.0
     parameters[:, 3] -= 1e17
     shifted = COLLECTION.replace(
-        photo_parameters=parameters, point_positions=COLLECTION.point_positions + [1e17, 0.0, 0.0]
+        photo_parameters=parameters, point_positions=COLLECTION.point_positions + np.array([1e17, 0.0, 0.0])
     )
-    with pytest.raises(AdjustmentError, match="photos .* and the points .*: count from an origin"):
+    with pytest.raises(AdjustmentError, match=r"photos .* and the points .*: count from an origin"):
         adjust(shifted)
 
 

@@ -13,7 +13,7 @@ from photogram.adjusted import Iteration
 from photogram.adjustment import Ordering, Progress, core_threads, teller
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
-from photogram.ends import too_coarse
+from photogram.ends import hidden, too_coarse
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory
 from photogram.messages import Message, listed
@@ -165,9 +165,8 @@ def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
         out[solution.collapsed] = False
     if out.any():
         messages.append(Message(f"left out, points with images on fewer than two photos: {_numbers(out)}"))
-    if solution.point_rays_behind.any():
-        rays, names = solution.point_rays_behind.sum(), _numbers(solution.point_rays_behind > 0)
-        messages.append(Message(f"{rays} image points have their point behind the camera: points {names}"))
+    behind = solution.point_rays_behind
+    messages += hidden(int(behind.sum()), [str(point) for point in np.flatnonzero(behind)], [])
     if solution.datum:
         held = ", ".join(f"{PARAMETERS[parameter]} of photo {photo}" for photo, parameter in solution.datum)
         messages.append(Message(f"nothing gives a datum; covariances hold for fixed {held}"))
