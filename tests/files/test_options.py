@@ -82,7 +82,7 @@ def test_a_former_name_does_its_work_and_says_what_is_written_now(run, tmp_path,
         assert (tmp_path / file).read_bytes() in [path.read_bytes() for path in (tmp_path / "x").iterdir()]
 
 
-def test_quiet_keeps_remarks_on_former_names(run, tmp_path):
+def test_quiet_silences_remarks_on_former_names(run, tmp_path):
     done = run("absolute-orientation", "--example", "--listing", "x.txt", "--quiet")
     assert (done.exit_code, done.output) == (0, "")
     assert (tmp_path / "x.txt").is_file()
