@@ -133,7 +133,7 @@ def test_closed_streams(tmp_path):
         check=False,
     )
     assert done.returncode == 0
-    assert (tmp_path / "j").read_bytes().endswith(b"}")
+    assert (tmp_path / "j").read_bytes().endswith(b"}\n")
     assert (tmp_path / "j").read_bytes().startswith(b"{")
 
 

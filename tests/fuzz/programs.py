@@ -111,11 +111,9 @@ def _check(place: Path, rng: Random, quiet: bool) -> list[str]:
 
 
 def _collection(place: Path, rng: Random, quiet: bool) -> list[str]:
-    ending = rng.choice(("", ".gz", ".bz2"))
     collection.collection(
         problem=place / "in" / "input",
-        out=place / f"adjusted{ending}",
-        report=place / "report.txt",
+        out=place / "out",
         json=place / "result.json",
         loss=rng.choice(list(collection.Loss)),
         sd=rng.choice((1.0, 0.1)),
@@ -124,14 +122,14 @@ def _collection(place: Path, rng: Random, quiet: bool) -> list[str]:
         threads=1,
         quiet=quiet,
     )
-    return [f"adjusted{ending}", "report.txt", "result.json"]
+    return ["out/adjusted.txt", "out/report.txt", "result.json"]
 
 
 def _orientation(place: Path, rng: Random, quiet: bool) -> list[str]:
     absolute_orientation.absolute_orientation(
         file=place / "in" / "input",
         json=place / "result.json",
-        listing=place / "listing.txt",
+        out=place / "out",
         reject=["S1"] if rng.random() < 0.1 else None,
         method=rng.choices(list(absolute_orientation.Method), (6, 1, 1))[0],
         start=rng.choice((None, None, *absolute_orientation.Start)),
@@ -139,7 +137,7 @@ def _orientation(place: Path, rng: Random, quiet: bool) -> list[str]:
         zero_missing=rng.random() < 0.2,
         quiet=quiet,
     )
-    return ["result.json", "listing.txt"]
+    return ["result.json", "out/report.txt"]
 
 
 def _transform(place: Path, rng: Random, quiet: bool) -> list[str]:
@@ -158,12 +156,12 @@ def _perspective(place: Path, rng: Random, quiet: bool) -> list[str]:
     perspective_center.perspective_center(
         deck=place / "in" / "grid.deck",
         json=place / "result.json",
-        listing=place / "listing.txt",
+        out=place / "out",
         as_published=rng.random() < 0.3,
         weights=rng.choice(list(perspective_center.Weights)),
         quiet=quiet,
     )
-    return ["result.json", "listing.txt"]
+    return ["result.json", "out/listing.txt"]
 
 
 def _tables(place: Path, rng: Random, quiet: bool) -> list[str]:
@@ -199,7 +197,7 @@ def _correct(place: Path, rng: Random, quiet: bool) -> list[str]:
     comparator.correct(
         correction=source / "correction.json",
         measurements=source / "points.csv",
-        out=place / "out.csv",
+        corrected=place / "out.csv",
         invert=rng.random() < 0.5,
     )
     return ["out.csv"]

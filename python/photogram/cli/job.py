@@ -310,14 +310,14 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
 
 def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
     """Refuse a value that says nothing; remark on an option that is about to go."""
-    value = values[parameter.name]
+    value = values.get(parameter.name, parameter.default)
     metadata = get_args(parameter.annotation)[1:]
     if isinstance(value, int) and abs(value) > LARGEST:
         raise typer.BadParameter("is too large", param_hint=_option(parameter))
     for mark in metadata:
         if isinstance(mark, Former) and value != parameter.default and not values.get("quiet"):
             print_remark(f"{_option(parameter)} will go: {mark.now}")
-        if isinstance(mark, ArgumentInfo) and "example" in values and values["example"] == bool(value):
+        if isinstance(mark, ArgumentInfo) and values.get("example") == bool(value):
             raise typer.BadParameter(f"give {mark.metavar}, or --example", param_hint=mark.metavar)
 
 
