@@ -6,7 +6,6 @@ catalogue places while the parameters are iterated, and the change of refraction
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
