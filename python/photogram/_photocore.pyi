@@ -1089,7 +1089,7 @@ class StellarProblem:
         """
 
     def without_effect(self) -> list[int]:
-        """Find the parameters, by index, that no image, no weight and not the axis touches at the initial values.
+        """Find the parameters, by index, that no image, no weight and not the axis touches.
 
         Parameters that are held are not among them.
 
