@@ -319,7 +319,8 @@ def adjust_block(
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
     threads
-        Number of threads, no more than four for each processor; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
+        the calling thread, larger work has all processors.
     memory
         Bytes that the adjustment may take; None for any number.
     progress
@@ -419,6 +420,13 @@ class BlockSolution:
         """What the adjusted values leave undetermined, as in a :class:`BlockError`: there are no cofactors.
 
         None where everything is determined.
+        """
+
+    @property
+    def redundancy_excess(self) -> float | None:
+        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
+
+        None without cofactors, and with a loss.
         """
 
     @property
@@ -785,7 +793,7 @@ def orient_model(
     tolerance
         Fraction of its standard deviation by which no unknown changes any more (rigorous method).
     threads
-        Number of threads; 0 for all processors.
+        Number of threads; 0 leaves it to the core (see `adjust_block`).
     trace
         Whether the report's methods keep what each cycle computed on its way.
 
@@ -1248,7 +1256,8 @@ def adjust_collection(
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     threads
-        Number of threads, no more than four for each processor; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
+        the calling thread, larger work has all processors.
     memory
         Bytes that the adjustment may take; None for any number.
     progress
@@ -1356,6 +1365,13 @@ class CollectionSolution:
     @property
     def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
         """Why there are no cofactors although they were asked for, as in :class:`CollectionError`."""
+
+    @property
+    def redundancy_excess(self) -> float | None:
+        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
+
+        None without cofactors, and with a loss.
+        """
 
     @property
     def counts(self) -> tuple[int, int, int]:

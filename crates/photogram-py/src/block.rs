@@ -1,21 +1,17 @@
 //! Block triangulation; its documentation is in `_photocore.pyi`.
 
-use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
-
 use numpy::PyReadonlyArrayDyn;
-use photocore::adjustment::{Criterion, Event, Options as AdjustmentOptions, Phase};
+use photocore::adjustment::{Criterion, Options as AdjustmentOptions};
 use photocore::programs::block::{Block, Image, Options, Photo, Point, UnitVariance};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
-use rayon::ThreadPool;
 
 use crate::arrays::{check_lengths, indices, numbers, rows};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
-use crate::memory;
 use crate::options::{named_loss, named_ordering, unknown};
-use crate::solution::{BlockSolution, failure, iteration_row};
+use crate::solution::{BlockSolution, failure};
+use crate::work::{Workers, watched};
 
 create_exception!(
     _photocore,
@@ -140,81 +136,7 @@ fn run(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BlockSolution> {
-    let solution = watched(py, threads, progress, |pool, watch| block.adjust(options, pool, watch))?;
+    let workers = Workers::of(threads, block.images.len());
+    let solution = watched(py, workers, progress, |pool, watch| block.adjust(options, pool, watch))?;
     solution.map(BlockSolution::new).map_err(|error| BlockError::new_err(failure(&error)))
-}
-
-/// Works without the GIL. Signals and the caller's `progress` are looked after now and then, on this thread.
-pub fn watched<T: Send, E: Send>(
-    py: Python<'_>,
-    threads: usize,
-    progress: Option<Py<PyAny>>,
-    work: impl FnOnce(&ThreadPool, &mut dyn FnMut(Event) -> ControlFlow<()>) -> Result<T, E> + Send,
-) -> PyResult<Result<T, E>> {
-    let pool = pool(threads)?;
-    let mut raised = None;
-    let mut last = Instant::now();
-    let mut watch = |event: Event| {
-        if memory::failed() {
-            return ControlFlow::Break(());
-        }
-        let due = matches!(event, Event::Iteration(_)) || last.elapsed() > PATIENCE;
-        if !due {
-            return ControlFlow::Continue(());
-        }
-        last = Instant::now();
-        match Python::attach(|py| tell(py, progress.as_ref(), event)) {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(error) => {
-                raised = Some(error);
-                ControlFlow::Break(())
-            }
-        }
-    };
-    let done = py.detach(|| work(&pool, &mut watch));
-    match raised {
-        Some(error) => Err(error),
-        None if done.is_err() && memory::failed() => Err(memory::failure()),
-        None => {
-            // What is made of the result needs a reserve again.
-            memory::arm()?;
-            Ok(done)
-        }
-    }
-}
-
-/// Threads for each processor at the most: more only wait for each other, and thousands of them take minutes to start.
-const THREADS_EACH: usize = 4;
-
-/// So many threads, and no more than are of use; 0 for all processors.
-pub fn pool(threads: usize) -> PyResult<ThreadPool> {
-    memory::arm()?;
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.min(THREADS_EACH * processors)).build();
-    pool.map_err(|error| memory::exhausted(&format!("threads cannot be started: {error}")))
-}
-
-/// Between two looks at signals and progress.
-const PATIENCE: Duration = Duration::from_millis(50);
-
-fn tell(py: Python<'_>, progress: Option<&Py<PyAny>>, event: Event) -> PyResult<()> {
-    py.check_signals()?;
-    let Some(progress) = progress else { return Ok(()) };
-    match event {
-        Event::Progress { phase, done, total } => {
-            progress.call1(py, (phase_name(phase), done, total, None::<()>))
-        }
-        Event::Iteration(iteration) => {
-            progress.call1(py, ("iteration", iteration.number, 0, Some(iteration_row(&iteration))))
-        }
-    }
-    .map(drop)
-}
-
-fn phase_name(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Form => "form",
-        Phase::Solve => "solve",
-        Phase::Invert => "invert",
-    }
 }

@@ -11,11 +11,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{check_lengths, indices, rows, squares, table};
-use crate::block::watched;
 use crate::options::{named_loss, named_ordering};
 use crate::solution::{
     IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
 };
+use crate::work::{Workers, watched};
 
 create_exception!(
     _photocore,
@@ -112,7 +112,8 @@ fn adjust_collection(
         ordering: named_ordering(ordering)?,
         memory,
     };
-    let solution = watched(py, threads, progress, |pool, watch| collection.adjust(&options, pool, watch))?;
+    let workers = Workers::of(threads, collection.images.len());
+    let solution = watched(py, workers, progress, |pool, watch| collection.adjust(&options, pool, watch))?;
     solution.map(|solution| CollectionSolution { solution }).map_err(|error| match error {
         Failure::Index(_) => PyValueError::new_err(error.to_string()),
         error => CollectionError::new_err(failure(&error)),
@@ -254,6 +255,11 @@ impl CollectionSolution {
     #[getter]
     fn undetermined(&self) -> Option<FailureRow> {
         self.solution.undetermined.as_ref().map(failure)
+    }
+
+    #[getter]
+    fn redundancy_excess(&self) -> Option<f64> {
+        self.solution.adjustment.redundancy_excess
     }
 
     #[getter]

@@ -12,6 +12,7 @@ mod resection;
 mod similarity;
 mod solution;
 mod stellar;
+mod work;
 
 use pyo3::prelude::*;
 

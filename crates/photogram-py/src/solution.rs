@@ -141,6 +141,11 @@ impl BlockSolution {
     }
 
     #[getter]
+    fn redundancy_excess(&self) -> Option<f64> {
+        self.solution.adjustment.redundancy_excess
+    }
+
+    #[getter]
     fn weak(&self) -> Vec<(usize, usize)> {
         self.solution.weak.clone()
     }

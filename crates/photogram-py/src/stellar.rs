@@ -13,8 +13,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{check_lengths, indices, matrices, numbers, rows, squares, table};
-use crate::block::watched;
 use crate::solution::iteration_row;
+use crate::work::{Watch, Workers, watched};
 
 create_exception!(
     _photocore,
@@ -268,10 +268,10 @@ impl StellarProblem {
             unit,
             whole,
         };
-        let work = |pool: &rayon::ThreadPool, watch: &mut dyn FnMut(_) -> _| {
-            self.calibration.adjust(&options, pool, watch)
-        };
-        let solution = watched(py, threads, progress, work)?.map_err(|error| failure(&error))?;
+        let work =
+            |pool: &rayon::ThreadPool, watch: Watch<'_>| self.calibration.adjust(&options, pool, watch);
+        let solution = watched(py, Workers::of(threads, self.calibration.images.len()), progress, work)?
+            .map_err(|error| failure(&error))?;
         let found = observations(py, solution.observations)?;
         let status = match solution.adjustment.status {
             Status::Converged => "converged",

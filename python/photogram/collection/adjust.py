@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjusted import Iteration
-from photogram.adjustment import Ordering, Progress, core_threads, teller
+from photogram.adjustment.adjustment import Ordering, Progress, core_threads, teller
+from photogram.adjustment.ends import rounded
+from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory
 from photogram.messages import Message, listed
-from photogram.robust import Loss, loss_row, remark
+from photogram.results.adjusted import Iteration
 
 __all__ = ["adjust"]
 
@@ -150,6 +151,7 @@ def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
     if solution.undetermined is not None:
         error = _named(*solution.undetermined)
         messages.append(Message(f"there are no covariances: {error}"))
+    messages += rounded(solution.redundancy_excess)
     if (solution.photo_images == 0).any():
         messages.append(
             Message(f"left as they are, photos without image points: {_numbers(solution.photo_images == 0)}")

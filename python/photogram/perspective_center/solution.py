@@ -12,20 +12,20 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arrays import one_of, shaped
+from photogram.adjustment.resection import Observed, solve
+from photogram.arguments.arrays import one_of, shaped
+from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError
-from photogram.geometry import rotation_matrix
 from photogram.messages import Message, listed
+from photogram.network.geometry import rotation_matrix
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
-from photogram.resection import Observed, solve
-from photogram.statistics import externally_studentized, studentized_limit
+from photogram.statistics.limits import externally_studentized, studentized_limit
 
 __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]
 
-Floats = NDArray[np.float64]
 Weights = Literal["equal", "readings", "deviations"]
 
 MOST_CYCLES = 6

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.stellar import published, strict
 from photogram.stellar.parameters import GROUPS, NAMES
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from photogram.stellar.state import Solved
 
 __all__ = ["combine", "constraints", "modify"]
-
-Floats = NDArray[np.float64]
 
 
 def constraints(pairs: tuple[tuple[str, str], ...], parameters: int) -> Floats:

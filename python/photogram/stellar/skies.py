@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import available_memory
 from photogram.messages import listed
@@ -35,8 +36,6 @@ __all__ = [
     "stars_near",
 ]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 _STILL = Earth()
 _SLACK = math.radians(2.0)
 _PER_IMAGE = 2000
