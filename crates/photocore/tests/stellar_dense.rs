@@ -49,7 +49,8 @@ fn night(held: bool) -> Calibration {
     let star = |k: usize| Star {
         place: place(k),
         catalogue: place(k),
-        weight: (!held && k > 0).then_some([[catalogue, -0.4 * catalogue], [-0.4 * catalogue, 0.8 * catalogue]]),
+        weight: (!held && k > 0)
+            .then_some([[catalogue, -0.4 * catalogue], [-0.4 * catalogue, 0.8 * catalogue]]),
         fixed: held,
     };
     let free = [1, 2, 3, 4, 7].map(|k| 3 * ATTITUDES + k);
@@ -89,9 +90,8 @@ fn adjusted(calibration: &Calibration) -> Result<Solution, StellarError> {
     let criterion = Criterion::Fraction(1e-9);
     let adjustment = AdjustmentOptions { criterion, max_iterations: 50, covariance: true, loss: None };
     let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    calibration.adjust(&Options { adjustment, unit: 1.0, whole: true }, &pool, &mut |_| {
-        ControlFlow::Continue(())
-    })
+    calibration
+        .adjust(&Options { adjustment, unit: 1.0, whole: true }, &pool, &mut |_| ControlFlow::Continue(()))
 }
 
 /// Rows of R A and R l, R from the left Cholesky factor of the weights.
@@ -135,10 +135,14 @@ fn dense(calibration: &Calibration, solution: &Solution) -> Dense {
         found.add(image.weight, spread(&rows, image.pointing, Some(image.star)), rows.constant);
     }
     for (k, star) in at.stars.iter().enumerate() {
-        let unit = |i: usize| (0..2 * STARS + 3 * ATTITUDES + COMMON).map(|j| f64::from(u8::from(j == 2 * k + i)));
+        let unit = |i: usize| {
+            let mut row = vec![0.0; 2 * STARS + 3 * ATTITUDES + COMMON];
+            row[2 * k + i] = 1.0;
+            row
+        };
         let off = [0, 1].map(|i| star.catalogue[i] - star.place[i]);
         if let Some(weight) = star.weight {
-            found.add(weight, [unit(0).collect(), unit(1).collect()], off);
+            found.add(weight, [unit(0), unit(1)], off);
         }
     }
     if let (Some(axis), Some(rows)) = (at.axis, at.axis_equations().unwrap()) {
@@ -200,7 +204,10 @@ fn weights_of_stars_and_parameters_and_the_axis_are_those_of_a_dense_adjustment(
     // Redundancy numbers: 1 - a Q a^T of every row.
     let share = |row: usize| {
         let a: Vec<f64> = own.iter().map(|&column| rows[row][column]).collect();
-        (0..own.len()).flat_map(|i| (0..own.len()).map(move |j| (i, j))).map(|(i, j)| a[i] * q(i, j) * a[j]).sum()
+        (0..own.len())
+            .flat_map(|i| (0..own.len()).map(move |j| (i, j)))
+            .map(|(i, j)| a[i] * q(i, j) * a[j])
+            .sum()
     };
     let observed = &solution.observations;
     let numbers: Vec<f64> = (observed.image_tests.iter().chain(&observed.place_tests[1..]))
