@@ -605,6 +605,10 @@ class ResectionSolution:
         """(n, 2, 6) partials of x and y with respect to position and attitude, at the solution."""
 
     @property
+    def points_behind(self) -> _Indices:
+        """Indices of the points that stand behind the camera, ascending."""
+
+    @property
     def sum_of_squares(self) -> float:
         """Weighted sum of squares."""
 
@@ -1180,7 +1184,10 @@ class StellarProblem:
         """Right ascension and declination (m, 2) of every image at the initial values."""
 
 class CollectionError(Exception):
-    """A collection cannot be adjusted: (kind, message, photos of each combination, points)."""
+    """A collection cannot be adjusted: (kind, message, photos of each combination, points).
+
+    The kinds are those of :class:`BlockError`, without `no intersection`.
+    """
 
 def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     """Read the numbers of a text, separated by white space, up to the first word that is not a finite number.

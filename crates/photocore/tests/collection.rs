@@ -8,7 +8,8 @@ use num_complex::Complex64 as C;
 use photocore::adjustment::{self, Criterion, Loss, Status};
 use photocore::geometry::{BundlerPhoto, angle_axis_rotation, angle_axis_with_jacobian};
 use photocore::normals::Ordering;
-use photocore::programs::collection::{Collection, Image, Options, Photo, Point, Solution};
+use photocore::programs::Coarse;
+use photocore::programs::collection::{Collection, CollectionError, Image, Options, Photo, Point, Solution};
 use proptest::prelude::*;
 use rayon::ThreadPoolBuilder;
 
@@ -130,6 +131,10 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Collection {
 }
 
 fn adjusted(collection: &Collection, loss: Option<Loss>, threads: usize) -> Solution {
+    tried(collection, loss, threads).unwrap()
+}
+
+fn tried(collection: &Collection, loss: Option<Loss>, threads: usize) -> Result<Solution, CollectionError> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let adjustment = adjustment::Options {
         criterion: Criterion::Decrease(1e-10),
@@ -138,7 +143,7 @@ fn adjusted(collection: &Collection, loss: Option<Loss>, threads: usize) -> Solu
         loss,
     };
     let options = Options { adjustment, ordering: Ordering::Auto, memory: None };
-    collection.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).unwrap()
+    collection.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
 }
 
 fn redundancy(solution: &Solution) -> Vec<f64> {
@@ -211,5 +216,66 @@ fn losses_join_their_slopes() {
             assert!((slope - loss.weight(s)).abs() < 1e-7, "{loss:?} at {s}");
             assert!(loss.value(s) <= s);
         }
+    }
+}
+
+#[test]
+fn a_point_that_runs_into_a_station_is_left_out_soon() {
+    let sound = collection(9, 80, 0.3);
+    let expected = adjusted(&sound, None, 1);
+    // One photo sees it somewhere, another at the station of the first: that is where it is to go.
+    let [first, second] = [0, 3].map(|photo| BundlerPhoto::new(expected.photos[photo].parameters));
+    let station = first.centre();
+    let mut with_point = sound.clone();
+    let point = sound.points.len();
+    let position = [station[0], station[1] + 0.5, station[2]];
+    with_point.points.push(Point { position, sd: [f64::INFINITY; 3] });
+    for (photo, xy) in [(0, [40.0, 30.0]), (3, second.linearize(&station).xy)] {
+        with_point.images.push(Image { photo, point, xy, sd: [0.5; 2] });
+    }
+    let found = adjusted(&with_point, None, 1);
+    assert_eq!((found.adjustment.status, &found.collapsed[..]), (Status::Converged, &[point][..]));
+    assert!(found.points[point].is_none());
+    // As soon as the stations stand still for the images: not after dozens of steps, each a little nearer.
+    let steps = [&found, &expected].map(|solution| solution.adjustment.iterations.len());
+    assert!(steps[0] <= steps[1] + 8, "{steps:?}");
+    assert!((found.sum_of_squares - expected.sum_of_squares).abs() < 1e-8 * expected.sum_of_squares);
+    assert_eq!(found.degrees_of_freedom, expected.degrees_of_freedom);
+}
+
+#[test]
+fn points_behind_a_camera_are_counted() {
+    let sound = collection(9, 80, 0.0);
+    assert!(adjusted(&sound, None, 1).points.iter().flatten().all(|point| point.behind == 0));
+    // Everything held, one photo turned about its station by half a turn: what it saw is behind it.
+    let mut turned = sound.clone();
+    turned.points.iter_mut().for_each(|point| point.sd = [0.0; 3]);
+    turned.photos.iter_mut().for_each(|photo| photo.sd = [0.0; 9]);
+    let centre = BundlerPhoto::new(turned.photos[4].parameters).centre();
+    let parameters = &mut turned.photos[4].parameters;
+    parameters[1] += std::f64::consts::PI;
+    let rotation = angle_axis_rotation([parameters[0], parameters[1], parameters[2]]);
+    (0..3).for_each(|k| parameters[3 + k] = -(0..3).map(|j| rotation[k][j] * centre[j]).sum::<f64>());
+    // Something must be free to adjust.
+    turned.photos[0].sd[6] = f64::INFINITY;
+    let found = adjusted(&turned, None, 1);
+    let seen = sound.images.iter().filter(|image| image.photo == 4).count();
+    assert_eq!(found.points.iter().flatten().map(|point| point.behind).sum::<usize>(), seen);
+}
+
+#[test]
+fn values_too_large_for_double_precision_are_named() {
+    let sound = collection(9, 80, 0.3);
+    for value in [1e308, -1e101, 1e16] {
+        for parameter in [1, 5] {
+            let mut wrong = sound.clone();
+            wrong.photos[6].parameters[parameter] = value;
+            let expected = Coarse { photos: vec![6], points: vec![] };
+            assert_eq!(tried(&wrong, None, 1).err(), Some(CollectionError::Coarse(expected)));
+        }
+        let mut wrong = sound.clone();
+        wrong.points[17].position[2] = value;
+        let expected = Coarse { photos: vec![], points: vec![17] };
+        assert_eq!(tried(&wrong, None, 1).err(), Some(CollectionError::Coarse(expected)));
     }
 }

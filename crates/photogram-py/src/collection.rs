@@ -3,6 +3,7 @@
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
 use photocore::adjustment::{Criterion, Options as AdjustmentOptions};
 use photocore::geometry::BundlerPhoto;
+use photocore::programs::Coarse;
 use photocore::programs::collection::{Collection, CollectionError as Failure};
 use photocore::programs::collection::{Image, Options, Photo, Point, Solution};
 use pyo3::create_exception;
@@ -13,7 +14,8 @@ use pyo3::types::PyDict;
 use crate::arrays::{check_lengths, indices, rows, squares, table};
 use crate::options::{named_loss, named_ordering};
 use crate::solution::{
-    IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
+    FailureRow, IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds,
+    status_name,
 };
 use crate::work::{Workers, watched};
 
@@ -120,13 +122,11 @@ fn adjust_collection(
     })
 }
 
-/// Kind, message, and the photos and points concerned.
-type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>);
-
 fn failure(error: &Failure) -> FailureRow {
     let (kind, photos, points) = match error {
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
         Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
+        Failure::Coarse(Coarse { photos, points }) => ("coarse", vec![photos.clone()], points.clone()),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
         Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),

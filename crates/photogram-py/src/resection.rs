@@ -210,6 +210,11 @@ impl ResectionSolution {
     }
 
     #[getter]
+    fn points_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_vec(py, self.solution.behind.iter().map(|&point| point as i64).collect())
+    }
+
+    #[getter]
     fn sum_of_squares(&self) -> f64 {
         self.solution.sum_of_squares
     }

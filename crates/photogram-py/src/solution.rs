@@ -2,6 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use photocore::adjustment::{Adjustment, Iteration, Observed, Status};
+use photocore::programs::Coarse;
 use photocore::programs::block::{BlockError as Failure, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -267,7 +268,7 @@ pub fn failure(error: &Failure) -> FailureRow {
         Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
         Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
-        Failure::Coarse { photos, points } => ("coarse", vec![photos.clone()], points.clone()),
+        Failure::Coarse(Coarse { photos, points }) => ("coarse", vec![photos.clone()], points.clone()),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
         Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),

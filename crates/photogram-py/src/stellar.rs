@@ -302,7 +302,7 @@ impl StellarProblem {
     fn without_effect(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
         let work =
             |pool: &rayon::ThreadPool, _: &mut dyn FnMut(_) -> _| self.calibration.without_effect(pool);
-        watched(py, 1, None, work)?.map_err(|error| failure(&error))
+        watched(py, Workers::Caller, None, work)?.map_err(|error| failure(&error))
     }
 
     #[pyo3(signature = (*, refraction, distortion, passes))]
@@ -317,7 +317,7 @@ impl StellarProblem {
         let work = |pool: &rayon::ThreadPool, _: &mut dyn FnMut(_) -> _| {
             self.calibration.correction(&tolerances, pool)
         };
-        let correction = watched(py, 1, None, work)?.map_err(|error| failure(&error))?;
+        let correction = watched(py, Workers::Caller, None, work)?.map_err(|error| failure(&error))?;
         let found = PyDict::new(py);
         found.set_item("parameters", PyArray1::from_vec(py, correction.parameters))?;
         found.set_item("without_effect", correction.without_effect)?;

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.ends import behind, rounded, undetermined
+from photogram.adjustment.ends import behind, rounded, too_coarse, undetermined
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
@@ -316,20 +316,10 @@ def _named(
     if kind == "no intersection":
         return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
     if kind == "coarse":
-        return _coarse([block.photo_ids[i] for i in photos[0]], point_names)
+        return too_coarse([block.photo_ids[i] for i in photos[0]], point_names)
     if kind == "memory":
         return OutOfMemoryError(message)
     return AdjustmentError(message)
-
-
-def _coarse(photos: list[str], points: list[str]) -> AdjustmentError:
-    """Name photos and points whose values double precision rounds too coarsely."""
-    parts = [f"{kind} {listed(names)}" for kind, names in (("photos", photos), ("points", points)) if names]
-    return AdjustmentError(
-        f"coordinates or angles of the {' and the '.join(parts)} are so large that double precision rounds"
-        " them by more than their standard deviations, or than image coordinates show: count from an origin"
-        " nearby (a standard deviation of 0 fixes a value)"
-    )
 
 
 def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankError:

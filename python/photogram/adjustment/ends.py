@@ -1,4 +1,4 @@
-"""How an adjustment of a block ended, where a reader must be careful: remarks with the names concerned."""
+"""How an adjustment ended, where a reader must be careful: remarks and errors with the names concerned."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.errors import AdjustmentError
 from photogram.messages import Message, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 
 if TYPE_CHECKING:
     from photogram import _photocore
-    from photogram.errors import AdjustmentError
 
-__all__ = ["behind", "rounded", "undetermined"]
+__all__ = ["behind", "hidden", "rounded", "too_coarse", "undetermined"]
 
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
@@ -62,12 +62,35 @@ def rounded(excess: float | None) -> list[Message]:
 
 
 def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Remark on image points whose point stands behind the camera: no ray can have made them."""
+    """Remark on image points whose point stands behind the camera."""
     images = solution.images_behind
-    if not images.size:
-        return []
     points = [block.point_ids[point] for point in np.unique(block.image_points[images])]
     photos = [block.photo_ids[photo] for photo in np.unique(block.image_photos[images])]
-    count = "1 image point has its" if len(images) == 1 else f"{len(images)} image points have their"
-    text = f"{count} point behind the camera: points {listed(points)} on photos {listed(photos)}"
-    return [Message(text)]
+    return hidden(len(images), points, photos)
+
+
+def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:
+    """Remark on image points whose point stands behind the camera: no ray can have made them.
+
+    Parameters
+    ----------
+    images
+        How many there are; zero for no remark.
+    points, photos
+        Names of what is concerned; no photos where there is one only.
+    """
+    if not images:
+        return []
+    count = "1 image point has its" if images == 1 else f"{images} image points have their"
+    on = f" on photos {listed(photos)}" if photos else ""
+    return [Message(f"{count} point behind the camera: points {listed(points)}{on}")]
+
+
+def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:
+    """Name photos and points whose values double precision rounds too coarsely."""
+    parts = [f"{kind} {listed(names)}" for kind, names in (("photos", photos), ("points", points)) if names]
+    return AdjustmentError(
+        f"coordinates or angles of the {' and the '.join(parts)} are so large that double precision rounds"
+        " them by more than their standard deviations, or than image coordinates show: count from an origin"
+        " nearby (a standard deviation of 0 fixes a value)"
+    )

@@ -46,7 +46,9 @@ Precise control at the edge of a block has a redundancy of a thousandth; its tes
 COMPARABLE = 0.4
 """Of the largest test value of a round: what is smaller may be its consequence and is judged again."""
 HOPELESS = 5.0
-"""Spread of the test values above which photos that did not fit before the adjustment are left out."""
+"""Spread of the test values above which photos that did not fit before the adjustment are left out.
+
+Nor is what such an adjustment says held against what was found before."""
 EXCHANGES = 5
 """Pairs of control points that are exchanged back, at the most."""
 LOOSE = 0.01

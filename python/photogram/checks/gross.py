@@ -15,8 +15,9 @@ from photogram.checks.findings import Finding, Level, Section
 from photogram.checks.rays import Rays, meet
 from photogram.checks.robust import fit, mad_sd
 from photogram.network.block import Block
+from photogram.results.result import Result
 
-__all__ = ["Suspects", "gross"]
+__all__ = ["Suspects", "disproved", "gross", "without"]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -42,6 +43,8 @@ FEWEST_ERRORS, ERRORS_OF_PHOTO = 5, 0.3
 """So many gross errors, and such a part of its images, condemn a photo as a whole."""
 CANDIDATES = 5
 """Photos with the largest residuals that are left out on trial."""
+IMAGE_KINDS = ("gross-error", "exchanged-points")
+"""Findings on images, which the adjusted stations may disprove."""
 MOST_PHOTOS = 20
 MOST_ON_PHOTO = 30
 
@@ -88,6 +91,47 @@ def gross(block: Block) -> tuple[Section, Suspects]:
     section.findings += findings
     control = _control(rays.without(images), section)
     return section, Suspects(images, photos, control)
+
+
+def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Mask:
+    """Tell which suspected images do not break the pattern any more when seen from the adjusted stations.
+
+    A station far off spoils the intersections of its neighbours, so that good images look wrong beside it.
+
+    Parameters
+    ----------
+    block
+        The block as :func:`gross` had it.
+    suspects
+        What it found.
+    adjusted
+        The adjustment without the suspected images; a converged one.
+
+    Returns
+    -------
+    (m,) images of `block`; none of photos that are not in the adjustment.
+    """
+    number = {name: index for index, name in enumerate(adjusted.block.photo_ids)}
+    index = np.array([number.get(name, -1) for name in block.photo_ids])
+    there = (index >= 0)[:, np.newaxis]
+    refined = block.replace(
+        photo_positions=np.where(there, adjusted.photo_positions[index], block.photo_positions),
+        photo_attitudes=np.where(there, adjusted.photo_attitudes[index], block.photo_attitudes),
+    )
+    gone = (index < 0)[block.image_photos]
+    _, wrong = _broken(Rays.of(refined).without(gone))
+    return suspects.images & ~wrong & ~gone
+
+
+def without(block: Block, findings: list[Finding], images: Mask) -> list[Finding]:
+    """Return the findings of :func:`gross` without those that rest on nothing but the given images."""
+
+    def stands(finding: Finding) -> bool:
+        photos = np.isin(np.array(block.photo_ids)[block.image_photos], finding.photos)
+        own = photos & np.isin(np.array(block.point_ids)[block.image_points], finding.points)
+        return finding.kind not in IMAGE_KINDS or not own.any() or not images[own].all()
+
+    return [finding for finding in findings if stands(finding)]
 
 
 def _overrun(rays: Rays, findings: list[Finding]) -> int | None:

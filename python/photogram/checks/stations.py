@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,15 +38,26 @@ QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
 """The angles are those between the photo and its strip, ground-to-photo."""
 
 
-def stations(block: Block, result: Result | None) -> Section:
-    """Compare every station with the smooth path of its strip, and with its initial values."""
+def stations(block: Block, result: Result | None, misleading: Collection[str] = ()) -> Section:
+    """Compare every station with the smooth path of its strip, and with its initial values.
+
+    Parameters
+    ----------
+    block
+        The block with its initial stations.
+    result
+        Its adjustment, if there is one.
+    misleading
+        Photos on whose points good images looked wrong from the initial stations: if one of them has moved,
+        its initial values are wrong beyond doubt.
+    """
     section = Section(
         "Stations",
         "An aircraft flies straight and level as far as it can: a departure from its path wants a reason.",
     )
     which = "initial"
     if result is not None:
-        _moved(result, section)
+        _moved(result, misleading, section)
         block = result.block.replace(
             photo_positions=result.photo_positions, photo_attitudes=result.photo_attitudes
         )
@@ -171,7 +183,7 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
             section.findings.append(Finding("outlying-station", level, text, [photo], [], values))
 
 
-def _moved(result: Result, section: Section) -> None:
+def _moved(result: Result, misleading: Collection[str], section: Section) -> None:
     """Name the stations that the adjustment moved far more than the others."""
     block = result.block
     if len(block.photo_ids) < FEWEST:
@@ -192,14 +204,19 @@ def _moved(result: Result, section: Section) -> None:
         small = np.abs(changes).max(axis=1) < (SMOOTH_ANGLE if what == "attitude" else SMOOTH_POSITION * base)
         for photo in np.flatnonzero((sizes.max(axis=1) > MOVED) & ~small).tolist():
             k = int(sizes[photo].argmax())
+            name = block.photo_ids[photo]
+            wrong = name in misleading
             text = (
-                f"station {block.photo_ids[photo]}: the adjustment changed its {what} by"
-                f" {changes[photo, k] * factor:.3f} {shown}, {sizes[photo, k]:.0f} times the usual:"
-                " are its initial values right?"
+                f"station {name}: the adjustment changed its {what} by"
+                f" {changes[photo, k] * factor:.3f} {shown}, {sizes[photo, k]:.0f} times the usual: "
+            ) + (
+                "its initial values are wrong, and made good images look wrong"
+                if wrong
+                else "are its initial values right?"
             )
             values = {"change": float(changes[photo, k] * factor), "times_usual": float(sizes[photo, k])}
             section.findings.append(
-                Finding("moved-station", "look", text, [block.photo_ids[photo]], [], values)
+                Finding("moved-station", "grave" if wrong else "look", text, [name], [], values)
             )
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.checks.editing import Edited, blunder_section, edit
+from photogram.checks.editing import HOPELESS, Edited, blunder_section, edit
 from photogram.checks.findings import Check, Finding, Section
-from photogram.checks.gross import Suspects, gross
+from photogram.checks.gross import Suspects, disproved, gross, without
 from photogram.checks.heights import two_ray_heights
 from photogram.checks.orientation import orientation, spare_explained
 from photogram.checks.rays import Rays
@@ -68,13 +69,23 @@ def _checked(project: Project, block: Block, limits: Limits | None, threads: int
     if suspects.photos.any():
         spare_explained(upright, oriented, suspects.photos)
     edited = _edited(project, oriented, suspects, threads)
+    misleading: set[str] = set()
+    if edited.last is not None and edited.last.converged and edited.spread < HOPELESS:
+        cleared = disproved(oriented, suspects, edited.last)
+        if cleared.any():
+            suspects = replace(suspects, images=suspects.images & ~cleared)
+            points = oriented.image_points[cleared]
+            on = oriented.image_photos[np.isin(oriented.image_points, points)]
+            misleading = {oriented.photo_ids[photo] for photo in on.tolist()}
+            errors.findings = without(oriented, errors.findings, cleared)
+            edited = _edited(project, oriented, suspects, threads)
     # What the adjustment has explained or disproved.
     settled = {name for pair in edited.exchanged for name in pair} | set(edited.cleared)
     errors.findings = [
         each for each in errors.findings if each.kind != "control-difference" or not settled & {*each.points}
     ]
     sections = [_input(project, block, limits), structure_section(block, edited.first), upright, errors]
-    sections += [edited.section, *_after_adjustment(oriented, edited)]
+    sections += [edited.section, *_after_adjustment(oriented, edited, misleading)]
     return Check(project.title, sections, edited.last)
 
 
@@ -112,14 +123,14 @@ def _input(project: Project, block: Block, limits: Limits | None) -> Section:
     return section
 
 
-def _after_adjustment(block: Block, edited: Edited) -> list[Section]:
+def _after_adjustment(block: Block, edited: Edited, misleading: set[str]) -> list[Section]:
     """Return the sections that rest on the adjustment, as far as there is one."""
     result = edited.last
     if result is None or not result.converged:
         return [stations(block, None), key_numbers(edited)]
     return [
         control(edited),
-        stations(block, result),
+        stations(block, result, misleading),
         residuals(result, edited.spread),
         two_ray_heights(result),
         key_numbers(edited),

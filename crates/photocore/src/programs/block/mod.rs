@@ -18,6 +18,7 @@ use thiserror::Error;
 use crate::adjustment::{self, AdjustError, Event, Problem, gib};
 use crate::geometry::{self, ObjectSpace, Refraction, RotationSense, Vector3};
 use crate::normals::{Layout, LayoutError, Ordering, System};
+use crate::programs::precision::{Coarse, median};
 
 use model::CentralPerspective;
 pub use screening::{Dropped, Reason};
@@ -135,14 +136,9 @@ pub enum BlockError {
     /// The initial values put a point into the plane of a projection centre, so that its image is not finite.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
-    /// Coordinates or angles that double precision rounds by more than their standard deviations, or than image coordinates show.
-    #[error("{} photos and {} points have coordinates or angles too large for double precision", .photos.len(), .points.len())]
-    Coarse {
-        /// Photographs that have them.
-        photos: Vec<usize>,
-        /// Points that have them.
-        points: Vec<usize>,
-    },
+    /// Coordinates or angles too large for double precision.
+    #[error(transparent)]
+    Coarse(#[from] Coarse),
     /// The adjustment would take more memory than it may.
     #[error("the adjustment takes {} of memory, and {} are free", gib(*.needed), gib(*.available))]
     Memory {
@@ -220,11 +216,8 @@ impl Block {
     /// as they are; differences are formed in geocentric space.
     fn origin(&self) -> Vector3 {
         let middle = |k: usize| {
-            let mut values: Vec<f64> = self.photos.iter().map(|photo| photo.position[k]).collect();
-            let middle = values.len() / 2;
-            let median =
-                (middle < values.len()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1);
-            median.map_or(0.0, f64::round)
+            let values = self.photos.iter().map(|photo| photo.position[k]).collect();
+            median(values).map_or(0.0, f64::round)
         };
         match self.space {
             ObjectSpace::Rectangular => std::array::from_fn(middle),

@@ -6,6 +6,7 @@
 //! attitude of one photo and one component of the translation of another held.
 
 mod model;
+mod precision;
 mod solution;
 
 use std::ops::ControlFlow;
@@ -16,6 +17,7 @@ use thiserror::Error;
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Problem, gib};
 use crate::geometry::{BundlerParameters, BundlerPhoto, Vector3};
 use crate::normals::{Layout, LayoutError, Ordering, System};
+use crate::programs::precision::Coarse;
 
 use model::Bundle;
 pub use solution::{AdjustedPhoto, AdjustedPoint, Solution};
@@ -91,6 +93,9 @@ pub enum CollectionError {
     /// The initial values put a point into the plane of a projection centre, so that its image is not finite.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
+    /// Values too large for double precision.
+    #[error(transparent)]
+    Coarse(#[from] Coarse),
     /// The adjustment would take more memory than it may.
     #[error("the adjustment takes {} of memory, and {} are free", gib(*.needed), gib(*.available))]
     Memory {
@@ -151,6 +156,9 @@ impl Collection {
             let used = self.used(&left_out);
             if used.points.is_empty() {
                 return Err(CollectionError::Empty);
+            }
+            if before.is_none() {
+                self.check_precision(&used)?;
             }
             let problem = self.problem(options, &used, &reached)?;
             let needed = problem.system.memory();
@@ -247,6 +255,7 @@ impl Collection {
                 images,
                 images_of: used.start.clone(),
                 images_on: used.images_on.clone(),
+                free: points().map(|point| point.sd == [f64::INFINITY; 3]).collect(),
                 placed,
             },
         })
