@@ -241,9 +241,10 @@ def _undetermined(error: _photocore.StellarError, exposures: int) -> str:
         return str(message)
     attitudes = sorted({index // 3 + 1 for index in indices if index < 3 * exposures})
     places = dict(zip(BROWN_PLACE, BrownCamera.NAMES, strict=True))
-    camera = [places[index - 3 * exposures] for index in indices if index >= 3 * exposures]
-    open_ = listed([*camera, *(f"the attitude of exposure {number}" for number in attitudes)])
-    return f"they leave {open_} open"
+    left = [places[index - 3 * exposures] for index in indices if index >= 3 * exposures]
+    if attitudes:
+        left.append(f"the attitudes of exposures {listed([str(number) for number in attitudes])}")
+    return f"they leave {', '.join(left)} open"
 
 
 def _refuse_too_large(images: int, exposures: int, weigh_stars: bool) -> None:
