@@ -6,7 +6,9 @@ use std::ops::ControlFlow;
 
 use num_complex::Complex64 as C;
 use photocore::adjustment::{self, Criterion, Loss, Status};
-use photocore::geometry::{BundlerPhoto, angle_axis_rotation, angle_axis_with_jacobian};
+use photocore::geometry::{
+    BundlerPhoto, ObjectSpace, Point as GroundPoint, angle_axis_rotation, angle_axis_with_jacobian,
+};
 use photocore::normals::Ordering;
 use photocore::programs::collection::{Collection, Image, Options, Photo, Point, Solution};
 use proptest::prelude::*;
@@ -33,6 +35,10 @@ fn image(unknowns: [C; 12]) -> [C; 2] {
     p.map(|value| f * (1.0 + k1 * square + k2 * square * square) * value)
 }
 
+fn ground(position: [f64; 3]) -> GroundPoint {
+    GroundPoint::new(ObjectSpace::Rectangular, position)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(500))]
 
@@ -51,14 +57,18 @@ proptest! {
             w[0], w[1], w[2], shift[0], shift[1], -10.0, f, k[0], k[1], point[0], point[1], point[2],
         ];
         let photo: [f64; 9] = std::array::from_fn(|i| unknowns[i]);
-        let computed = BundlerPhoto::new(photo).linearize(&point);
+        let computed = BundlerPhoto::from_parameters(photo).linearize(&ground(point));
         const STEP: f64 = 1e-100;
         for i in 0..12 {
             let mut stepped = unknowns.map(|value| C::new(value, 0.0));
             stepped[i].im = STEP;
             let expected = image(stepped);
             for row in 0..2 {
-                let partial = if i < 9 { computed.photo[row][i] } else { computed.point[row][i - 9] };
+                let partial = match i {
+                    0..6 => computed.photo[row][i],
+                    6..9 => computed.camera[row][i - 6],
+                    _ => computed.point[row][i - 9],
+                };
                 let scale = if i < 3 { f } else { f / 10.0 }.max(1.0);
                 prop_assert!((partial - expected[row].im / STEP).abs() < 1e-10 * scale, "partial {i} of {row}");
                 prop_assert!((computed.xy[row] - expected[row].re).abs() < 1e-10 * f);
@@ -71,20 +81,20 @@ proptest! {
 #[test]
 fn the_rotation_is_orthogonal_and_turns_by_the_angle() {
     for angle in [0.0, 1e-12, 1e-4, 0.3, 0.32, 2.0, 3.1, 6.2] {
-        let w = [0.6 * angle, 0.0, -0.8 * angle];
-        let (r, jacobian) = angle_axis_with_jacobian(w);
-        assert_eq!(r, angle_axis_rotation(w));
+        let w = [0.6 * angle, 0.0, -0.8 * angle].into();
+        let (r, jacobian) = angle_axis_with_jacobian(&w);
+        assert_eq!(r, angle_axis_rotation(&w));
         for i in 0..3 {
             for j in 0..3 {
-                let product: f64 = (0..3).map(|k| r[i][k] * r[j][k]).sum();
+                let product: f64 = (0..3).map(|k| r[(i, k)] * r[(j, k)]).sum();
                 assert!((product - f64::from(u8::from(i == j))).abs() < 1e-14);
                 // (R - I) w = 0 and J w = w
-                assert!((r[i][j] * w[j]).is_finite() && jacobian[i][j].is_finite());
+                assert!((r[(i, j)] * w[j]).is_finite() && jacobian[(i, j)].is_finite());
             }
-            let along: f64 = (0..3).map(|j| jacobian[i][j] * w[j]).sum();
+            let along: f64 = (0..3).map(|j| jacobian[(i, j)] * w[j]).sum();
             assert!((along - w[i]).abs() < 1e-14 * (1.0 + angle));
         }
-        let trace = r[0][0] + r[1][1] + r[2][2];
+        let trace = r.trace();
         assert!((trace - (1.0 + 2.0 * f64::cos(angle))).abs() < 1e-14);
     }
 }
@@ -105,7 +115,7 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Collection {
     let mut images = Vec::new();
     for point in 0..points {
         for photo in (0..photos).filter(|photo| (photo + point) % 3 > 0) {
-            let exact = BundlerPhoto::new(parameters(photo)).linearize(&position(point)).xy;
+            let exact = BundlerPhoto::from_parameters(parameters(photo)).project(&ground(position(point)));
             let n = images.len();
             let xy = [exact[0] + 0.5 * noise(2 * n + 7), exact[1] + 0.5 * noise(2 * n + 8)];
             images.push(Image { photo, point, xy, sd: [0.5; 2] });

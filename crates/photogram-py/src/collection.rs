@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
 use photocore::adjustment::{Criterion, Options as AdjustmentOptions};
-use photocore::geometry::BundlerPhoto;
+use photocore::geometry::{BundlerPhoto, ObjectSpace, Point as GroundPoint};
 use photocore::programs::collection::{Collection, CollectionError as Failure};
 use photocore::programs::collection::{Image, Options, Photo, Point, Solution};
 use pyo3::create_exception;
@@ -55,8 +55,10 @@ fn bundler_images<'py>(
     let parameters = rows("photo_parameters", &photo_parameters)?;
     let points = rows("points", &points)?;
     check_lengths(("points", points.len()), &[("photo_parameters", parameters.len())])?;
-    let image = |(&photo, point)| BundlerPhoto::new(photo).linearize(point).xy;
-    let images = py.detach(|| parameters.iter().zip(&points).map(image).collect());
+    let image = |(photo, point)| {
+        BundlerPhoto::from_parameters(photo).project(&GroundPoint::new(ObjectSpace::Rectangular, point))
+    };
+    let images = py.detach(|| parameters.into_iter().zip(points).map(image).collect());
     table(py, images)
 }
 

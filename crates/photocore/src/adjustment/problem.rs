@@ -28,7 +28,7 @@ pub trait Model: Sync {
 
     /// Local blocks that the iterations have led to where they harm all others: what they say of one kept block is so much more than
     /// all others say together that rounding takes what these say. Asked after every damped step.
-    fn collapsed(&self, _unknowns: &[f64]) -> Vec<usize> {
+    fn collapsed(&self, _before: &[f64], _after: &[f64]) -> Vec<usize> {
         vec![]
     }
 

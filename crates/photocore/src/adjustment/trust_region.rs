@@ -76,7 +76,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 let iteration =
                     Iteration { number, sum_of_squares, largest_change: solved.change, damping: used };
                 self.accept(iteration, &unknowns, &trial)?;
-                self.collapsed = self.problem.model.collapsed(&trial);
+                self.collapsed = self.problem.model.collapsed(&unknowns, &trial);
                 if !self.collapsed.is_empty() {
                     let status = Status::NotConverged;
                     return Ok(End { status, unknowns: trial, basis: None, undetermined: None, last: None });

@@ -16,7 +16,7 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Event, Problem, gib};
-use crate::geometry::{self, ObjectSpace, Refraction, RotationSense, Vector3};
+use crate::geometry::{self, ObjectSpace, Refraction, RotationSense};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 use model::CentralPerspective;
@@ -27,17 +27,17 @@ pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
 #[derive(Debug, Clone, Copy)]
 pub struct Photo {
     /// Initial position in the coordinates of the object space; that of fixed components.
-    pub position: Vector3,
+    pub position: [f64; 3],
     /// Initial omega, phi, kappa in radians; those of fixed angles.
-    pub attitude: Vector3,
+    pub attitude: [f64; 3],
     /// Observed position; of its components those count that are weighted.
-    pub observed_position: Vector3,
+    pub observed_position: [f64; 3],
     /// Observed omega, phi, kappa in radians, whole turns apart; those count that are weighted.
-    pub observed_attitude: Vector3,
+    pub observed_attitude: [f64; 3],
     /// Standard deviations of the position: infinite free, zero fixed.
-    pub position_sd: Vector3,
+    pub position_sd: [f64; 3],
     /// Standard deviations of the attitude in radians: infinite free, zero fixed.
-    pub attitude_sd: Vector3,
+    pub attitude_sd: [f64; 3],
     /// Signed principal distance in millimetres: negative for the positive plane.
     pub principal_distance: f64,
 }
@@ -46,9 +46,9 @@ pub struct Photo {
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
     /// Coordinates in the object space; NaN where unknown.
-    pub coordinates: Vector3,
+    pub coordinates: [f64; 3],
     /// Standard deviations: finite for held components of control (zero fixed), infinite for all others.
-    pub sd: Vector3,
+    pub sd: [f64; 3],
 }
 
 impl Point {
@@ -218,7 +218,7 @@ impl Block {
     /// A point near the photographs: coordinates are counted from it while the block is adjusted, so that no digits are lost
     /// in large ones. Medians, so that a single photograph with a wrong position does not move it. Geographic coordinates stay
     /// as they are; differences are formed in geocentric space.
-    fn origin(&self) -> Vector3 {
+    fn origin(&self) -> [f64; 3] {
         let middle = |k: usize| {
             let mut values: Vec<f64> = self.photos.iter().map(|photo| photo.position[k]).collect();
             let middle = values.len() / 2;
@@ -238,10 +238,10 @@ impl Block {
         options: &Options,
         points: &[usize],
         images: PointImages,
-        origin: Vector3,
+        origin: [f64; 3],
     ) -> Result<Problem<CentralPerspective>, BlockError> {
         let PointImages { start, order } = images;
-        let local = |values: Vector3| -> Vector3 { std::array::from_fn(|k| values[k] - origin[k]) };
+        let local = |values: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| values[k] - origin[k]) };
         let local_point = |&point: &usize| {
             let Point { coordinates, sd } = self.points[point];
             Point { coordinates: local(coordinates), sd }
@@ -275,11 +275,11 @@ impl Block {
         let met = model.intersect(&stations);
         self.check_resolution(model.middle_distance(&stations, met.as_deref().ok()))?;
         let coordinates = met.map_err(|point| BlockError::NoIntersection(points[point]))?;
-        let own: Vec<Vector3> = model.points.iter().map(|point| point.coordinates).collect();
+        let own: Vec<[f64; 3]> = model.points.iter().map(|point| point.coordinates).collect();
         let own_sd = model.points.iter().map(|point| point.sd);
         let sd = own_sd.chain(self.photos.iter().flat_map(photo_sd)).flatten().collect();
         let photo_of = model.images.iter().map(|image| image.photo as u32).collect();
-        let places = stations.iter().map(geometry::Photo::centre).collect();
+        let places = stations.iter().map(|photo| photo.centre().into()).collect();
         let layout = Layout::new(2, 3, &vec![6; self.photos.len()], model.start.clone(), photo_of)?
             .with_places(places)?;
         Ok(Problem {

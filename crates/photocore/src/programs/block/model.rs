@@ -47,7 +47,8 @@ impl Refracted {
     #[inline(never)]
     fn linearize(&self, stations: &Stations, photo: usize, point: usize) -> Projection {
         let (from, to) = (&stations.photos[photo], &stations.points[point]);
-        let lift = self.refraction.lift(from, &self.at_photos[photo], to, &self.at_points[point]);
+        let lift =
+            self.refraction.lift(&from.orientation, &self.at_photos[photo], to, &self.at_points[point]);
         from.linearize_lifted(to, &lift)
     }
 }

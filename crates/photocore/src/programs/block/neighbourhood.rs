@@ -14,16 +14,12 @@ impl Block {
     pub(super) fn along_curve(&self, images_of: &PointImages) -> Vec<usize> {
         let centres: Vec<Vector3> =
             self.photos.iter().map(|photo| self.space.cartesian(photo.position)).collect();
-        let lowest: Vector3 =
-            std::array::from_fn(|k| centres.iter().map(|centre| centre[k]).fold(f64::INFINITY, f64::min));
-        let extent =
-            centres.iter().flatten().zip(lowest.iter().cycle()).map(|(x, low)| x - low).fold(0.0, f64::max);
+        let lowest = centres.iter().fold(Vector3::repeat(f64::INFINITY), |low, centre| low.inf(centre));
+        let extent = centres.iter().flat_map(|centre| (centre - lowest).data.0[0]).fold(0.0, f64::max);
         let key = |point: usize| {
             let images = images_of.of(point);
             let count = images.len().max(1) as f64;
-            let mean: Vector3 = std::array::from_fn(|k| {
-                images.iter().map(|&image| centres[self.images[image].photo][k] / count).sum()
-            });
+            let mean: Vector3 = images.iter().map(|&image| centres[self.images[image].photo] / count).sum();
             // What is not finite comes first.
             interleaved(std::array::from_fn(|k| ((mean[k] - lowest[k]) / extent * (CELLS - 1.0)) as u32))
         };

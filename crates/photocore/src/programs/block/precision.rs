@@ -2,8 +2,7 @@
 
 use super::model::CentralPerspective;
 use super::{Block, BlockError, Photo};
-use crate::geometry::vector::{difference, square};
-use crate::geometry::{self, Vector3};
+use crate::geometry;
 
 /// The square of a larger coordinate, or the product of its partials, is not a number.
 const LARGEST: f64 = 1e100;
@@ -27,7 +26,7 @@ impl Block {
     /// [`BlockError::Coarse`].
     pub(super) fn check_rounding(&self) -> Result<(), BlockError> {
         let too_large = |value: f64| value.abs() > LARGEST;
-        let coarse = |values: &Vector3, sd: &Vector3| {
+        let coarse = |values: &[f64; 3], sd: &[f64; 3]| {
             values.iter().zip(sd).any(|(&value, &sd)| is_coarse(value, sd) || too_large(value))
         };
         self.refuse(
@@ -52,7 +51,7 @@ impl Block {
         let angle = angle.fold(f64::INFINITY, f64::min);
         // Coordinates in the units of a length: those of geographic space stand on the ground at their distance from its centre.
         let length = |value: f64| angle * distance.unwrap_or(f64::INFINITY) < rounding(value).max(SMALLEST);
-        let position = |coordinates: Vector3| self.space.cartesian(coordinates).into_iter().any(length);
+        let position = |coordinates: [f64; 3]| self.space.cartesian(coordinates).iter().copied().any(length);
         self.refuse(
             |photo| {
                 position(photo.position)
@@ -83,18 +82,18 @@ impl CentralPerspective {
     pub fn middle_distance(
         &self,
         photos: &[geometry::Photo],
-        coordinates: Option<&[Vector3]>,
+        coordinates: Option<&[[f64; 3]]>,
     ) -> Option<f64> {
         let mut distances: Vec<f64> = match coordinates {
             Some(coordinates) => {
                 let first = coordinates.iter().zip(&self.start);
-                let distance = |(&at, &first): (&Vector3, &usize)| {
+                let distance = |(&at, &first): (&[f64; 3], &usize)| {
                     let image = self.images.get(first)?;
-                    Some(difference(&self.space.cartesian(at), &photos[image.photo].centre()))
+                    Some((self.space.cartesian(at) - photos[image.photo].centre()).norm())
                 };
-                first.filter_map(distance).map(|offset| square(&offset).sqrt()).collect()
+                first.filter_map(distance).collect()
             }
-            None => photos.iter().map(|photo| square(&photo.centre()).sqrt()).collect(),
+            None => photos.iter().map(|photo| photo.centre().norm()).collect(),
         };
         let middle = distances.len() / 2;
         (middle < distances.len()).then(|| *distances.select_nth_unstable_by(middle, f64::total_cmp).1)

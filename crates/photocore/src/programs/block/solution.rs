@@ -3,15 +3,14 @@
 use super::model::CentralPerspective;
 use super::{Block, BlockError, Dropped, Options, UnitVariance};
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
-use crate::geometry::Vector3;
 
 /// An adjusted photograph.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedPhoto {
     /// Position in the coordinates of the object space.
-    pub position: Vector3,
+    pub position: [f64; 3],
     /// Omega, phi, kappa in radians.
-    pub attitude: Vector3,
+    pub attitude: [f64; 3],
     /// Cofactors of position and attitude (a priori unit weight); NaN when not asked for.
     pub cofactors: [[f64; 6]; 6],
     /// Redundancy numbers of its six unknowns as observations of themselves; zero unless weighted.
@@ -22,13 +21,13 @@ pub struct AdjustedPhoto {
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedPoint {
     /// Coordinates in the object space.
-    pub coordinates: Vector3,
+    pub coordinates: [f64; 3],
     /// Cofactors (a priori unit weight); NaN when not asked for.
     pub cofactors: [[f64; 3]; 3],
     /// Redundancy numbers of its components as observations of themselves; zero unless weighted.
     pub redundancy: [f64; 3],
     /// Its correction in the last iteration.
-    pub last_correction: Vector3,
+    pub last_correction: [f64; 3],
     /// Number of images.
     pub rays: usize,
 }
@@ -89,7 +88,7 @@ impl Solution {
         problem: &Problem<CentralPerspective>,
         mut adjustment: Adjustment,
         points: &[usize],
-        origin: Vector3,
+        origin: [f64; 3],
         dropped: Vec<Dropped>,
     ) -> Self {
         let unknowns = std::mem::take(&mut adjustment.unknowns);
@@ -153,7 +152,7 @@ impl Solution {
 }
 
 /// Coordinates counted from the origin of the object space again; fixed ones as they were given, to the last bit.
-fn absolute(given: Vector3, sd: Vector3, values: &[f64], origin: Vector3) -> Vector3 {
+fn absolute(given: [f64; 3], sd: [f64; 3], values: &[f64], origin: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| if sd[k] == 0.0 { given[k] } else { values[k] + origin[k] })
 }
 

@@ -14,7 +14,7 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Problem, gib};
-use crate::geometry::{BundlerParameters, BundlerPhoto, Vector3};
+use crate::geometry::{BundlerParameters, BundlerPhoto};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 use model::Bundle;
@@ -33,9 +33,9 @@ pub struct Photo {
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
     /// Initial (and, where weighted, observed) coordinates.
-    pub position: Vector3,
+    pub position: [f64; 3],
     /// Their standard deviations: infinite free, zero fixed.
-    pub sd: Vector3,
+    pub sd: [f64; 3],
 }
 
 /// An image point.
@@ -223,7 +223,11 @@ impl Collection {
     ) -> Result<Problem<Bundle>, CollectionError> {
         let images: Vec<Image> = used.images.iter().map(|&image| self.images[image]).collect();
         let photo_of = images.iter().map(|image| image.photo as u32).collect();
-        let places = start.photos.iter().map(|&parameters| BundlerPhoto::new(parameters).centre()).collect();
+        let places = start
+            .photos
+            .iter()
+            .map(|&parameters| BundlerPhoto::from_parameters(parameters).centre().into())
+            .collect();
         let layout = Layout::new(2, 3, &vec![9; self.photos.len()], used.start.clone(), photo_of)?
             .with_places(places)?;
         let points = || used.points.iter().map(|&point| &self.points[point]);
@@ -255,7 +259,7 @@ impl Collection {
 
 /// Values of all points and photos.
 struct Values {
-    points: Vec<Vector3>,
+    points: Vec<[f64; 3]>,
     photos: Vec<BundlerParameters>,
 }
 

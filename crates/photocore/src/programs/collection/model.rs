@@ -2,8 +2,7 @@
 
 use super::Image;
 use crate::adjustment::Model;
-use crate::geometry::vector::{apply, difference, square};
-use crate::geometry::{BundlerPhoto, Vector3};
+use crate::geometry::{BundlerPhoto, ObjectSpace, Point, Vector3};
 use crate::normals::GroupRows;
 
 /// A point has run into a station when its share in what the station learns is so many times that of the others in the mean: it is
@@ -29,13 +28,18 @@ pub struct Bundle {
 #[derive(Debug)]
 pub struct Stations {
     photos: Vec<BundlerPhoto>,
-    points: Vec<Vector3>,
+    points: Vec<Point>,
 }
 
 impl Bundle {
     /// The photos at given values of all unknowns.
     pub fn photos(&self, unknowns: &[f64]) -> Vec<BundlerPhoto> {
-        unknowns[3 * self.points..].as_chunks().0.iter().map(|&values| BundlerPhoto::new(values)).collect()
+        unknowns[3 * self.points..]
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&values| BundlerPhoto::from_parameters(values))
+            .collect()
     }
 }
 
@@ -43,7 +47,8 @@ impl Model for Bundle {
     type Prepared = Stations;
 
     fn prepare(&self, unknowns: &[f64]) -> Stations {
-        let points = unknowns[..3 * self.points].as_chunks().0.to_vec();
+        let points = unknowns[..3 * self.points].as_chunks().0.iter();
+        let points = points.map(|&at| Point::new(ObjectSpace::Rectangular, at)).collect();
         Stations { photos: self.photos(unknowns), points }
     }
 
@@ -54,18 +59,20 @@ impl Model for Bundle {
         for row in 0..2 {
             rows.constant[row] = observed.xy[row] - image.xy[row];
             rows.local[3 * row..][..3].copy_from_slice(&image.point[row]);
-            rows.kept[9 * row..][..9].copy_from_slice(&image.photo[row]);
+            rows.kept[9 * row..][..6].copy_from_slice(&image.photo[row]);
+            rows.kept[9 * row + 6..][..3].copy_from_slice(&image.camera[row]);
         }
     }
 
     /// Points that have run into a station: two rays that meet there ask for it. The image of such a point turns by 1 / distance
     /// when point or station move; what its station learns from it, and loses again when the point is eliminated, is the square of that.
-    fn collapsed(&self, unknowns: &[f64]) -> Vec<usize> {
+    fn collapsed(&self, _: &[f64], unknowns: &[f64]) -> Vec<usize> {
         let photos = self.photos(unknowns);
         let points = unknowns[..3 * self.points].as_chunks::<3>().0;
         let centres: Vec<Vector3> = photos.iter().map(BundlerPhoto::centre).collect();
-        let share =
-            |point: usize, image: &Image| square(&difference(&points[point], &centres[image.photo])).recip();
+        let share = |point: usize, image: &Image| {
+            (Vector3::from(points[point]) - centres[image.photo]).norm_squared().recip()
+        };
         let mut shares = vec![0.0; photos.len()];
         for (point, images) in self.images_of.windows(2).enumerate() {
             self.images[images[0]..images[1]]
@@ -90,7 +97,7 @@ impl Model for Bundle {
         let (false, Some(first)) = (self.placed, with_images().next()) else { return vec![] };
         let centre = photos[first].centre();
         let shifts = with_images().filter(|&photo| photo != first).flat_map(|photo| {
-            let shift = apply(photos[photo].rotation(), &difference(&photos[photo].centre(), &centre));
+            let shift = photos[photo].orientation.pose().sight(&centre);
             (0..3).map(move |k| (shift[k].abs(), 9 * photo + 3 + k))
         });
         let scale = shifts.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, unknown)| unknown);

@@ -3,7 +3,7 @@
 use super::model::Bundle;
 use super::{Collection, CollectionError, Used};
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
-use crate::geometry::{BundlerParameters, Vector3};
+use crate::geometry::{BundlerParameters, ObjectSpace};
 
 /// An adjusted photo.
 #[derive(Debug, Clone, Copy)]
@@ -22,11 +22,11 @@ pub struct AdjustedPhoto {
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedPoint {
     /// Coordinates.
-    pub position: Vector3,
+    pub position: [f64; 3],
     /// Cofactors (a priori unit weight); NaN where there are none.
     pub cofactors: [[f64; 3]; 3],
     /// Redundancy numbers of the coordinates as observations of themselves; zero unless weighted, NaN where there are no cofactors.
-    pub redundancy: Vector3,
+    pub redundancy: [f64; 3],
     /// Number of images.
     pub rays: usize,
     /// How many of them have it behind the camera.
@@ -121,14 +121,19 @@ fn photos(problem: &Problem<Bundle>, adjustment: &Adjustment, unknowns: &[f64]) 
 fn points(problem: &Problem<Bundle>, adjustment: &Adjustment, unknowns: &[f64]) -> Vec<AdjustedPoint> {
     let photos = problem.model.photos(unknowns);
     let positions = unknowns[..3 * problem.model.points].as_chunks::<3>().0;
-    let point = |(local, position): (usize, &Vector3)| {
+    let point = |(local, position): (usize, &[f64; 3])| {
         let images = &problem.model.images[problem.layout().groups_of(local)];
         AdjustedPoint {
             position: *position,
             cofactors: leading_matrix(adjustment.cofactors.as_ref().map(|all| &all.local[9 * local..])),
             redundancy: adjustment.prior_redundancy(3 * local),
             rays: images.len(),
-            behind: images.iter().filter(|image| photos[image.photo].depth(position) < 0.0).count(),
+            behind: images
+                .iter()
+                .filter(|image| {
+                    photos[image.photo].depth(&ObjectSpace::Rectangular.cartesian(*position)) < 0.0
+                })
+                .count(),
         }
     };
     positions.iter().enumerate().map(point).collect()
