@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram import Block, simulate
-from photogram.geometry import Spheroid
 from photogram.giant import Finding, Project, check
+from photogram.network.geometry import Spheroid
 
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from photogram import simulate
-from photogram.geometry import Spheroid
 from photogram.giant import Project, read_project, write_project
 from photogram.giant.files import NAMES
+from photogram.network.geometry import Spheroid
 
 T = TypeVar("T")
 

@@ -23,8 +23,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from photogram import AdjustmentError, Resection, resect
-from photogram.geometry import project, rotation_angles, rotation_matrix
-from photogram.resection import Observed, solve
+from photogram.adjustment.resection import Observed, solve
+from photogram.network.geometry import project, rotation_angles, rotation_matrix
 
 THREE_SIGMA = 0.9973
 STEEP = np.radians(80.0)

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram import AdjustmentError, InputError
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue

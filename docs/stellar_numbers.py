@@ -10,7 +10,7 @@ from importlib.resources import as_file, files
 import erfa
 import numpy as np
 
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Result, calibrate, refraction
 from photogram.stellar.listing import summary
 from photogram.stellar.night import CalibratedNight, calibrate_night

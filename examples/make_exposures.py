@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram import geometry
-from photogram.geometry import Spheroid
 from photogram.giant import Camera, Common, Frame, GroundPoint, ImageFrame, Project, write_project
+from photogram.network import geometry
+from photogram.network.geometry import Spheroid
 
 ROOT = Path(__file__).resolve().parents[1]
 PRINTED = ROOT / "tests" / "data" / "giant"

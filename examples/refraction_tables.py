@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from photogram import Refraction, geometry
-from photogram.refraction import Air, Water
+from photogram.network.refraction import Air, Water
 
 HEIGHTS_M = (500, 1000, 3000, 6000, 9000, 11000, 15000, 20000, 40000)
 CAMERAS_M = (100, 1000, 4500)

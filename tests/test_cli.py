@@ -265,7 +265,7 @@ def test_the_options_of_simulate_are_the_arguments_of_the_function():
     arguments = inspect.signature(simulate_function).parameters
     options = inspect.signature(simulate_command).parameters
     refraction = {"air_refraction", "water_refraction", "water_level", "water_index"}
-    assert set(options) - set(arguments) == {"out", "overwrite", *refraction}
+    assert set(options) - set(arguments) == {"out", "overwrite", "quiet", *refraction}
     assert set(arguments) - set(options) == {"refraction"}
     for name in set(arguments) - {"spheroid", "refraction"}:
         assert options[name].default == arguments[name].default
@@ -335,10 +335,10 @@ def test_weights_too_weak_for_a_datum_are_an_error_with_the_remark_that_explains
 @pytest.mark.parametrize(
     ("command", "package", "extra"),
     [
-        (["perspective-center", "--example", "--plot", "p.png"], "matplotlib", "plots"),
-        (["absolute-orientation", "--example", "--plot", "p.png"], "matplotlib", "plots"),
+        (["perspective-center", "--example", "--out", "o", "--plots"], "matplotlib", "plots"),
+        (["absolute-orientation", "--example", "--out", "o", "--plots"], "matplotlib", "plots"),
         (["stellar-camera", "--example", "--plots"], "matplotlib", "plots"),
-        (["plan", "--strips", "1", "--plot", "p.png"], "matplotlib", "plots"),
+        (["plan", "--strips", "1", "--out", "o", "--plots"], "matplotlib", "plots"),
     ],
 )
 def test_a_package_of_an_extra_that_is_not_there_is_named(

@@ -17,10 +17,9 @@ EXAMPLES = Path(str(files("photogram") / "examples"))
     "command",
     [
         ("perspective-center", "perspective_center/grid.deck", "--json"),
-        ("perspective-center", "perspective_center/grid.deck", "--listing"),
         ("absolute-orientation", "absolute_orientation/stations.csv", "--json"),
-        ("absolute-orientation", "absolute_orientation/stations.csv", "--listing"),
-        ("comparator", "comparator/comparator-3.txt", "--no-pictures", "--json"),
+        ("absolute-orientation", "absolute_orientation/stations.csv", "--method", "report", "--trace"),
+        ("comparator", "comparator/comparator-3.txt", "--no-plots", "--json"),
         ("stellar-camera", "stellar/plate.toml", "--json"),
         ("stellar-camera", "exposures", "exposures/night.toml", "--json"),
     ],

@@ -163,9 +163,9 @@ def test_reports_do_not_differ_from_run_to_run(run, project, tmp_path):
 def test_reports_of_collections_do_not_differ_from_run_to_run(run, tmp_path):
     texts = []
     for number, threads in enumerate((1, 2, 1)):
-        report = tmp_path / f"{number}.txt"
-        assert run("collection", "--example", "--report", report, "--threads", threads).exit_code == 0
-        texts.append(report.read_bytes())
+        out = tmp_path / str(number)
+        assert run("collection", "--example", "--out", out, "--threads", threads).exit_code == 0
+        texts.append((out / "report.txt").read_bytes())
     assert texts[0] == texts[1] == texts[2]
     assert b"seconds" not in texts[0]
 

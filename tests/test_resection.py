@@ -151,6 +151,15 @@ def test_two_points_suffice_with_a_known_pose():
     np.testing.assert_allclose(photo.residuals, 0.0, atol=1e-3)
 
 
+def test_a_known_pose_with_the_points_behind_it_is_refused():
+    """The equations hold for what is behind the camera as well."""
+    up = ANGLES + np.array([np.pi, 0.0, 0.0])
+    known = {"position": STATION, "position_sd": 0.0, "attitude": up, "attitude_sd": 0.0}
+    seen_there = view(GROUND, angles=up)
+    with pytest.raises(AdjustmentError, match="in front of the camera"):
+        resect(GROUND, seen_there, C, **known)
+
+
 def test_a_prior_chooses_among_the_poses_of_three_points():
     triangle = np.array([[100.0 * np.cos(t), 100.0 * np.sin(t), 0.0] for t in (0.0, 1.8, 3.9)])
     station = np.array([0.0, 0.0, 300.0])

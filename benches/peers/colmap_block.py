@@ -21,7 +21,7 @@ from covariances import Place, moved
 from solution import HALF_TURN, Floats, Solution, to_object_space
 
 from photogram import Block
-from photogram.geometry import rotation_angles
+from photogram.network.geometry import rotation_angles
 
 _CAMERA = 1
 

@@ -21,7 +21,7 @@ from umeyama import umeyama
 
 from photogram import orient
 from photogram.absolute_orientation import Similarity, Stations
-from photogram.geometry import rotation_matrix
+from photogram.network.geometry import rotation_matrix
 
 Floats = NDArray[np.float64]
 Parameters = tuple[float, Floats, Floats]

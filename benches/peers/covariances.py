@@ -8,7 +8,7 @@ import numpy as np
 from solution import HALF_TURN, Floats
 
 from photogram import Block
-from photogram.geometry import rotation_angles
+from photogram.network.geometry import rotation_angles
 
 Place = tuple[Floats, Floats]
 """The rotation from object to camera space and the projection centre."""

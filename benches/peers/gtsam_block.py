@@ -20,7 +20,7 @@ from gtsam.symbol_shorthand import L, X
 from solution import HALF_TURN, Floats, Solution, to_object_space
 
 from photogram import Block
-from photogram.geometry import rotation_angles
+from photogram.network.geometry import rotation_angles
 
 Optimizer = Callable[[gtsam.NonlinearFactorGraph, gtsam.Values], gtsam.NonlinearOptimizer]
 

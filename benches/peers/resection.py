@@ -23,7 +23,7 @@ import numpy as np
 from scipy.stats import chi2
 
 import photogram
-from photogram.geometry import rotation_angles
+from photogram.network.geometry import rotation_angles
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from resect_random import THREE_SIGMA, Case, cases

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import Block, Result
-from photogram.geometry import rotation_matrix
+from photogram.network.geometry import rotation_matrix
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from agreement import Agreement  # noqa: E402
 from start import intersections  # noqa: E402
 
 import photogram  # noqa: E402
-from photogram import geometry  # noqa: E402
+from photogram.network import geometry  # noqa: E402
 
 Arrays = dict[str, Any]
 Run = Callable[[photogram.Block, side.Floats, side.Record], Arrays]

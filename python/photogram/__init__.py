@@ -5,21 +5,23 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from photogram.former_names import TODAY, found_under_former_names
+
 if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
-    from photogram.adjusted import Iteration
-    from photogram.adjustment import AsPublished, Progress, adjust
-    from photogram.block import Block
+    from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.prediction import predict
+    from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
-    from photogram.geometry import Spheroid
     from photogram.messages import Message
+    from photogram.network.block import Block
+    from photogram.network.geometry import Spheroid
+    from photogram.network.refraction import Refraction
+    from photogram.network.simulation import Simulation, simulate
     from photogram.planning import Plan, plan
-    from photogram.prediction import predict
-    from photogram.refraction import Refraction
-    from photogram.resection import Pose, Resection, resect
-    from photogram.result import Result
-    from photogram.simulation import Simulation, simulate
+    from photogram.results.adjusted import Iteration
+    from photogram.results.result import Result
 
 __all__ = [
     "AdjustmentError",
@@ -51,30 +53,30 @@ __all__ = [
 
 _HOMES = {
     "AdjustmentError": "errors",
-    "AsPublished": "adjustment",
-    "Block": "block",
+    "AsPublished": "adjustment.adjustment",
+    "Block": "network.block",
     "InputError": "errors",
-    "Iteration": "adjusted",
+    "Iteration": "results.adjusted",
     "Message": "messages",
     "Orientation": "absolute_orientation",
     "OutOfMemoryError": "errors",
     "PhotogramError": "errors",
     "Plan": "planning",
-    "Pose": "resection",
-    "Progress": "adjustment",
+    "Pose": "adjustment.resection",
+    "Progress": "adjustment.adjustment",
     "RankError": "errors",
-    "Refraction": "refraction",
-    "Resection": "resection",
-    "Result": "result",
-    "Simulation": "simulation",
-    "Spheroid": "geometry",
+    "Refraction": "network.refraction",
+    "Resection": "adjustment.resection",
+    "Result": "results.result",
+    "Simulation": "network.simulation",
+    "Spheroid": "network.geometry",
     "__version__": "_photocore",
-    "adjust": "adjustment",
+    "adjust": "adjustment.adjustment",
     "orient": "absolute_orientation",
     "plan": "planning",
-    "predict": "prediction",
-    "resect": "resection",
-    "simulate": "simulation",
+    "predict": "adjustment.prediction",
+    "resect": "adjustment.resection",
+    "simulate": "network.simulation",
 }
 """The module of each name, loaded when it is first asked for.
 
@@ -82,10 +84,16 @@ NumPy and the engine take a while, in which the command line could not yet end c
 """
 
 
+found_under_former_names()
+
+
 def __getattr__(name: str) -> object:
-    if name not in _HOMES:
+    if name in _HOMES:
+        value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    elif name in TODAY:
+        value = import_module(f"{__name__}.{TODAY[name]}")
+    else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
 

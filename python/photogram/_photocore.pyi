@@ -319,7 +319,8 @@ def adjust_block(
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
     threads
-        Number of threads, no more than four for each processor; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
+        the calling thread, larger work has all processors.
     memory
         Bytes that the adjustment may take; None for any number.
     progress
@@ -419,6 +420,13 @@ class BlockSolution:
         """What the adjusted values leave undetermined, as in a :class:`BlockError`: there are no cofactors.
 
         None where everything is determined.
+        """
+
+    @property
+    def redundancy_excess(self) -> float | None:
+        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
+
+        None without cofactors, and with a loss.
         """
 
     @property
@@ -595,6 +603,10 @@ class ResectionSolution:
     @property
     def partials(self) -> _Floats:
         """(n, 2, 6) partials of x and y with respect to position and attitude, at the solution."""
+
+    @property
+    def points_behind(self) -> _Indices:
+        """Indices of the points that stand behind the camera, ascending."""
 
     @property
     def sum_of_squares(self) -> float:
@@ -785,7 +797,7 @@ def orient_model(
     tolerance
         Fraction of its standard deviation by which no unknown changes any more (rigorous method).
     threads
-        Number of threads; 0 for all processors.
+        Number of threads; 0 leaves it to the core (see `adjust_block`).
     trace
         Whether the report's methods keep what each cycle computed on its way.
 
@@ -1111,7 +1123,10 @@ class StellarProblem:
         """Right ascension and declination (m, 2) of every image at the initial values."""
 
 class CollectionError(Exception):
-    """A collection cannot be adjusted: (kind, message, photos of each combination, points)."""
+    """A collection cannot be adjusted: (kind, message, photos of each combination, points).
+
+    The kinds are those of :class:`BlockError`, without `no intersection`.
+    """
 
 def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     """Read the numbers of a text, separated by white space, up to the first word that is not a finite number.
@@ -1187,7 +1202,8 @@ def adjust_collection(
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     threads
-        Number of threads, no more than four for each processor; 0 for all processors.
+        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
+        the calling thread, larger work has all processors.
     memory
         Bytes that the adjustment may take; None for any number.
     progress
@@ -1295,6 +1311,13 @@ class CollectionSolution:
     @property
     def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
         """Why there are no cofactors although they were asked for, as in :class:`CollectionError`."""
+
+    @property
+    def redundancy_excess(self) -> float | None:
+        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
+
+        None without cofactors, and with a loss.
+        """
 
     @property
     def counts(self) -> tuple[int, int, int]:

@@ -31,14 +31,14 @@ def run(run):
 
 
 def test_the_example(run, tmp_path):
-    result = run("--example", "--json", "result.json", "--listing", "listing.txt", "--plot", "plan.png")
+    result = run("--example", "--json", "result.json", "--out", "o", "--plots")
     assert result.exit_code == 0, result.output
     assert "converged" in result.output
-    assert {path.name for path in tmp_path.iterdir()} == {
+    assert {path.name for path in tmp_path.iterdir()} == {"result.json", "o"}
+    assert {path.name for path in Path("o").iterdir()} == {
         "points-transformed.csv",
-        "result.json",
-        "listing.txt",
-        "plan.png",
+        "report.txt",
+        "residuals.png",
     }
     document = json.loads(Path("result.json").read_bytes())
     assert set(document) >= {*MEMBERS, "control", "points"}
@@ -51,7 +51,7 @@ def test_the_example(run, tmp_path):
     assert sums == pytest.approx(document["degrees_of_freedom"], abs=1e-8)
     squares = sum((value or 0) ** 2 for station in document["control"] for value in station["residual"])
     assert document["rms"] == pytest.approx((squares / document["known_coordinates"]) ** 0.5)
-    assert Path("plan.png").read_bytes().startswith(b"\x89PNG")
+    assert Path("o/residuals.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("case", cases("partial_mixed", "partial_min"))
@@ -79,18 +79,18 @@ def test_a_station_is_rejected_and_the_solution_restarted(run, case):
     first = run("stations.csv", "--json", "first.json")
     assert re.search(r"^  4 +[XYZ].*<--$", first.output, re.MULTILINE)
     arguments = ["stations.csv", "--reject", 4, "--restart", "first.json", "--method", "report"]
-    assert run(*arguments, "--json", "second.json", "--listing", "second.txt").exit_code == 0
+    assert run(*arguments, "--json", "second.json", "--out", "o").exit_code == 0
     second = json.loads(Path("second.json").read_bytes())
     assert second["start"] == "restart"
     assert second["iterations"] == 2
     assert [station["id"] for station in second["rejected"]] == ["4"]
-    assert "Rejected control" in Path("second.txt").read_text()
+    assert "Rejected control" in Path("o/report.txt").read_text()
     assert second["rms"] < 0.1 * json.loads(Path("first.json").read_bytes())["rms"]
 
 
 def test_part_two_by_itself(run, tmp_path):
-    assert run("--example", "--json", "result.json", "--listing", "listing.txt", "-q").exit_code == 0
-    listing = Path("listing.txt").read_text()
+    assert run("--example", "--json", "result.json", "--out", "o", "-q").exit_code == 0
+    listing = Path("o/report.txt").read_text()
     records = listing[listing.index("as part II reads it") :].splitlines()[2:4]
     Path("cards.txt").write_text("\n".join(records) + "\n")
     source = str(EXAMPLE / "points.csv")
@@ -98,7 +98,7 @@ def test_part_two_by_itself(run, tmp_path):
     bare = run("transform", "cards.txt", source, "b.csv", "--decimals", 5)
     assert "12 points written" in bare.output
     with_sd, without, inline = (
-        Path(name).read_text().splitlines() for name in ("a.csv", "b.csv", "points-transformed.csv")
+        Path(name).read_text().splitlines() for name in ("a.csv", "b.csv", "o/points-transformed.csv")
     )
     assert [line.split(",")[:4] for line in with_sd] == [line.split(",")[:4] for line in inline]
     assert [line.split(",")[:4] for line in without] == [line.split(",")[:4] for line in inline]
@@ -139,9 +139,7 @@ def test_exit_codes(run, tmp_path):
     assert few.exit_code == 3
     assert "insufficient control" in few.output
     Path("points.csv").write_text("id,x,y,z\nA,1,2,bad\n")
-    faulty = run(
-        "--example", "--points", "points.csv", "--json", "r.json", "--listing", "l.txt", "--plot", "p.png"
-    )
+    faulty = run("--example", "--points", "points.csv", "--json", "r.json", "--out", "o", "--plots")
     assert faulty.exit_code == 1
     assert "record 2" in faulty.output
     over = run("--example", "--points", "points.csv", "--points-out", "points.csv")
@@ -161,7 +159,7 @@ def test_the_numbers_of_the_page(run):
         assert result.exit_code == 0, result.output
         texts = [
             result.output,
-            *(path.read_text() for path in Path().glob("*.*") if path.suffix in (".txt", ".csv")),
+            *(path.read_text() for path in Path().rglob("*.*") if path.suffix in (".txt", ".csv")),
         ]
         printed = {line.strip() for text in texts for line in text.splitlines()}
         for line in filter(None, map(str.strip, shown.splitlines())):

@@ -203,14 +203,12 @@ def test_no_file_is_taken_for_a_good_one(run, tmp_path):
     (tmp_path / "points.csv").write_text("id,x,y,z\nP,1,2,3\n")
     result = run(
         *("absolute-orientation", "stations.csv", "--points", "points.csv"),
-        *("--json", "result.json", "--listing", "listing.txt"),
+        *("--json", "result.json", "--out", "o"),
     )
     assert result.exit_code == 3
     assert "probably X and Y of station 0 are exchanged" in result.output
     assert "no points were transformed" in result.output
-    assert {path.name for path in tmp_path.iterdir()} == {
-        *("stations.csv", "points.csv", "result.json", "listing.txt")
-    }
+    assert {path.name for path in tmp_path.iterdir()} == {*("stations.csv", "points.csv", "result.json", "o")}
     document = json.loads((tmp_path / "result.json").read_text())
     assert document["usable"] is False
     assert "do not use these values" in document["messages"][0]

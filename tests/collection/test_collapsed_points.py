@@ -52,6 +52,30 @@ def test_the_others_are_as_if_the_point_were_not_there(tolerance, digits):
     assert np.isnan(result.point_positions[WRONG]).all()
     np.testing.assert_allclose(result.photo_sd, expected.photo_sd, rtol=digits)
     np.testing.assert_allclose(result.point_sd[:WRONG], expected.point_sd, rtol=digits)
+    # It is found as soon as it is there, not after it has crept ten thousand times nearer than the others.
+    assert len(result.iterations) <= len(expected.iterations) + 3
     assert result.degrees_of_freedom == expected.degrees_of_freedom
     numbers = [iteration.number for iteration in result.iterations]
     assert numbers == list(range(1, len(numbers) + 1))
+
+
+def test_a_point_that_other_photos_tell_from_the_station_stays():
+    """However near it is: one photo more sees it where it is."""
+    collection = with_point()
+    near = collection.point_positions[WRONG] - [0.0, 0.5, 0.0] + [0.03, 0.0, 0.04]
+    photos = adjust(SOUND, tolerance=1e-14).photo_parameters
+    extra = [0, 3, 4, 5]
+    others = collection.image_points != WRONG
+    known = collection.replace(
+        point_positions=np.vstack([collection.point_positions[:WRONG], near + 0.01]),
+        image_photos=np.append(collection.image_photos[others], extra),
+        image_points=np.append(collection.image_points[others], [WRONG] * 4),
+        image_xy=np.vstack(
+            [collection.image_xy[others], _photocore.bundler_images(photos[extra], np.tile(near, (4, 1)))]
+        ),
+        image_sd=np.vstack([collection.image_sd[others], np.full((4, 2), 0.5)]),
+    )
+    result = adjust(known, tolerance=1e-12)
+    assert result.converged
+    assert result.point_rays[WRONG] == 4
+    assert np.linalg.norm(result.point_positions[WRONG] - near) < 0.05

@@ -16,9 +16,7 @@ def test_the_example_converges_and_everything_is_written(run, tmp_path):
         "--sd",
         "0.5",
         "--out",
-        "out.txt.bz2",
-        "--report",
-        "report.txt",
+        "out",
         "--json",
         "all.json",
     )
@@ -28,11 +26,20 @@ def test_the_example_converges_and_everything_is_written(run, tmp_path):
     assert document["status"] == "converged"
     assert document["variance_of_unit_weight"] == pytest.approx(1, abs=0.2)
     assert len(document["photos"]) == 8
-    adjusted = read(tmp_path / "out.txt.bz2")
+    adjusted = read(tmp_path / "out" / "adjusted.txt")
     assert 4 * adjusted.cost() == pytest.approx(document["cost"], rel=1e-9)
-    report = (tmp_path / "report.txt").read_text()
+    report = (tmp_path / "out" / "report.txt").read_text()
     assert "Photos: values and standard deviations" in report
     assert f"{document['cost']:.6e}" in report
+
+
+@pytest.mark.parametrize("packing", ["", ".bz2", ".gz"])
+def test_what_was_packed_is_packed_again(run, tmp_path, packing):
+    made = simulate(seed=3)
+    (tmp_path / f"problem.txt{packing}").write_bytes(to_bytes(made.collection, packing))
+    assert run("collection", f"problem.txt{packing}", "--out", "out").exit_code == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"report.txt", f"adjusted.txt{packing}"}
+    assert len(read(tmp_path / "out" / f"adjusted.txt{packing}").image_xy) == len(made.collection.image_xy)
 
 
 def test_a_robust_loss_by_option(run, tmp_path):

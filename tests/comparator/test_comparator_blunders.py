@@ -113,7 +113,7 @@ def test_a_pointing_ten_sigma_off_is_named_with_its_record(run, tmp_path):
     path = tmp_path / "m.csv"
     path.write_bytes(to_csv(changed(session, 1, xy_um=xy)))
     (tmp_path / "1.csv").write_bytes(session.grids[1].to_csv())
-    result = run("comparator", path, "--grid", tmp_path / "1.csv", "--no-pictures")
+    result = run("comparator", path, "--grid", tmp_path / "1.csv", "--no-plots")
     assert result.exit_code == 0
     point = session.cases[1].points[37]
     assert f"case 2, point {point}: a pointing is" in result.output
@@ -181,7 +181,7 @@ def exchanged(tmp_path):
     path = tmp_path / "m.csv"
     path.write_bytes(to_csv(session))
     (tmp_path / "1.csv").write_bytes(session.grids[1].to_csv())
-    return ["comparator", path, "--grid", tmp_path / "1.csv", "--no-pictures"]
+    return ["comparator", path, "--grid", tmp_path / "1.csv", "--no-plots"]
 
 
 def test_the_command_withholds_what_outliers_spoil(run, tmp_path, exchanged):

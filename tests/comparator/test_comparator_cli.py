@@ -74,7 +74,7 @@ def test_the_example_is_what_its_script_makes(tmp_path, monkeypatch):
 
 
 def test_tables_make_one_calibration(run, tables, tmp_path):
-    result = run(*tables, "--no-pictures", "--json", "result.json", "--quiet")
+    result = run(*tables, "--no-plots", "--json", "result.json", "--quiet")
     assert (result.exit_code, result.output) == (0, "")
     assert names(tmp_path / "first-calibrated") == TEXTS | {"grid-1.csv"}
     document = json.loads(Path("result.json").read_bytes())
@@ -88,7 +88,7 @@ def test_tables_make_one_calibration(run, tables, tmp_path):
 def test_batches_of_decks(run, tmp_path):
     card = to_cards(case_2_session()).decode()
     (tmp_path / "batch.txt").write_text(card + card + "\n")
-    result = run("batch.txt", "--no-pictures", "--json", "all.json")
+    result = run("batch.txt", "--no-plots", "--json", "all.json")
     assert result.exit_code == 0, result.output
     assert names("batch-calibrated") == {"1", "2"}
     assert names("batch-calibrated/2") == TEXTS | {"grid-1320.csv"}
@@ -129,7 +129,7 @@ def test_bad_input_writes_nothing(run, tables, tmp_path):
 
 
 def test_as_published_cuts_the_sigmas_after_the_linear_fit_only(run):
-    lines = run("--example", "--as-published", "--no-pictures", "--out", "out").output.splitlines()
+    lines = run("--example", "--as-published", "--no-plots", "--out", "out").output.splitlines()
     sigmas = {line[:40].strip(): line.split()[-3:] for line in lines if line.startswith("  AFTER LINEAR")}
     assert sigmas["AFTER LINEAR CORRECTIONS"] == ["1.448", "0.923", "1.214"]
     assert sigmas["AFTER LINEAR AND NONLINEAR CORRECTIONS"] == ["0.897", "0.897", "0.897"]
@@ -149,10 +149,10 @@ def test_handedness_must_agree(run, tables):
 def test_strict_turns_remarks_into_errors(run, tables):
     lines = tables[0].read_text().splitlines()
     tables[0].write_text("\n".join(line for line in lines if not line.startswith("1,1,1,0,25,")) + "\n")
-    lenient = run(*tables, "--no-pictures")
+    lenient = run(*tables, "--no-plots")
     assert lenient.exit_code == 0
     assert "  case 1: 1 of 25 points of plate 1 are missing" in lenient.output
-    strict = run(*tables, "--no-pictures", "--strict", "--out", "strict")
+    strict = run(*tables, "--no-plots", "--strict", "--out", "strict")
     assert strict.exit_code == 1
     assert not Path("strict").exists()
 
@@ -160,7 +160,7 @@ def test_strict_turns_remarks_into_errors(run, tables):
 def test_the_date_of_the_run_stands_on_the_title_page_only(run, tables, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "94435200")
     for out, said in (("a", []), ("b", ["--date", "12/29/72"])):
-        assert run(*tables, "--no-pictures", "--out", out, "--json", f"{out}.json", *said).exit_code == 0
+        assert run(*tables, "--no-plots", "--out", out, "--json", f"{out}.json", *said).exit_code == 0
     first, second = (Path(out, "listing.txt").read_text().splitlines() for out in ("a", "b"))
     different = [pair for pair in zip(first, second, strict=True) if pair[0] != pair[1]]
     assert [[line.split() for line in pair] for pair in different] == [
@@ -170,7 +170,7 @@ def test_the_date_of_the_run_stands_on_the_title_page_only(run, tables, monkeypa
         assert Path("a", name).read_bytes() == Path("b", name).read_bytes()
     assert Path("a.json").read_bytes() == Path("b.json").read_bytes()
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "²")
-    refused = run(*tables, "--no-pictures", "--out", "c")
+    refused = run(*tables, "--no-plots", "--out", "c")
     assert refused.exit_code == 1
     assert "SOURCE_DATE_EPOCH is '²': no seconds since 1970" in refused.stderr
     assert not Path("c").exists()
@@ -179,14 +179,14 @@ def test_the_date_of_the_run_stands_on_the_title_page_only(run, tables, monkeypa
 def test_the_date_of_the_run_is_today_where_nothing_is_said(run, tables, monkeypatch):
     monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
     before = datetime.now(UTC).date()
-    assert run(*tables, "--no-pictures", "--out", "a").exit_code == 0
+    assert run(*tables, "--no-plots", "--out", "a").exit_code == 0
     (line,) = [line for line in Path("a/listing.txt").read_text().splitlines() if "DATE OF RUN" in line]
     assert before <= date.fromisoformat(line.split()[-1]) <= datetime.now(UTC).date()
 
 
 def test_tables_and_pictures_of_every_case(run, tables):
-    assert run(*tables, "--no-pictures", "--out", "a").exit_code == 0
-    assert run(*tables, "--no-pictures", "--out", "b", "--each-case").exit_code == 0
+    assert run(*tables, "--no-plots", "--out", "a").exit_code == 0
+    assert run(*tables, "--no-plots", "--out", "b", "--each-case").exit_code == 0
     pages = [Path(out, "listing.txt").read_text().count("NONLINEAR CORRECTIONS, CASE") for out in ("a", "b")]
     assert pages == [0, 4]
 
@@ -204,7 +204,7 @@ def test_tables_and_pictures_of_every_case(run, tables):
 def test_settings_that_cannot_be_name_their_record(run, tables, setting, words):
     kept = [line for line in tables[0].read_text().splitlines() if not line.startswith("#")]
     tables[0].write_text("\n".join([f"# {setting}", *kept]) + "\n")
-    result = run(*tables, "--no-pictures")
+    result = run(*tables, "--no-plots")
     assert result.exit_code == 1
     assert isinstance(result.exception, SystemExit)
     assert f"{tables[0]}, record 1: " in result.stderr
@@ -213,7 +213,7 @@ def test_settings_that_cannot_be_name_their_record(run, tables, setting, words):
 
 @pytest.mark.parametrize("grid", ["²", "9" * 30, "9" * 5000, "a\0b"])
 def test_names_of_plates_that_cannot_be(run, tables, grid):
-    result = run(*tables[:2], "--grid", grid, "--no-pictures")
+    result = run(*tables[:2], "--grid", grid, "--no-plots")
     assert result.exit_code == 1
     assert isinstance(result.exception, SystemExit)
 
@@ -227,7 +227,7 @@ def test_no_result_goes_over_a_plate_that_was_read(run, tables, tmp_path):
         if not named:
             first = tables[0].read_text()
             tables[0].write_text(f"# grid = grid-1.csv\n{first}")
-        result = run(*tables[:2], *named, "--no-pictures", "--out", tmp_path)
+        result = run(*tables[:2], *named, "--no-plots", "--out", tmp_path)
         assert result.exit_code == 1
         assert isinstance(result.exception, SystemExit)
         assert str(given) in result.stderr
@@ -242,9 +242,9 @@ def test_the_middle_of_the_range_comes_from_the_table(run, tables):
 
 
 def test_correct_applies_and_inverts(run, tables, tmp_path):
-    assert run(*tables, "--no-pictures", "--out", "out", "--quiet").exit_code == 0
+    assert run(*tables, "--no-plots", "--out", "out", "--quiet").exit_code == 0
     Path("points.csv").write_text("name,x_mm,y_mm\na,50.0001,60\nb,200,12.5\n")
-    result = run("correct", "out/correction-joint.json", "points.csv", "--out", "corrected.csv")
+    result = run("correct", "out/correction-joint.json", "points.csv", "corrected.csv")
     assert result.exit_code == 0, result.output
     head, *rows = Path("corrected.csv").read_text().splitlines()
     assert head == "name,x_mm,y_mm,corrected_x_um,corrected_y_um,sd_x_um,sd_y_um"

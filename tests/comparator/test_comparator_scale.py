@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from plates import QUICK, STRAIGHT, noisy
 
+from photogram import OutOfMemoryError
 from photogram.comparator import Grid, calibrate, listing, simulate_calibration, to_json
+from photogram.comparator.calibration import needed_memory
 from photogram.comparator.gridsigma import unbiased_grid_sigma
 from photogram.comparator.grouping import group_as_listed, rows_by_point
 from photogram.comparator.orientation import locations
@@ -43,6 +45,22 @@ def test_memory_grows_with_the_points():
     small, double = peak(large(24)), peak(large(48))
     assert small < 40e6
     assert double < 5 * small
+
+
+def test_the_estimate_of_memory_holds():
+    for columns in (6, 24, 48):
+        session = large(columns)
+        assert peak(session) < needed_memory(sum(len(case.points) for case in session.cases))
+
+
+def test_what_memory_does_not_hold_is_refused(monkeypatch):
+    session = large(6)
+    pointings = sum(len(case.points) for case in session.cases)
+    monkeypatch.setattr("photogram.memory.available_memory", lambda: needed_memory(pointings) - 1)
+    with pytest.raises(OutOfMemoryError, match=f"a calibration of {pointings} pointings would take"):
+        calibrate(session, QUICK)
+    monkeypatch.setattr("photogram.memory.available_memory", lambda: needed_memory(pointings))
+    calibrate(session, QUICK)
 
 
 def dense_grid_sigma(grid_rows, cases, stage):

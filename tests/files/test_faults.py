@@ -120,8 +120,7 @@ def test_every_call_fails_in_turn_under_a_command(run, tmp_path, monkeypatch, la
                 "o.csv",
                 "--json",
                 "r.json",
-                "--listing",
-                "l.txt",
+                *("--method", "report", "--trace", "l.txt"),
             )
         if system.failed is None:
             break

@@ -34,7 +34,7 @@ RUNS = {
         ["former.json", "points.csv"],
     ),
     "comparator calibrate": (
-        ["comparator", "comparator-3.txt", "--grid", "grid.csv", "--no-pictures"],
+        ["comparator", "comparator-3.txt", "--grid", "grid.csv", "--no-plots"],
         ["comparator-3.txt", "grid.csv"],
     ),
     "comparator correct": (
@@ -243,7 +243,7 @@ def test_the_default_directory_may_be_a_link_to_the_input(run, place, name):
 def test_files_of_an_output_directory_spare_the_inputs(run, place, name):
     (place / "comparator-3.txt").rename(place / "listing.txt")
     before = content(place)
-    result = run("comparator", "listing.txt", "--no-pictures", "--out", place)
+    result = run("comparator", "listing.txt", "--no-plots", "--out", place)
     assert result.exit_code == 1, (name, result.output)
     assert "listing.txt: would be written over the input" in result.stderr
     assert content(place) == before
@@ -272,7 +272,7 @@ def test_files_of_an_output_directory_spare_the_other_results(run, place, name, 
 def test_the_packaged_example_is_an_input(run, tmp_path):
     packaged = EXAMPLES / "collection" / "ring.txt"
     before = packaged.read_bytes()
-    result = run("collection", "--example", "--out", packaged)
+    result = run("collection", "--example", "--json", packaged)
     assert result.exit_code == 1
     assert "would be written over the input" in result.stderr
     assert packaged.read_bytes() == before

@@ -38,7 +38,10 @@ TOLERANCE = 1e-9
 """Of the engine."""
 HOPELESS = 1e6
 """Condition of the scaled equations beyond which normal equations have no digits that could be compared."""
-ENDINGS = ("agree", "too weak to compare", "not converged", "refused by name", "differ")
+TOLD = ("hardly determine", "lose digits to rounding")
+"""Of the engine's remarks that its values may be off."""
+SAID = "differ, and said so"
+ENDINGS = ("agree", "too weak to compare", "not converged", "refused by name", SAID, "differ")
 
 
 def _size(random: np.random.Generator) -> dict[str, object]:
@@ -189,7 +192,9 @@ def _compared(block: Block, result: Result) -> Comparison:
     redundancy = float(np.abs(result.redundancy[place.images].ravel() - numbers).max())
     fine = max(EXACT, ROUNDING * condition**2, _bent(block, result, deviations / scale))
     same = moved < max(NEAR, fine) and cofactors < fine and redundancy < fine
-    return Comparison("agree" if same else "differ", condition, moved, cofactors, redundancy)
+    told = any(remark in str(message) for message in result.messages for remark in TOLD)
+    ending = "agree" if same else SAID if told else "differ"
+    return Comparison(ending, condition, moved, cofactors, redundancy)
 
 
 def _bent(block: Block, result: Result, deviations: Floats) -> float:

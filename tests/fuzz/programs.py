@@ -40,7 +40,7 @@ class Watch:
     COMPUTATIONS = (
         ("photogram", "adjust"),
         ("photogram", "orient"),
-        ("photogram.giant.checks", "check"),
+        ("photogram.giant", "check"),
         ("photogram.collection", "adjust"),
         ("photogram.perspective_center.batch", "determine"),
         ("photogram.comparator", "calibrate"),

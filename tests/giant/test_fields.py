@@ -18,10 +18,9 @@ from photogram.giant.fields import (
     format_real,
     natural_order,
     parse_angle,
-    parse_integer,
     parse_name,
-    parse_real,
 )
+from photogram.io.fields import parse_integer, parse_real
 
 GOLDEN = json.loads((Path(__file__).parents[1] / "data" / "giant" / "golden_cases.json").read_text())
 

@@ -68,10 +68,10 @@ def test_the_example_is_what_its_script_makes():
 
 
 def test_everything_is_written(run, tmp_path):
-    result = run("--example", "--json", "out.json", "--listing", "out.txt", "--plot", "out.png")
+    result = run("--example", "--json", "out.json", "--out", "o", "--plots")
     assert result.exit_code == 0, result.output
     assert "data set 2: 25 points, 60 readings, least squares" in result.output
-    assert "written: out.json, out.txt, out.png" in result.output
+    assert "written: out.json, o/listing.txt, o/residuals.png" in result.output
     document = json.loads(Path("out.json").read_text())
     assert document["error"] is None
     assert len(document["sets"]) == 2
@@ -92,9 +92,9 @@ def test_everything_is_written(run, tmp_path):
         for point in each["points"]:
             assert set(point) == POINT
             assert all(len(point[name]) == 2 for name in ("mean", "residual", "redundancy", "standardized"))
-    assert Path("out.txt").read_text() == listing(run_deck(Path(str(EXAMPLE))))
-    assert Path("out.png").read_bytes().startswith(b"\x89PNG")
-    assert {path.name for path in tmp_path.iterdir()} == {"out.json", "out.txt", "out.png"}
+    assert Path("o/listing.txt").read_text() == listing(run_deck(Path(str(EXAMPLE))))
+    assert Path("o/residuals.png").read_bytes().startswith(b"\x89PNG")
+    assert {path.name for path in tmp_path.iterdir()} == {"out.json", "o"}
 
 
 def test_the_document_agrees_with_the_result():
@@ -130,20 +130,20 @@ def test_usage(run):
 def test_no_convergence_is_an_exit_code(run, tmp_path):
     text = EXAMPLE.read_text().replace("    0.0010", "    0.0000", 1)
     (tmp_path / "deck").write_text(text)
-    result = run("deck", "--as-published", "--listing", "out.txt")
+    result = run("deck", "--as-published", "--out", "o")
     assert result.exit_code == 3
-    assert Path("out.txt").read_text().count("SORRY - SOLUTION DOES NOT CONVERGE") == 2
+    assert Path("o/listing.txt").read_text().count("SORRY - SOLUTION DOES NOT CONVERGE") == 2
     assert run("deck").exit_code == 0
 
 
 def test_a_set_that_cannot_be_solved_stops_the_run(run, singular):
-    result = run(singular, "--json", "out.json", "--listing", "out.txt", "--plot", "out.svg")
+    result = run(singular, "--json", "out.json", "--out", "o", "--plots")
     assert result.exit_code == 3
     assert "NORMAL EQUATIONS MATRIX IS SINGULAR: fewer than three points" in result.output
     document = json.loads(Path("out.json").read_text())
     assert len(document["sets"]) == 1
     assert document["error"].startswith("NORMAL EQUATIONS MATRIX IS SINGULAR")
-    pages = Path("out.txt").read_text().split("\f")
+    pages = Path("o/listing.txt").read_text().split("\f")
     assert "TWO POINTS" in pages[-1]
     assert pages[-1].rstrip().endswith("NORMAL EQUATIONS MATRIX IS SINGULAR")
 

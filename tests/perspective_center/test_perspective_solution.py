@@ -138,6 +138,21 @@ def test_bad_approximations_are_replaced(make_grid):
         ]
 
 
+def test_points_behind_the_projector_are_named(make_grid):
+    """The program of 1969 follows its approximations to below the model, where the equations hold as well."""
+    below = make_grid(initial=np.array([250.0, 250.0, -310.0, 0.0, 0.0, 3.0]))
+    result = determine(below, as_published=True)
+    assert result.converged
+    assert result.position[2] < 0
+    assert "25 image points have their point behind the camera: points 1, 2," in str(result.messages[0])
+    assert (
+        determine(
+            make_grid(initial=np.array([250.0, 250.0, 310.0, 0.0, 0.0, 0.3])), as_published=True
+        ).messages
+        == []
+    )
+
+
 def test_as_published_needs_approximations(make_grid):
     with pytest.raises(InputError, match="needs initial approximations"):
         determine(make_grid(), as_published=True)

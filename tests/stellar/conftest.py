@@ -26,3 +26,31 @@ def truth(plate):
 
     solved = calibrate(plate).solved.parameters
     return plates.seen(plates.quiet(plate), solved)
+
+
+@pytest.fixture(scope="module")
+def night():
+    """Return the example of a night."""
+    from nights import EXAMPLE
+
+    from photogram.stellar.night_file import read_night
+
+    return read_night(EXAMPLE)
+
+
+@pytest.fixture(scope="module")
+def result(night):
+    """Return the calibration of the night of the module."""
+    from photogram.stellar.night import calibrate_night
+
+    return calibrate_night(night)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Return a folder with the files of the example."""
+    from nights import EXAMPLE
+
+    for name in ("night.toml", "images.csv"):
+        (tmp_path / name).write_bytes((EXAMPLE.parent / name).read_bytes())
+    return tmp_path

@@ -6,7 +6,6 @@ import numpy as np
 
 from photogram.angles import ARCSEC
 from photogram.stellar.parameters import INDEX, NAMES
-from photogram.stellar.reduction import columns
 
 PLATE_SD, STAR_SD = 3e-6, 0.2 * ARCSEC
 """Noise of the computed references."""
@@ -138,13 +137,23 @@ def dense(problem, parameters, places, free):
     return parameters, places, cofactors, right @ right
 
 
+def columns(equations, groups):
+    """Return (m, 2, 26) partials by all parameters."""
+    rows = np.zeros((len(groups), 2, len(NAMES)))
+    rows[:, :, 9:] = equations["common"]
+    image = np.arange(len(groups))
+    for k in range(3):
+        rows[image, :, 3 * groups + k] = equations["pointing"][:, :, k]
+    return rows
+
+
 def equations(problem, parameters, places, free):
     """Return all observation equations with unit weight: images, stars, axis, weighted parameters."""
     first, unknowns = len(NAMES), len(NAMES) + 2 * len(places)
     core = problem.core(parameters, places, ~free)
     found, image = core.equations(), np.arange(len(problem.image_stars))
     images = np.zeros((len(image), 2, unknowns))
-    images[:, :, :first] = columns(problem, found, problem.image_groups)
+    images[:, :, :first] = columns(found, problem.image_groups)
     for k in range(2):
         images[image, :, first + 2 * problem.image_stars + k] = found["star"][:, :, k]
     known = np.flatnonzero(problem.known)
@@ -155,7 +164,7 @@ def equations(problem, parameters, places, free):
     ]
     if problem.axis is not None:
         axis, row = core.axis_equations(), np.zeros((1, 2, unknowns))
-        row[:, :, :first] = columns(problem, axis, np.array([problem.axis.group]))
+        row[:, :, :first] = columns(axis, np.array([problem.axis.group]))
         blocks.append((problem.axis.weight[None], row, axis["constant"]))
     weighted = np.flatnonzero(problem.weighted & free)
     if weighted.size:

@@ -1,9 +1,6 @@
 """Exposures against each other, and what a night says of itself when they do not fit."""
 
-import runpy
 from dataclasses import replace
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,26 +16,11 @@ from photogram.stellar.night_file import read_night
 from photogram.stellar.places import apparent_places, sidereal_time
 from photogram.stellar.skies import calibrate_exposures
 
-EXAMPLE = Path(str(files("photogram") / "examples" / "exposures" / "night.toml"))
-MAKER = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "make_exposures.py"))
-
 
 @pytest.fixture(scope="module")
-def night():
-    night = read_night(EXAMPLE)
+def night(night):
+    """Return the night without a pole: exposures held out are compared in the frame of the adjustment."""
     return replace(night, earth=replace(night.earth, pole=(0.0, 0.0)))
-
-
-@pytest.fixture(scope="module")
-def result(night):
-    return calibrate_night(night)
-
-
-@pytest.fixture
-def folder(tmp_path):
-    for name in ("night.toml", "images.csv"):
-        (tmp_path / name).write_bytes((EXAMPLE.parent / name).read_bytes())
-    return tmp_path
 
 
 def test_an_exposure_held_out_is_what_an_adjustment_without_it_says(night, result):

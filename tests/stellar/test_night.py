@@ -1,14 +1,13 @@
 """A night of exposures: from the files of the packaged example to the camera that made them."""
 
 import json
-import runpy
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 import erfa
 import numpy as np
 import pytest
+from nights import EXAMPLE, MAKER
 from observer import places_of_j2000
 from typer.testing import CliRunner
 
@@ -28,26 +27,7 @@ from photogram.stellar.pointing import attitude_of, axis_of
 from photogram.stellar.skies import calibrate_exposures, project_sky, stars_near
 from photogram.stellar.transformation import pole_matrix, terrestrial
 
-EXAMPLE = Path(str(files("photogram") / "examples" / "exposures" / "night.toml"))
-MAKER = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "make_exposures.py"))
 TRUTH = MAKER["CAMERA"].values
-
-
-@pytest.fixture(scope="module")
-def night():
-    return read_night(EXAMPLE)
-
-
-@pytest.fixture(scope="module")
-def result(night):
-    return calibrate_night(night)
-
-
-@pytest.fixture
-def folder(tmp_path):
-    for name in ("night.toml", "images.csv"):
-        (tmp_path / name).write_bytes((EXAMPLE.parent / name).read_bytes())
-    return tmp_path
 
 
 def normalized(result):

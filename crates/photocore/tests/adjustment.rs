@@ -5,7 +5,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use std::collections::HashSet;
 use std::ops::ControlFlow;
+use std::sync::Mutex;
+use std::thread::{self, ThreadId};
 
 use photocore::adjustment::{
     AdjustError, Adjustment, Criterion, Event, Model, Options, Phase, Problem, Status, adjust,
@@ -134,6 +137,7 @@ fn redundancy_numbers_sum_to_the_degrees_of_freedom_from_free_to_fixed() {
         assert_eq!(adjusted.status, Status::Converged);
         let counts = adjusted.counts;
         let fixed = if sd == 0.0 { DATUM.len() } else { 0 };
+        assert!(adjusted.redundancy_excess.unwrap().abs() < 1e-9);
         assert_eq!(counts.observations, 2 * POINTS * FRAMES);
         assert_eq!((counts.weighted, counts.unknowns), (6 - fixed, UNKNOWNS - fixed));
         let redundancy = adjusted.redundancy.unwrap().iter().sum::<f64>()
@@ -279,4 +283,43 @@ fn without_covariance_there_is_none() {
     assert_eq!(adjusted.status, Status::Converged);
     assert!(adjusted.cofactors.is_none() && adjusted.redundancy.is_none());
     assert!(adjusted.prior_redundancy.is_none());
+}
+
+/// Which thread observes.
+#[derive(Debug)]
+struct Witness {
+    frames: Frames,
+    seen: Mutex<HashSet<ThreadId>>,
+}
+
+impl Model for Witness {
+    type Prepared = Vec<f64>;
+
+    fn prepare(&self, unknowns: &[f64]) -> Vec<f64> {
+        self.frames.prepare(unknowns)
+    }
+
+    fn observe(&self, values: &Vec<f64>, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        self.seen.lock().unwrap().insert(thread::current().id());
+        self.frames.observe(values, local, group, rows);
+    }
+}
+
+#[test]
+fn a_thread_of_another_pool_watches_and_leaves_the_work_to_the_pool_that_it_is_given() {
+    let of_pools = thread::spawn(|| {
+        let own = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().unwrap();
+        let other = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        [&own, &other].map(|pool| {
+            let mut held = problem();
+            hold(&mut held, &DATUM, 0.0);
+            let Problem { model, system, observation_sd, initial, prior, sd } = held;
+            let model = Witness { frames: model, seen: Mutex::default() };
+            let problem = Problem { model, system, observation_sd, initial, prior, sd };
+            let mut watch = |_: Event| ControlFlow::Continue(());
+            adjust(&problem, &STRICT, pool, &mut watch).unwrap();
+            problem.model.seen.into_inner().unwrap().contains(&thread::current().id())
+        })
+    });
+    assert_eq!(of_pools.join().unwrap(), [true, false]);
 }

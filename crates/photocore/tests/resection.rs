@@ -223,3 +223,16 @@ fn poses_that_fit_as_well_are_told() {
     assert!(all.map(from).fold(f64::INFINITY, f64::min) < 1e-6);
     assert!((solution.outside_danger_cylinder.unwrap()).abs() > 1.0);
 }
+
+#[test]
+fn points_behind_the_camera_are_told_and_no_start_of_our_own_ends_there() {
+    // Below the points and looking up where they were seen from above: the equations hold.
+    let mut start = POSE;
+    start.position[2] = -900.0;
+    let given = Resection { start: Some(start), ..resection(&POSE, &POINTS, 0.0) };
+    let below = adjust(&given, &STRICT).unwrap();
+    assert_eq!(below.adjustment.status, Status::Converged);
+    assert_eq!(below.behind, (0..POINTS.len()).collect::<Vec<_>>());
+    let above = adjust(&resection(&POSE, &POINTS, 0.0), &STRICT).unwrap();
+    assert!(above.behind.is_empty());
+}

@@ -123,8 +123,8 @@ fn control_that_does_not_determine_is_refused() {
     let mut line = stations(&truth, |_| [true; 3]);
     for (i, station) in line.iter_mut().enumerate() {
         let along = i as f64 - 3.0;
-        (station.control, station.model) =
-            ([along, 2.0 * along, 0.1 * along], [along, 2.0 * along, 0.1 * along]);
+        let at = Vector3::new(along, 2.0 * along, 0.1 * along);
+        (station.control, station.model) = (at, at);
     }
     let Err(SimilarityError::Undetermined { cause, stations }) = run(&line, &PLAIN) else { panic!() };
     assert_eq!((cause, stations.len()), (Cause::StationsInLine, 8));

@@ -1,17 +1,16 @@
 //! Joint calibration of a comparator; its documentation is in `_photocore.pyi`.
 
-use std::ops::ControlFlow;
-
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::adjustment::{Criterion, Options, Status};
 use photocore::programs::comparator::{
     Basis, Calibration, CalibrationError, Case, Comparator, GridPoint, Measurement, Placement, Solution,
 };
 use pyo3::create_exception;
-use pyo3::exceptions::{PyException, PyValueError};
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 use crate::arrays::{check_lengths, indices, rows, squares, table};
+use crate::work::{Workers, watched};
 
 create_exception!(
     _photocore,
@@ -78,15 +77,8 @@ fn adjust_comparator(
     };
     let options =
         Options { criterion: Criterion::Fraction(limit), max_iterations, covariance: true, loss: None };
-    // A calibration takes milliseconds: threads would cost more than they save.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let pool = pool.map_err(|error| PyValueError::new_err(error.to_string()))?;
-    let solution = py.detach(|| {
-        calibration.adjust(&options, &pool, &mut |_| match Python::attach(|py| py.check_signals()) {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(_) => ControlFlow::Break(()),
-        })
-    });
+    let workers = Workers::of(0, calibration.measurements.len());
+    let solution = watched(py, workers, None, |pool, watch| calibration.adjust(&options, pool, watch))?;
     solution.map(|solution| ComparatorSolution { solution }).map_err(|error| failure(&error))
 }
 

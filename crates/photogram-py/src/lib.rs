@@ -1,17 +1,17 @@
 //! The extension module `photogram._photocore`: converts arrays, releases the GIL, decides nothing.
 
 mod arrays;
-mod block;
-mod collection;
 mod comparator;
 mod distributions;
 mod geometry;
 mod memory;
+mod network;
 mod options;
 mod resection;
 mod similarity;
 mod solution;
 mod stellar;
+mod work;
 
 use pyo3::prelude::*;
 
@@ -24,8 +24,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     distributions::register(module)?;
     geometry::register(module)?;
-    block::register(module)?;
-    collection::register(module)?;
+    network::register(module)?;
     comparator::register(module)?;
     resection::register(module)?;
     similarity::register(module)?;

@@ -1,10 +1,7 @@
 //! Resection of one photo; its documentation is in `_photocore.pyi`.
 
-use std::cell::Cell;
-use std::ops::ControlFlow;
-
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
-use photocore::adjustment::{Criterion, Event, Options};
+use photocore::adjustment::{Criterion, Options};
 use photocore::programs::resection::{
     AdjustedImage, ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError as Failure,
     Solution,
@@ -12,11 +9,11 @@ use photocore::programs::resection::{
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::arrays::{check_lengths, numbers, rows, squares, table};
 use crate::geometry::{object_space, rotation_sense};
 use crate::solution::{IterationRow, iteration_row, status_name};
+use crate::work::{Workers, watched};
 
 create_exception!(_photocore, ResectionError, PyException, "The photo cannot be resected: (kind, message).");
 
@@ -82,41 +79,12 @@ fn resect(
     run(py, &resection, &Options { criterion, max_iterations, covariance, loss: None })
 }
 
-/// The calling thread as a pool of one thread. One photo is too little work for another thread, and handing it over would take
-/// longer than the work. A thread can be in one pool only and stays in it: it is made once for each calling thread.
-fn own_thread() -> PyResult<&'static ThreadPool> {
-    thread_local! {
-        static POOL: Cell<Option<&'static ThreadPool>> = const { Cell::new(None) };
-    }
-    if let Some(pool) = POOL.get() {
-        return Ok(pool);
-    }
-    let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-    let pool = Box::leak(Box::new(pool.map_err(|error| PyValueError::new_err(error.to_string()))?));
-    POOL.set(Some(pool));
-    Ok(pool)
-}
-
-/// Adjusts without the GIL; signals are looked after between iterations, on this thread.
+/// Adjusts on the calling thread: one photo is too little work for another one.
 fn run(py: Python<'_>, resection: &Resection, options: &Options) -> PyResult<ResectionSolution> {
-    let pool = own_thread()?;
-    let mut raised = None;
-    let mut watch = |event: Event| match event {
-        Event::Progress { .. } => ControlFlow::Continue(()),
-        Event::Iteration(_) => match Python::attach(|py| py.check_signals()) {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(error) => {
-                raised = Some(error);
-                ControlFlow::Break(())
-            }
-        },
-    };
-    let solution = py.detach(|| resection.adjust(options, pool, &mut watch));
-    match (solution, raised) {
-        (_, Some(error)) => Err(error),
-        (Ok(solution), None) => Ok(ResectionSolution { solution }),
-        (Err(error), None) => Err(ResectionError::new_err((kind(error), error.to_string()))),
-    }
+    let solution = watched(py, Workers::Caller, None, |pool, watch| resection.adjust(options, pool, watch))?;
+    solution
+        .map(|solution| ResectionSolution { solution })
+        .map_err(|error| ResectionError::new_err((kind(error), error.to_string())))
 }
 
 fn pose(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<[[f64; 3]; 2]> {
@@ -239,6 +207,11 @@ impl ResectionSolution {
         let count = self.solution.images.len();
         let values: Vec<[[f64; 6]; 2]> = self.solution.images.iter().map(|image| image.partials).collect();
         PyArray1::from_vec(py, values.into_flattened().into_flattened()).reshape([count, 2, 6])
+    }
+
+    #[getter]
+    fn points_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_vec(py, self.solution.behind.iter().map(|&point| point as i64).collect())
     }
 
     #[getter]

@@ -1,7 +1,5 @@
 //! Absolute orientation; its documentation is in `_photocore.pyi`.
 
-use std::ops::ControlFlow;
-
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
 use photocore::programs::similarity::{
     AdjustedStation, Matrix7, Method, Options, Parameters, Similarity, SimilarityError as Failure, Solution,
@@ -12,8 +10,8 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{check_lengths, from_rows, row_major, rows, squares, table};
-use crate::block::pool;
 use crate::solution::{IterationRow, iteration_row, status_name};
+use crate::work::{Workers, watched};
 
 create_exception!(
     _photocore,
@@ -105,29 +103,15 @@ fn orient_model(
     run(py, &stations, &options, threads)
 }
 
-/// Orients without the GIL; signals are looked after between the phases of the adjustment.
 fn run(
     py: Python<'_>,
     stations: &[Station],
     options: &Options,
     threads: usize,
 ) -> PyResult<SimilaritySolution> {
-    let pool = pool(threads)?;
-    let mut raised = None;
-    let solution = py.detach(|| {
-        orient(stations, options, &pool, &mut |_| match Python::attach(|py| py.check_signals()) {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(error) => {
-                raised = Some(error);
-                ControlFlow::Break(())
-            }
-        })
-    });
-    match (solution, raised) {
-        (_, Some(error)) => Err(error),
-        (Ok(solution), None) => Ok(SimilaritySolution { solution }),
-        (Err(error), None) => Err(failure(&error)),
-    }
+    let workers = Workers::of(threads, stations.len());
+    let solution = watched(py, workers, None, |pool, watch| orient(stations, options, pool, watch))?;
+    solution.map(|solution| SimilaritySolution { solution }).map_err(|error| failure(&error))
 }
 
 fn failure(error: &Failure) -> PyErr {

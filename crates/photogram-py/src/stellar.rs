@@ -4,8 +4,8 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::adjustment::{Criterion, Options as AdjustmentOptions, Status};
 use photocore::geometry::{Air, Station, pointing, pointing_angles};
 use photocore::programs::stellar::{
-    Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Options, Rows, Star,
-    StellarError as Failure, Tested, Tolerances, Weights,
+    Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Observations, Options, Rows,
+    Star, StellarError as Failure, Tested, Tolerances, Weights,
 };
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
@@ -13,14 +13,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{check_lengths, from_rows, indices, matrices, numbers, row_major, rows, squares, table};
-use crate::block::watched;
 use crate::solution::iteration_row;
+use crate::work::{Watch, Workers, watched};
 
 create_exception!(
     _photocore,
     StellarError,
     PyException,
-    "The camera cannot be calibrated: (kind, message, stars)."
+    "The camera cannot be calibrated: (kind, message, indices of stars or parameters)."
 );
 
 /// Adds the class and the functions to the extension module.
@@ -250,7 +250,7 @@ impl StellarProblem {
         })
     }
 
-    #[pyo3(signature = (*, unit, fraction, max_iterations, covariance, threads, progress))]
+    #[pyo3(signature = (*, unit, fraction, max_iterations, covariance, threads, progress, whole=false))]
     fn adjust<'py>(
         &self,
         py: Python<'py>,
@@ -260,17 +260,19 @@ impl StellarProblem {
         covariance: bool,
         threads: usize,
         progress: Option<Py<PyAny>>,
+        whole: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let criterion = Criterion::Fraction(fraction);
         let options = Options {
             adjustment: AdjustmentOptions { criterion, max_iterations, covariance, loss: None },
             unit,
+            whole,
         };
-        let work = |pool: &rayon::ThreadPool, watch: &mut dyn FnMut(_) -> _| {
-            self.calibration.adjust(&options, pool, watch)
-        };
-        let solution = watched(py, threads, progress, work)?.map_err(|error| failure(&error))?;
-        let found = PyDict::new(py);
+        let work =
+            |pool: &rayon::ThreadPool, watch: Watch<'_>| self.calibration.adjust(&options, pool, watch);
+        let solution = watched(py, Workers::of(threads, self.calibration.images.len()), progress, work)?
+            .map_err(|error| failure(&error))?;
+        let found = observations(py, solution.observations)?;
         let status = match solution.adjustment.status {
             Status::Converged => "converged",
             Status::NotConverged => "not converged",
@@ -281,16 +283,61 @@ impl StellarProblem {
         found.set_item("iterations", iterations)?;
         found.set_item("initial_sum_of_squares", solution.adjustment.initial_sum_of_squares)?;
         found.set_item("parameters", PyArray1::from_vec(py, solution.parameters))?;
-        found.set_item("cofactors", PyArray1::from_vec(py, solution.cofactors))?;
-        found.set_item("places", table(py, solution.places)?)?;
-        found.set_item("place_cofactors", squares(py, solution.place_cofactors)?)?;
-        found.set_item("residuals", table(py, solution.residuals)?)?;
-        found.set_item("axis_residual", solution.axis_residual)?;
-        found.set_item("sums_of_squares", solution.sums_of_squares)?;
-        tests(&found, "image", &solution.image_tests)?;
-        tests(&found, "place", &solution.place_tests)?;
         tests(&found, "axis", &[solution.axis_test])?;
+        if let Some(cofactors) = solution.cofactors {
+            let pointings = self.calibration.pointings.len();
+            let own = PyArray1::from_vec(py, cofactors.own).reshape([pointings, 3, 3])?;
+            let cross = PyArray1::from_vec(py, cofactors.cross).reshape([pointings, 3, COMMON])?;
+            let common = PyArray1::from_vec(py, cofactors.common).reshape([COMMON, COMMON])?;
+            found.set_item("pointing_cofactors", own)?;
+            found.set_item("cross_cofactors", cross)?;
+            found.set_item("common_cofactors", common)?;
+        }
+        if let Some((log_determinant, cofactors)) = solution.whole {
+            self.set_whole(&found, log_determinant, cofactors)?;
+        }
         Ok(found)
+    }
+
+    fn without_effect(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
+        let work =
+            |pool: &rayon::ThreadPool, _: &mut dyn FnMut(_) -> _| self.calibration.without_effect(pool);
+        watched(py, Workers::Caller, None, work)?.map_err(|error| failure(&error))
+    }
+
+    #[pyo3(signature = (*, refraction, distortion, passes))]
+    fn correction<'py>(
+        &self,
+        py: Python<'py>,
+        refraction: f64,
+        distortion: f64,
+        passes: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let tolerances = Tolerances { refraction, distortion, passes };
+        let work = |pool: &rayon::ThreadPool, _: &mut dyn FnMut(_) -> _| {
+            self.calibration.correction(&tolerances, pool)
+        };
+        let correction = watched(py, Workers::Caller, None, work)?.map_err(|error| failure(&error))?;
+        let found = PyDict::new(py);
+        found.set_item("parameters", PyArray1::from_vec(py, correction.parameters))?;
+        found.set_item("without_effect", correction.without_effect)?;
+        self.set_whole(&found, correction.log_determinant, correction.cofactors)?;
+        Ok(found)
+    }
+
+    #[pyo3(signature = (cofactors, *, refraction, distortion, passes))]
+    fn residual_cycle<'py>(
+        &self,
+        py: Python<'py>,
+        cofactors: Array<'py>,
+        refraction: f64,
+        distortion: f64,
+        passes: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let tolerances = Tolerances { refraction, distortion, passes };
+        let cofactors: Vec<f64> = cofactors.as_array().iter().copied().collect();
+        let found = self.calibration.residual_cycle(&tolerances, &cofactors);
+        observations(py, found.map_err(|error| failure(&error))?)
     }
 
     fn equations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -325,6 +372,28 @@ impl StellarProblem {
     }
 }
 
+impl StellarProblem {
+    fn set_whole(&self, dict: &Bound<'_, PyDict>, log_determinant: f64, cofactors: Vec<f64>) -> PyResult<()> {
+        let count = self.calibration.parameters();
+        dict.set_item("log_determinant", log_determinant)?;
+        dict.set_item("cofactors", PyArray1::from_vec(dict.py(), cofactors).reshape([count, count])?)
+    }
+}
+
+/// Stars, images and axis after an adjustment.
+fn observations<'py>(py: Python<'py>, found: Observations) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("places", table(py, found.places)?)?;
+    dict.set_item("place_cofactors", squares(py, found.place_cofactors)?)?;
+    dict.set_item("place_inverses", squares(py, found.place_inverses)?)?;
+    dict.set_item("residuals", table(py, found.residuals)?)?;
+    dict.set_item("axis_residual", found.axis_residual)?;
+    dict.set_item("sums_of_squares", found.sums_of_squares)?;
+    tests(&dict, "image", &found.image_tests)?;
+    tests(&dict, "place", &found.place_tests)?;
+    Ok(dict)
+}
+
 /// Discrepancies and partials as arrays; the second index is x or y.
 fn equations<'py>(py: Python<'py>, all: &[Rows]) -> PyResult<Bound<'py, PyDict>> {
     let count = all.len();
@@ -345,14 +414,19 @@ fn tests(dict: &Bound<'_, PyDict>, name: &str, all: &[Tested]) -> PyResult<()> {
 }
 
 fn failure(error: &Failure) -> PyErr {
-    let (kind, stars) = match error {
+    let (kind, indices) = match error {
         Failure::UndeterminedStars(stars) => ("undetermined stars", stars.clone()),
-        Failure::Undetermined(_) => ("undetermined", vec![]),
+        Failure::NotFinite(stars) => ("not finite", stars.clone()),
+        Failure::Undetermined(combinations) => {
+            let mut parameters = combinations.concat();
+            parameters.sort_unstable();
+            parameters.dedup();
+            ("undetermined", parameters)
+        }
         Failure::Weight(_) => ("weight", vec![]),
-        Failure::NotFinite => ("not finite", vec![]),
         Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted | Failure::OutOfMemory(_) => {
             ("input", vec![])
         }
     };
-    StellarError::new_err((kind, error.to_string(), stars))
+    StellarError::new_err((kind, error.to_string(), indices))
 }

@@ -7,7 +7,7 @@ from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.absolute_orientation.stream import transform_file
-from photogram.arguments import check_arguments
+from photogram.arguments.annotations import check_arguments
 
 __all__ = [
     "Orientation",

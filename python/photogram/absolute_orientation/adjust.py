@@ -16,12 +16,13 @@ from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.oriented import Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
-from photogram.adjusted import Iteration
-from photogram.arrays import names as names_of
-from photogram.arrays import number, one_of, truth_value, whole_number
+from photogram.arguments.arrays import names as names_of
+from photogram.arguments.arrays import number, one_of, truth_value, whole_number
+from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
-from photogram.statistics import externally_studentized, global_test
+from photogram.results.adjusted import Iteration
+from photogram.statistics.limits import externally_studentized, global_test
 
 __all__ = ["Method", "Start", "UnitVariance", "orient"]
 
@@ -29,7 +30,6 @@ Method = Literal["rigorous", "report", "fill-in"]
 Start = Literal["auto", "report", "closed-form"]
 UnitVariance = Literal["estimated", "unity"]
 
-Floats = NDArray[np.float64]
 
 MOST_ITERATIONS = 50
 TRIAL_ITERATIONS = 15
@@ -50,8 +50,6 @@ IN_A_PLANE = 3.0
 """Points are in a plane as far as can be told when they are off it by less than this many rms residuals."""
 ROUNDING = 1e-9
 """Residuals below this fraction of the size of the model are rounding."""
-SHARED = 10_000
-"""Stations from which more than one thread is worth its start."""
 
 
 def orient(
@@ -139,7 +137,7 @@ def orient(
                 "trace": False,
                 **options,
             },
-            threads=1 if len(rows) < SHARED else 0,
+            threads=0,
         )
 
     try:

@@ -11,16 +11,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.files import read_lines
-from photogram.geometry import rotation_matrix
+from photogram.io.files import read_lines
+from photogram.io.numbers import finite_number, whole_number
+from photogram.io.places import Place
 from photogram.messages import Message, quoted
-from photogram.numbers import finite_number, whole_number
-from photogram.places import Place
+from photogram.network.geometry import rotation_matrix
 
 __all__ = [
     "Deck",
@@ -30,7 +30,6 @@ __all__ = [
     "transformation_records",
 ]
 
-Floats = NDArray[np.float64]
 MISSING = ("", "-")
 
 

@@ -13,9 +13,9 @@ from photogram.absolute_orientation.stations import (
     Stations,
 )
 from photogram.errors import InputError
-from photogram.files import read_lines
-from photogram.places import Place
-from photogram.rows import Row, Table, cells
+from photogram.io.files import read_lines
+from photogram.io.places import Place
+from photogram.io.rows import Row, Table, cells
 
 __all__ = ["header", "is_csv", "read_csv", "spelling"]
 

@@ -8,29 +8,27 @@ from typing import Any
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.absolute_orientation.oriented import OrientedModel
 from photogram.absolute_orientation.similarity import Similarity
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.files import read_bytes
-from photogram.statistics import GlobalTest
+from photogram.io import json
+from photogram.io.files import read_bytes
+from photogram.statistics.limits import GlobalTest
 
 __all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
-
-Floats = NDArray[np.float64]
 
 
 def to_json(result: OrientedModel) -> bytes:
     """Return the whole result as JSON (UTF-8); its points are the stations without control."""
-    return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}"])
+    return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}\n"])
 
 
 def without_points(result: OrientedModel) -> Iterator[bytes]:
     """Return the document up to the first of its points, so that any number of them can follow."""
-    head = orjson.dumps(_head(result), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
-    yield head.removesuffix(b"\n}")
+    yield json.to_json(_head(result)).removesuffix(b"\n}\n")
     yield b',\n  "points": ['
 
 

@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from photogram.arguments.types import Floats
 
 __all__ = ["Fit", "Hint", "find", "undecided"]
 
-Floats = NDArray[np.float64]
 
 FOOT = 0.3048
 IMPROVEMENT = 25.0

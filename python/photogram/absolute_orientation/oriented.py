@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
-from photogram.adjusted import Iteration
+from photogram.arguments.types import Floats
 from photogram.messages import Message, listed
-from photogram.reliability import TESTABLE
-from photogram.statistics import GlobalTest, normal_limit, studentized_limit
+from photogram.results.adjusted import Iteration
+from photogram.statistics.limits import GlobalTest, normal_limit, studentized_limit
+from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["OrientedModel", "Trace"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

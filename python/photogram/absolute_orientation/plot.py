@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.absolute_orientation.oriented import OrientedModel
-from photogram.pictures import round_length
+from photogram.arguments.types import Floats
+from photogram.show.pictures import arrows, drawn, new_figure, round_length
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["plot"]
 
-Floats = NDArray[np.float64]
 
 LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""
@@ -27,11 +26,7 @@ def plot(result: OrientedModel) -> bytes:
 
     Needs matplotlib (`pip install 'photogram[plots]'`).
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # takes long to import
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8, 7.5), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8, 7.5)
     axes = figure.add_subplot()
     rows = np.flatnonzero(result.took_part)
     plan = result.adjusted_control[rows, :2]
@@ -51,9 +46,7 @@ def plot(result: OrientedModel) -> bytes:
     axes.set_title(f"Control, given minus transformed; rms {rms:.3g} {result.stations.ground_unit}")
     axes.locator_params(nbins=6)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=120)
-    return picture.getvalue()
+    return drawn(figure)
 
 
 def _stations(axes: Axes, result: OrientedModel, rows: NDArray[np.intp], plan: Floats) -> None:
@@ -71,29 +64,18 @@ def _stations(axes: Axes, result: OrientedModel, rows: NDArray[np.intp], plan: F
         axes.annotate(result.stations.ids[row], place, (6, 6), textcoords="offset points", fontsize=8)
 
 
-def _residuals(axes: Axes, plan: Floats, drawn: Floats) -> None:
+def _residuals(axes: Axes, plan: Floats, enlarged: Floats) -> None:
     """Draw residuals, already in the scale of the plan."""
-    flat = np.isfinite(drawn[:, :2]).any(axis=1)
+    flat = np.isfinite(enlarged[:, :2]).any(axis=1)
     if flat.any():
-        axes.quiver(
-            *plan[flat].T,
-            *np.nan_to_num(drawn[flat, :2]).T,
-            angles="xy",
-            scale_units="xy",
-            scale=1,
-            width=0.004,
-            zorder=3,
-            color="C0",
-        )
+        arrows(axes, plan[flat], np.nan_to_num(enlarged[flat, :2]), width=0.004, zorder=3, color="C0")
         axes.plot([], [], color="C0", label="plan residual")
-    high = np.isfinite(drawn[:, 2])
-    ends = plan[high, 1] + drawn[high, 2]
+    high = np.isfinite(enlarged[:, 2])
+    ends = plan[high, 1] + enlarged[high, 2]
     axes.vlines(
         plan[high, 0], plan[high, 1], ends, color="C1", linewidth=3, label="height residual (up: positive)"
     )
-    # Neither arrows nor bars widen the limits of the axes by themselves.
-    shown = np.where(np.isfinite(drawn[:, :2]), drawn[:, :2], 0.0) + plan
-    axes.update_datalim(shown)
+    # Bars do not widen the limits of the axes by themselves.
     axes.update_datalim(np.column_stack([plan[high, 0], ends]))
 
 

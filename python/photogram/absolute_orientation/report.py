@@ -6,16 +6,15 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram.absolute_orientation.cards import restart_record, transformation_records
 from photogram.absolute_orientation.oriented import OrientedModel
-from photogram.angles import ARCSEC
-from photogram.sections import Section, composed, headline
+from photogram.arguments.types import Floats
+from photogram.show.angles import ARCSEC
+from photogram.show.sections import Section, composed, headline
 
 __all__ = ["report", "summary"]
 
-Floats = NDArray[np.float64]
 
 AXES = ("X", "Y", "Z")
 

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arrays import number, numbers, shaped
+from photogram.arguments.arrays import number, numbers, shaped
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.geometry import rotation_angles
+from photogram.network.geometry import rotation_angles
 
 __all__ = ["Similarity"]
 
-Floats = NDArray[np.float64]
 
 ORTHOGONAL = 1e-6
 """Elements of A A^T - I that a matrix read from a file may have."""

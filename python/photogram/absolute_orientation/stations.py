@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arrays import frozen, names, numbers, text
+from photogram.arguments.arrays import frozen, names, numbers, text
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ __all__ = [
     "numbers",
 ]
 
-Floats = NDArray[np.float64]
 
 CONTROL_COLUMNS = ("X", "Y", "Z")
 MODEL_COLUMNS = ("x", "y", "z")

@@ -11,26 +11,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
 
 from photogram.absolute_orientation.csv_files import header
 from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.files import reading
+from photogram.io.files import reading
+from photogram.io.numbers import finite_number
+from photogram.io.places import Place
+from photogram.io.rows import LONGEST_RECORD, cells
+from photogram.io.writing import OutputSet
 from photogram.messages import quoted
-from photogram.numbers import finite_number
-from photogram.places import Place
-from photogram.rows import LONGEST_RECORD, cells
-from photogram.writing import OutputSet
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["CHUNK", "Document", "decimals_for", "transform_file"]
 
-Floats = NDArray[np.float64]
 
 CHUNK = 100_000
 """Points transformed at a time."""
@@ -127,7 +126,7 @@ def transform_file(
         if not done:
             raise InputError("holds no points", file=source)
         if json:
-            json.write(b"\n  ]\n}")
+            json.write(b"\n  ]\n}\n")
     return done
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from photogram.absolute_orientation.oriented import OrientedModel, Trace
-from photogram.sections import Section, composed, headline
+from photogram.show.sections import Section, composed, headline
 
 __all__ = ["trace_text"]
 

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from enum import StrEnum
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, errors, output, print_sections, print_written
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Quiet
+from photogram.cli.console import output, print_sections
+from photogram.cli.job import Former, Job, Reads, Writes, with_job
+from photogram.cli.options import FormerPlot, JsonFile, Plots, Quiet, needs_out, out_option
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity, Stations
+    from photogram.io.writing import OutputSet
     from photogram.messages import Message
-    from photogram.writing import OutputSet
 
 __all__ = ["absolute_orientation", "transform"]
 
 SHOWN = 40
 """Lines of a section that the summary shows at most."""
+TRANSFORMED = "points-transformed.csv"
+"""What becomes of the points of the packaged example."""
 EXAMPLE = "absolute_orientation"
 """The packaged example, a directory of photogram.examples."""
 
@@ -89,21 +90,19 @@ def absolute_orientation(
         Writes.FILE,
         typer.Option(
             metavar="FILE",
-            help="Where they go, as CSV. Default: POINTS-transformed.csv beside them.",
+            help="Where they go, as CSV. Default: POINTS-transformed.csv in --out, or beside them.",
             show_default=False,
         ),
     ] = None,
+    out: Annotated[
+        Path | None, Writes.DIRECTORY, out_option("Directory for report.txt. Default: no report.")
+    ] = None,
     json: JsonFile = None,
+    plots: Plots = False,
     listing: Annotated[
-        Path | None,
-        Writes.FILE,
-        typer.Option(metavar="FILE", help="Write the listing as text.", show_default=False),
+        Path | None, Writes.FILE, Former("--out DIR writes the report there"), typer.Option(hidden=True)
     ] = None,
-    plot: Annotated[
-        Path | None,
-        Writes.FILE,
-        typer.Option(metavar="FILE", help="Draw the residuals of the control (PNG).", show_default=False),
-    ] = None,
+    plot: FormerPlot = None,
     trace: Annotated[
         Path | None,
         Writes.FILE,
@@ -162,11 +161,10 @@ def absolute_orientation(
     Prints problems, figures, parameters and residuals; writes what is asked for, whole or not at all.
     Stations without control are transformed too. Exit code 3: not converged, or control that does not fit.
     """
-    if example == (file is not None):
-        raise typer.BadParameter("give a file, or --example", param_hint="FILE")
+    needs_out(plots, out)
     if trace and method is Method.RIGOROUS:
         raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
-    with job, ExitStack() as resources:
+    with job:
         from photogram import orient
         from photogram.absolute_orientation.document import read_similarity
         from photogram.absolute_orientation.report import summary
@@ -174,15 +172,16 @@ def absolute_orientation(
 
         target = points_out
         if file is None:
-            directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
+            directory = job.packaged(EXAMPLE)
             file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
             if points is None:
-                points, target = directory / "points.csv", target or Path("points-transformed.csv")
+                points, target = directory / "points.csv", target or (out or Path()) / TRANSFORMED
             job.reads(file, points)
         if points and not target:
-            target = points.with_name(f"{points.stem}-transformed.csv")
-        if target and target is not points_out:
-            job.writes(target)
+            target = (out or points.parent) / f"{points.stem}-transformed.csv"
+        reports = [path for path in (listing, out and out / "report.txt") if path]
+        pictures = [path for path in (plot, out / "residuals.png" if plots and out else None) if path]
+        job.writes(*reports, *pictures, *([target] if target and target is not points_out else []))
         stations, former, messages = _read(file, format, zero_missing, ground_unit, model_unit)
         result = orient(
             stations,
@@ -197,19 +196,19 @@ def absolute_orientation(
         if points and not result.usable:
             result.messages.append(Message("no points were transformed: the orientation is not to be used"))
             points = None
-        made = _small_files(result, listing, plot, trace, None if points else json)
+        made = _small_files(result, reports, pictures, trace, None if points else json)
         written = list(made)
         with job.outputs() as outputs:
             if points and target:
-                _stream(outputs, result, points, target, json, point_sd, decimals, quiet)
+                _stream(job, outputs, result, points, target, json, point_sd, decimals)
                 written = [target, *([json] if json else []), *written]
             for path, content in made.items():
                 outputs.write(path, content)
-        if not quiet:
-            print_sections(summary(result), "the listing", SHOWN)
-            print_written(written)
-    if not result.usable:
-        raise typer.Exit(NOT_CONVERGED)
+        job.conclude(
+            written,
+            summary=lambda: print_sections(summary(result), "the report", SHOWN),
+            good=result.usable,
+        )
 
 
 @with_job
@@ -237,7 +236,7 @@ def transform(
         from photogram.absolute_orientation import transform_file
 
         similarity = _former(result)
-        with job.outputs() as outputs, _progress(points, quiet) as progress:
+        with job.outputs() as outputs, _progress(job, points) as progress:
             count = transform_file(
                 similarity,
                 points,
@@ -255,7 +254,7 @@ def _former(path: Path) -> Similarity:
     """Read a former result in either of its forms."""
     from photogram.absolute_orientation.cards import read_transformation
     from photogram.absolute_orientation.document import read_similarity
-    from photogram.files import read_lines
+    from photogram.io.files import read_lines
 
     document = any(line.lstrip().startswith("{") for line in read_lines(path)[:1])
     return read_similarity(path, usable=True) if document else read_transformation(path)
@@ -274,14 +273,18 @@ def _read(
 
 
 def _small_files(
-    result: Orientation, listing: Path | None, plot: Path | None, trace: Path | None, json: Path | None
+    result: Orientation,
+    reports: list[Path],
+    pictures: list[Path],
+    trace: Path | None,
+    json: Path | None,
 ) -> dict[Path, bytes]:
     """Make everything that is small, before anything is written."""
     made: dict[Path, bytes] = {}
-    if listing:
-        made[listing] = result.report().encode()
-    if plot:
-        made[plot] = result.plot()
+    if reports:
+        made |= dict.fromkeys(reports, result.report().encode())
+    if pictures:
+        made |= dict.fromkeys(pictures, result.plot())
     if trace:
         from photogram.absolute_orientation.trace import trace_text
 
@@ -292,6 +295,7 @@ def _small_files(
 
 
 def _stream(
+    job: Job,
     outputs: OutputSet,
     result: Orientation,
     points: Path,
@@ -299,7 +303,6 @@ def _stream(
     json: Path | None,
     point_sd: float,
     decimals: int | None,
-    quiet: bool,
 ) -> None:
     """Transform a file of points, into the JSON document too."""
     from photogram.absolute_orientation.document import point_rows, without_points
@@ -310,7 +313,7 @@ def _stream(
     document = None
     if json:
         document = Document(json, b"".join(without_points(result)), point_rows(*result.transform_points()))
-    with _progress(points, quiet) as progress:
+    with _progress(job, points) as progress:
         transform_file(
             result.similarity,
             points,
@@ -324,10 +327,8 @@ def _stream(
 
 
 @contextmanager
-def _progress(points: Path, quiet: bool) -> Iterator[Callable[[int], None] | None]:
+def _progress(job: Job, points: Path) -> Iterator[Callable[[int], None] | None]:
     """Show on standard error how many points are done."""
-    if quiet:
-        yield None
-        return
-    with errors.status(f"transforming {escape(points.name)}", spinner="line") as status:
-        yield lambda done: status.update(f"transforming {escape(points.name)}: {done} points")
+    text = f"transforming {escape(points.name)}"
+    with job.status(text) as status:
+        yield None if status is None else lambda done: status.update(f"{text}: {done} points")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, errors, output
+from photogram.cli.console import output
 from photogram.cli.job import Job, Reads, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
 
@@ -38,15 +37,14 @@ def check(
     """
     with job:
         from photogram.giant import Limits, read_project
-        from photogram.giant.checks import check as check_project
+        from photogram.giant import check as check_project
 
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
-        with errors.status("checking", spinner="line") if not quiet else nullcontext():
+        with job.status("checking"):
             found = check_project(project, limits=allowed, threads=threads)
-        if json is not None:
-            job.write({json: found.to_json()})
-        if not quiet:
-            output.print(escape(found.report()), end="")
-    if found.grave:
-        raise typer.Exit(NOT_CONVERGED)
+        job.finish(
+            {} if json is None else {json: found.to_json()},
+            summary=lambda: output.print(escape(found.report()), end=""),
+            good=not found.grave,
+        )

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack, nullcontext
 from enum import StrEnum
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.console import NOT_CONVERGED, errors, print_sections, print_written
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads
+from photogram.cli.console import print_sections
+from photogram.cli.job import Former, Job, Reads, Writes, with_job
+from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, out_option
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
-    from photogram import robust
+    from photogram.adjustment import robust
 
 __all__ = ["collection"]
 
-EXAMPLE = "ring.txt"
-"""The packaged example, a file of photogram.examples.collection."""
+EXAMPLE = ("collection", "ring.txt")
+"""The packaged example, in photogram.examples."""
+PACKED = (".bz2", ".gz")
 
 
 class Loss(StrEnum):
@@ -53,15 +52,14 @@ def collection(
     ] = False,
     out: Annotated[
         Path | None,
-        Writes.FILE,
-        typer.Option(
-            metavar="OUT",
-            help="Write the adjusted collection in the same format, packed if it ends in .bz2 or .gz.",
-            show_default=False,
+        Writes.DIRECTORY,
+        out_option(
+            "Directory for report.txt and the adjusted collection: adjusted.txt, packed as FILE is."
+            " Default: no files."
         ),
     ] = None,
     report: Annotated[
-        Path | None, Writes.FILE, typer.Option(metavar="FILE", help="Write the report.", show_default=False)
+        Path | None, Writes.FILE, Former("--out DIR writes the report there"), typer.Option(hidden=True)
     ] = None,
     json: JsonFile = None,
     loss: Annotated[
@@ -92,19 +90,21 @@ def collection(
     quiet: Quiet = False,
 ) -> None:
     """Adjust photos of unknown cameras by Levenberg-Marquardt steps, however far the start."""
-    if example == (problem is not None):
-        raise typer.BadParameter("give a file, or --example", param_hint="FILE")
-    with job, ExitStack() as resources:
+    if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
+        raise typer.BadParameter("names a directory; adjusted.txt goes there", param_hint="--out")
+    with job:
         from photogram.collection import adjust, read, to_bytes
         from photogram.collection.report import summary
 
         if problem is None:
-            packaged = files("photogram") / "examples" / "collection" / EXAMPLE
-            problem = resources.enter_context(as_file(packaged))
+            problem = job.packaged(*EXAMPLE)
             job.reads(problem)
+        packing = problem.suffix if problem.suffix in PACKED else ""
+        names = [] if out is None else [out / "report.txt", out / f"adjusted.txt{packing}"]
+        job.writes(*names)
         photos = read(problem)
         photos = photos.replace(image_sd=sd)
-        with errors.status("adjusting", spinner="line") if not quiet else nullcontext() as status:
+        with job.status("adjusting") as status:
             result = adjust(
                 photos,
                 tolerance=tolerance,
@@ -117,15 +117,12 @@ def collection(
                 progress=shown(status, "cost", 0.5) if status is not None else None,
             )
         written = {}
-        if out is not None:
-            written[out] = to_bytes(result.adjusted(), out.suffix)
+        if names:
+            written[names[0]] = result.report().encode()
+            written[names[1]] = to_bytes(result.adjusted(), packing)
         if report is not None:
             written[report] = result.report().encode()
         if json is not None:
             written[json] = result.to_json()
-        job.write(written)
-        if not quiet:
-            print_sections((section for section in summary(result) if section[1]), "the report")
-            print_written(written)
-    if not result.converged:
-        raise typer.Exit(NOT_CONVERGED)
+        whole = (section for section in summary(result) if section[1])
+        job.finish(written, summary=lambda: print_sections(whole, "the report"), good=result.converged)

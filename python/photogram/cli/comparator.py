@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
 from enum import StrEnum
-from importlib.resources import as_file, files
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,17 +14,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, errors, output, print_remark, print_written
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import Quiet, default_out
+from photogram.cli.console import errors, output, print_remark
+from photogram.cli.job import Former, Job, Reads, Writes, with_job
+from photogram.cli.options import Quiet, default_out, out_option
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
 __all__ = ["comparator", "correct"]
 
-EXAMPLE = "comparator-3.txt"
-"""The packaged example, a deck of photogram.examples.comparator."""
+EXAMPLE = ("comparator", "comparator-3.txt")
+"""The packaged example, a deck in photogram.examples."""
 
 
 class Hand(StrEnum):
@@ -69,10 +67,9 @@ def comparator(
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
-        typer.Option(
-            metavar="OUT",
-            help="Directory for the results. Default: FILE-calibrated beside the first FILE.",
-            show_default=False,
+        out_option(
+            "Directory for listing, report, correction and grids. Default: FILE-calibrated beside the first"
+            " FILE."
         ),
     ] = None,
     json: Annotated[
@@ -85,9 +82,15 @@ def comparator(
         ),
     ] = None,
     pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf instead of report.html.")] = False,
-    pictures: Annotated[
-        bool, typer.Option("--pictures/--no-pictures", help="Write the report with pictures.")
+    plots: Annotated[
+        bool,
+        typer.Option("--plots/--no-plots", help="Draw the pictures too, in a report (needs matplotlib)."),
     ] = True,
+    pictures: Annotated[
+        bool | None,
+        Former("say --plots or --no-plots"),
+        typer.Option("--pictures/--no-pictures", hidden=True),
+    ] = None,
     as_published: Annotated[
         bool,
         typer.Option(
@@ -121,15 +124,12 @@ def comparator(
     Writes listing.txt, report.html (pictures), correction.json and the corrected grid of each plate. Where
     outliers make the correction unusable, correction and grid are withheld, and the exit code is 3.
     """
-    if example == bool(paths):
-        raise typer.BadParameter("give files, or --example", param_hint="FILE")
-    with job, ExitStack() as resources:
+    with job:
         from photogram.comparator import Options, calibrate, find_grid, read
         from photogram.errors import InputError
 
         if example:
-            packaged = files("photogram") / "examples" / "comparator" / EXAMPLE
-            paths = [resources.enter_context(as_file(packaged))]
+            paths = [job.packaged(*EXAMPLE)]
             job.reads(*paths)
             out = out or Path("comparator-calibrated")
         left_handed = None if hand is Hand.FILE else hand is Hand.LEFT
@@ -146,16 +146,14 @@ def comparator(
                 )
         folder = out or default_out((paths or [])[0], "-calibrated")
         job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))
-        written = _results(calibrations, folder, _run_date(date), pdf=pdf, pictures=pictures, quiet=quiet)
+        drawn = plots if pictures is None else pictures
+        written = _results(calibrations, folder, _run_date(date), pdf=pdf, pictures=drawn, quiet=quiet)
         documents = {json: _documents(calibrations)} if json is not None else {}
+        usable = all(calibration.usable for calibration in calibrations)
         job.write(written, documents)
-        if not quiet:
-            for calibration in calibrations:
-                _summarize(calibration)
-            print_written([*written, *documents])
-        if not all(calibration.usable for calibration in calibrations):
+        if not usable:
             _withheld(calibrations, folder)
-            raise typer.Exit(NOT_CONVERGED)
+        job.conclude([*written, *documents], summary=lambda: _summarize(calibrations), good=usable)
 
 
 def _withheld(calibrations: list[Calibration], folder: Path) -> None:
@@ -191,8 +189,8 @@ def _place(folder: Path, number: int, count: int) -> Path:
 def _run_date(date: str | None) -> str:
     """Return the date of the run: as it is said, as the environment says, or today (UTC)."""
     from photogram.errors import InputError
+    from photogram.io.numbers import whole_number
     from photogram.messages import quoted
-    from photogram.numbers import whole_number
 
     if date is not None:
         return date if date.isprintable() else repr(date)
@@ -241,8 +239,13 @@ def _documents(calibrations: list[Calibration]) -> bytes:
     return documents[0] if len(documents) == 1 else b"[" + b",\n".join(documents) + b"]\n"
 
 
-def _summarize(calibration: Calibration) -> None:
-    """Print problems, the analysis of variance and the linear parameters."""
+def _summarize(calibrations: list[Calibration]) -> None:
+    """Print problems, the analysis of variance and the linear parameters of each."""
+    for calibration in calibrations:
+        _summarize_one(calibration)
+
+
+def _summarize_one(calibration: Calibration) -> None:
     from photogram.comparator.listing.summary import summary_page
 
     session = calibration.session
@@ -273,10 +276,13 @@ def correct(
         Reads.FILE,
         typer.Argument(metavar="FILE", help="Table with columns x_um, y_um (or x_mm, y_mm)."),
     ],
-    out: Annotated[
+    corrected: Annotated[
         Path | None,
         Writes.FILE,
-        typer.Option(metavar="OUT", help="Table to write. Default: standard output.", show_default=False),
+        typer.Argument(metavar="OUT", help="Table to write. Default: standard output.", show_default=False),
+    ] = None,
+    out: Annotated[
+        Path | None, Writes.FILE, Former("name the table after FILE"), typer.Option("--out", hidden=True)
     ] = None,
     invert: Annotated[
         bool, typer.Option("--invert", help="Turn corrected coordinates back into readings.")
@@ -292,7 +298,7 @@ def correct(
         from photogram.comparator.csvfile import read_table
 
         made = correct_table(Correction.read(correction), read_table(measurements), invert=invert)
-        if out is None:
+        tables = [path for path in (corrected, out) if path]
+        job.write(dict.fromkeys(tables, made))
+        if not tables:
             typer.echo(made.decode(), nl=False)
-        else:
-            job.write({out: made})

@@ -15,7 +15,7 @@ from photogram.cli.streams import stream_fault
 from photogram.messages import printable
 
 if TYPE_CHECKING:
-    from photogram.sections import Section
+    from photogram.show.sections import Section
 
 __all__ = [
     "NOT_CONVERGED",

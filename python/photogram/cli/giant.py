@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack, nullcontext
 from dataclasses import replace
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, SHOWN, errors, print_sections, print_written
+from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, default_out
+from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, default_out, out_option
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
@@ -51,10 +49,8 @@ def giant(
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
-        typer.Option(
-            metavar="OUT",
-            help="Directory for adjusted stations and points, and report. Default: DIR-adjusted beside DIR.",
-            show_default=False,
+        out_option(
+            "Directory for adjusted stations and points and report. Default: DIR-adjusted beside DIR."
         ),
     ] = None,
     json: JsonFile = None,
@@ -108,22 +104,21 @@ def giant(
     quiet: Quiet = False,
     overwrite: Annotated[
         bool,
-        typer.Option("--overwrite", help="Allow OUT to be a directory with another GIANT project in it."),
+        typer.Option("--overwrite", help="Allow --out to be a directory with another GIANT project in it."),
     ] = False,
 ) -> None:
     """Adjust a GIANT project: photographs, points and their covariances.
 
     Writes FRAMES and GROUND (adjusted, when converged), RESTART (stations of the last iteration), report.txt.
     """
-    if example == (directory is not None):
-        raise typer.BadParameter("give a directory, or --example", param_hint="DIR")
-    with job, ExitStack() as resources:
+    with job:
         from photogram.errors import AdjustmentError
         from photogram.giant import Limits, read_project
-        from photogram.report import summary
+        from photogram.results.report import summary
 
         if directory is None:
-            directory = resources.enter_context(as_file(files("photogram") / "examples" / EXAMPLE))
+            directory = job.packaged(EXAMPLE)
+            job.reads(directory)
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
         job.writes(*(out / name for name in RESULTS))
@@ -133,7 +128,7 @@ def giant(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
         try:
-            result = _adjust(project, block, as_published, ordering, threads, quiet)
+            result = _adjust(job, project, block, as_published, ordering, threads)
         except AdjustmentError:
             # What was remarked on while reading is often the reason.
             for message in project.messages[:SHOWN]:
@@ -148,12 +143,12 @@ def giant(
 
             text = printout(project, block, result, as_published=as_published, limits=allowed)
             documents[listing] = text.encode()
-        job.write(written, documents)
-        if not quiet:
-            print_sections(summary(result), "report.txt")
-            print_written([*written, *documents])
-    if not result.converged:
-        raise typer.Exit(NOT_CONVERGED)
+        job.finish(
+            written,
+            documents,
+            summary=lambda: print_sections(summary(result), "report.txt"),
+            good=result.converged,
+        )
 
 
 def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Path:
@@ -191,18 +186,18 @@ def _refracted(
 
 
 def _adjust(
+    job: Job,
     project: Project,
     block: Block,
     as_published: bool,
     ordering: OrderingName,
     threads: int | None,
-    quiet: bool,
 ) -> Result:
     """Adjust the block as COMMON asks, with the progress on standard error."""
     from photogram import AsPublished, adjust
 
     common = project.common
-    with errors.status("adjusting", spinner="line") if not quiet else nullcontext() as status:
+    with job.status("adjusting") as status:
         result = adjust(
             block,
             unit_variance=common.unit_variance,

@@ -20,7 +20,20 @@ class GroupWithMain(TyperGroup):
         return list(self.commands)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put the main command before arguments that name no command."""
-        if not args or args[0] not in self.commands:
-            args = [next(iter(self.commands)), *args]
+        """Put the main command before arguments that name no command.
+
+        While a shell completes the first word, either may follow: see :meth:`shell_complete`.
+        """
+        if (args or not ctx.resilient_parsing) and (not args or args[0] not in self.commands):
+            args = [self._main, *args]
         return list(super().parse_args(ctx, args))
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Return the side commands, and what the main command begins with."""
+        main = self.commands[self._main]
+        with main.make_context(self._main, [], parent=ctx, resilient_parsing=True) as own:
+            return [*super().shell_complete(ctx, incomplete), *main.shell_complete(own, incomplete)]
+
+    @property
+    def _main(self) -> str:
+        return next(iter(self.commands))

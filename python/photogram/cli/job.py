@@ -1,26 +1,34 @@
-"""One job behind every command: it knows what is read and written, guards the inputs, writes the results."""
+"""One job behind every command: read, compute, spare the input, write, summarise, end with an exit code."""
 
 from __future__ import annotations
 
 import errno
 import os
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from enum import Enum
 from functools import wraps
+from importlib.resources import as_file, files
 from inspect import Parameter, signature
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, get_args
 
 import typer
+from typer.models import ArgumentInfo, OptionInfo
 
-from photogram.cli.console import failures, print_remark
+from photogram.cli.console import NOT_CONVERGED, errors, failures, print_remark, print_written
 from photogram.messages import printable
 
 if TYPE_CHECKING:
-    from photogram.writing import OutputSet
+    from collections.abc import Iterator
 
-__all__ = ["Job", "Reads", "Writes", "roles", "with_job"]
+    from rich.status import Status
+
+    from photogram.io.writing import OutputSet
+
+__all__ = ["Former", "Job", "Reads", "Writes", "roles", "with_job"]
 
 LARGEST = 2**53
 """What integers of options may be at most: beyond it numbers are not counts."""
@@ -40,6 +48,13 @@ class Writes(Enum):
     DIRECTORY = "directory of results"
 
 
+@dataclass(frozen=True)
+class Former:
+    """Mark of a hidden option under its former name, with what is said now; it is remarked on when used."""
+
+    now: str
+
+
 class Job:
     """The inputs and outputs of a run of a command; a context manager around its work.
 
@@ -53,6 +68,8 @@ class Job:
         Files, and directories of GIANT projects, that are read.
     outputs, directories
         Files, and directories for results, that are written.
+    quiet
+        Whether nothing but errors is shown.
     """
 
     def __init__(
@@ -61,10 +78,14 @@ class Job:
         projects: Iterable[Path] = (),
         outputs: Iterable[Path] = (),
         directories: Iterable[Path] = (),
+        *,
+        quiet: bool = False,
     ) -> None:
         self._files, self._projects = list(files), list(projects)
         self._outputs, self._directories = list(outputs), list(directories)
         self._failures = failures()
+        self._resources = ExitStack()
+        self.quiet = quiet
 
     def __enter__(self) -> Job:
         self._failures.__enter__()
@@ -80,17 +101,23 @@ class Job:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> bool | None:
+        self._resources.close()
         return self._failures.__exit__(kind, error, trace)
 
-    def reads(self, *files: Path) -> None:
-        """Name further files that are read: no result goes over them.
+    def packaged(self, *example: str) -> Path:
+        """Return a packaged example, a file or a directory, for as long as the job lasts."""
+        return self._resources.enter_context(as_file(files("photogram").joinpath("examples", *example)))
+
+    def reads(self, *paths: Path) -> None:
+        """Name further files, or directories of projects, that are read: no result goes over them.
 
         Raises
         ------
         InputError
             A result was to do so.
         """
-        self._files += files
+        for path in paths:
+            (self._projects if path.is_dir() else self._files).append(path)
         self._check()
 
     def writes(self, *files: Path) -> None:
@@ -101,7 +128,7 @@ class Job:
         InputError
             One of them would harm an input or another result.
         """
-        self._outputs += files
+        self._outputs += [path for path in files if path not in self._outputs]
         self._check()
 
     def write(self, *results: Mapping[Path, bytes]) -> None:
@@ -115,9 +142,46 @@ class Job:
                     self._check_projects(path)
                     outputs.write(path, content)
 
+    def finish(
+        self, *results: Mapping[Path, bytes], summary: Callable[[], None] | None = None, good: bool = True
+    ) -> None:
+        """Write the results, as :meth:`write` does, then show what they are, and end.
+
+        Parameters
+        ----------
+        results
+            Contents of files.
+        summary
+            Prints what a reader wants first.
+        good
+            Whether the job ends with the exit code 0; else with 3.
+        """
+        self.write(*results)
+        self.conclude([path for each in results for path in each], summary=summary, good=good)
+
+    def conclude(
+        self, written: Iterable[Path], *, summary: Callable[[], None] | None = None, good: bool = True
+    ) -> None:
+        """Show what was found and written, and end; see :meth:`finish`."""
+        if not self.quiet:
+            if summary is not None:
+                summary()
+            print_written(written)
+        if not good:
+            raise typer.Exit(NOT_CONVERGED)
+
+    @contextmanager
+    def status(self, text: str) -> Iterator[Status | None]:
+        """Show on standard error what is going on, if anything is to be shown."""
+        if self.quiet:
+            yield None
+            return
+        with errors.status(text, spinner="line") as status:
+            yield status
+
     def outputs(self) -> OutputSet:
         """Return a set of files, for results that are written piece by piece."""
-        from photogram.writing import OutputSet
+        from photogram.io.writing import OutputSet
 
         return OutputSet(self._inputs())
 
@@ -132,8 +196,8 @@ class Job:
 
     def _check(self) -> None:
         from photogram.errors import InputError
-        from photogram.files import reading
-        from photogram.writing import check_outputs
+        from photogram.io.files import reading
+        from photogram.io.writing import check_outputs
 
         for path in [*self._files, *self._projects]:
             with reading(path):
@@ -153,7 +217,7 @@ class Job:
 
     def _remark(self) -> None:
         """Remark on inputs that belong to a set which an interrupted run may have left incomplete."""
-        from photogram.writing.markers import doubtful
+        from photogram.io.writing.markers import doubtful
 
         for path, mark in doubtful(self._inputs()).items():
             told = f"{path}: an interrupted run may have left it out of step with other files: {mark}"
@@ -207,6 +271,8 @@ def _holds_path(kind: object) -> bool:
 def with_job(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command its :class:`Job` as the parameter `job`, made of its options that are marked.
 
+    Where it has an option `--example`, either that or its first argument must be given.
+
     Raises
     ------
     TypeError
@@ -221,18 +287,43 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def with_one(**values: Any) -> None:
-        for name, value in values.items():
-            if isinstance(value, int) and abs(value) > LARGEST:
-                option = "--" + name.replace("_", "-")
-                raise typer.BadParameter("is too large", param_hint=option)
+        for parameter in own:
+            _check_value(parameter, values)
         found: dict[Reads | Writes, list[Path]] = {each: [] for each in (*Reads, *Writes)}
         for name, role in marked.items():
             given = values.get(name)
             paths = given if isinstance(given, list) else [given]
             found[role] += [Path(path) for path in paths if path is not None]
-        job = Job(found[Reads.FILE], found[Reads.PROJECT], found[Writes.FILE], found[Writes.DIRECTORY])
+        job = Job(
+            found[Reads.FILE],
+            found[Reads.PROJECT],
+            found[Writes.FILE],
+            found[Writes.DIRECTORY],
+            quiet=values.get("quiet", False),
+        )
         command(job=job, **values)
 
     with_one.__dict__["__signature__"] = signature(command).replace(parameters=own)
     with_one.__annotations__ = {parameter.name: parameter.annotation for parameter in own}
     return with_one
+
+
+def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
+    """Refuse a value that says nothing; remark on an option that is about to go."""
+    value = values[parameter.name]
+    metadata = get_args(parameter.annotation)[1:]
+    if isinstance(value, int) and abs(value) > LARGEST:
+        raise typer.BadParameter("is too large", param_hint=_option(parameter))
+    for mark in metadata:
+        if isinstance(mark, Former) and value != parameter.default:
+            print_remark(f"{_option(parameter)} will go: {mark.now}")
+        if isinstance(mark, ArgumentInfo) and "example" in values and values["example"] == bool(value):
+            raise typer.BadParameter(f"give {mark.metavar}, or --example", param_hint=mark.metavar)
+
+
+def _option(parameter: Parameter) -> str:
+    """Return the name of an option on the command line."""
+    for mark in get_args(parameter.annotation)[1:]:
+        if isinstance(mark, OptionInfo) and mark.param_decls:
+            return mark.param_decls[0]
+    return "--" + parameter.name.replace("_", "-")

@@ -5,18 +5,36 @@ from __future__ import annotations
 import os
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from photogram.cli.job import Writes
+from photogram.cli.job import Former, Writes
 
-__all__ = ["JsonFile", "Ordering", "OrderingName", "Quiet", "Threads", "default_out"]
+__all__ = [
+    "FormerPlot",
+    "JsonFile",
+    "Ordering",
+    "OrderingName",
+    "Plots",
+    "Quiet",
+    "Threads",
+    "default_out",
+    "needs_out",
+    "out_option",
+]
+
 
 JsonFile = Annotated[
     Path | None,
     Writes.FILE,
     typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
+]
+Plots = Annotated[
+    bool, typer.Option("--plots", help="Draw the pictures too, as PNG files in --out (needs matplotlib).")
+]
+FormerPlot = Annotated[
+    Path | None, Writes.FILE, Former("say --out DIR --plots"), typer.Option("--plot", hidden=True)
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 
@@ -37,6 +55,17 @@ Threads = Annotated[
     int | None,
     typer.Option(min=1, help="Threads; the results do not depend on it. Default: all.", show_default=False),
 ]
+
+
+def out_option(help: str) -> Any:  # noqa: A002  # as typer calls it
+    """Return the option `--out DIR`; `help` says what goes there, and what the default is."""
+    return typer.Option("--out", metavar="DIR", help=help, show_default=False)
+
+
+def needs_out(plots: bool, out: Path | None) -> None:
+    """Refuse pictures without a place."""
+    if plots and out is None:
+        raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
 
 
 def default_out(source: Path, ending: str) -> Path:

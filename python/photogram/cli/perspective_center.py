@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from enum import StrEnum
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, output, print_remark, print_written
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Quiet
+from photogram.cli.console import output, print_remark
+from photogram.cli.job import Former, Job, Reads, Writes, with_job
+from photogram.cli.options import FormerPlot, JsonFile, Plots, Quiet, needs_out, out_option
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
@@ -43,23 +41,17 @@ def perspective_center(
     example: Annotated[
         bool, typer.Option("--example", help="Run the packaged example instead: a grid at two heights.")
     ] = False,
+    out: Annotated[
+        Path | None,
+        Writes.DIRECTORY,
+        out_option("Directory for listing.txt, what the 1969 program printed. Default: no files."),
+    ] = None,
     json: JsonFile = None,
+    plots: Plots = False,
     listing: Annotated[
-        Path | None,
-        Writes.FILE,
-        typer.Option(
-            metavar="FILE", help="Write the listing of the 1969 program, item by item.", show_default=False
-        ),
+        Path | None, Writes.FILE, Former("--out DIR writes the listing there"), typer.Option(hidden=True)
     ] = None,
-    plot: Annotated[
-        Path | None,
-        Writes.FILE,
-        typer.Option(
-            metavar="FILE",
-            help="Draw residual vectors and radial distortion (png, pdf, svg).",
-            show_default=False,
-        ),
-    ] = None,
+    plot: FormerPlot = None,
     as_published: Annotated[
         bool,
         typer.Option(
@@ -78,46 +70,43 @@ def perspective_center(
 
     The run stops at the first set that cannot be read or solved; what was solved before is written.
     """
-    if example == (deck is not None):
-        raise typer.BadParameter("give a deck, or --example", param_hint="DECK")
-    with job, ExitStack() as resources:
+    needs_out(plots, out)
+    with job:
         from photogram.perspective_center import run_deck
 
         if deck is None:
-            deck = resources.enter_context(as_file(files("photogram").joinpath("examples", *EXAMPLE)))
+            deck = job.packaged(*EXAMPLE)
             job.reads(deck)
+        listings = [path for path in (listing, out and out / "listing.txt") if path]
+        pictures = [path for path in (plot, out / "residuals.png" if plots and out else None) if path]
+        job.writes(*listings, *pictures)
         run = run_deck(deck, as_published=as_published, weights=weights.value)
-        written = _files(run, json, listing, plot)
-        job.write(written)
-        if not quiet:
-            _summarize(run)
-            print_written(written)
+        stopped = run.stop is not None
+        job.finish(
+            _files(run, json, listings, pictures),
+            summary=lambda: _summarize(run),
+            good=run.converged or stopped,
+        )
         if run.stop is not None:
             raise run.stop.error
-    if not run.converged:
-        raise typer.Exit(NOT_CONVERGED)
 
 
-def _files(run: Run, json: Path | None, listing: Path | None, plot: Path | None) -> dict[Path, bytes]:
+def _files(run: Run, json: Path | None, listings: list[Path], pictures: list[Path]) -> dict[Path, bytes]:
     """Make everything that is asked for, before anything is written."""
     made = {}
     if json is not None:
         from photogram.perspective_center.document import to_json
 
         made[json] = to_json(run)
-    if listing is not None:
-        from photogram.perspective_center.listing import listing as listed
+    if listings:
+        from photogram.perspective_center.listing import listing
 
-        made[listing] = listed(run).encode()
-    if plot is not None and run.results:
-        made[plot] = _drawn(run, plot)
+        made |= dict.fromkeys(listings, listing(run).encode())
+    if pictures and run.results:
+        from photogram.perspective_center.plot import draw
+
+        made |= {path: draw(run.results, path) for path in pictures}
     return made
-
-
-def _drawn(run: Run, path: Path) -> bytes:
-    from photogram.perspective_center.plot import draw
-
-    return draw(run.results, path)
 
 
 def _summarize(run: Run) -> None:

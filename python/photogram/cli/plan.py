@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.console import errors, output, print_remark, print_written
+from photogram.cli.console import output, print_remark
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile
+from photogram.cli.options import FormerPlot, JsonFile, Plots, Quiet, needs_out, out_option
 from photogram.cli.simulated import Control, NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -49,24 +49,26 @@ def plan(
         float | None,
         typer.Option(help="As --position-sd, for the second pattern. Default: the same.", show_default=False),
     ] = None,
-    json: JsonFile = None,
-    plot: Annotated[
-        Path | None,
-        Writes.FILE,
-        typer.Option(
-            metavar="FILE",
-            help="Draw the patterns in plan with the expected standard deviations in height (png, pdf, svg).",
-            show_default=False,
-        ),
+    out: Annotated[
+        Path | None, Writes.DIRECTORY, out_option("Directory for report.txt. Default: no files.")
     ] = None,
+    json: JsonFile = None,
+    plots: Plots = False,
+    plot: FormerPlot = None,
+    quiet: Quiet = False,
 ) -> None:
     """Predict the accuracy of a network before it is flown: two patterns of control side by side.
 
     No measurements are needed or made: expected standard deviations of points by number of rays and by
     location, of photographs, and the gross errors that can be found.
     """
+    needs_out(plots, out)
     with job:
         from photogram.planning import plan as predict
+
+        report = out and out / "report.txt"
+        pictures = [path for path in (plot, out / "plan.png" if plots and out else None) if path]
+        job.writes(*pictures, *([report] if report else []))
 
         if projects:
             _check_alone(network, against, against_spacing, against_position_sd)
@@ -80,15 +82,16 @@ def plan(
             )
             patterns = _simulated(network, second)
         made = predict(patterns)
-        written = _documents(made, json, plot)
-        job.write(written)
-        output.print(made.report(), markup=False, end="")
-        print_written(written, errors)
+        written = {report: made.report().encode()} if report else {}
+        job.finish(
+            {**written, **_documents(made, json, pictures)},
+            summary=lambda: output.print(made.report(), markup=False, end=""),
+        )
 
 
 def _simulated(*networks: NetworkOptions) -> dict[str, Block]:
     """Simulate networks: their true positions, nothing measured."""
-    from photogram.simulation import simulate
+    from photogram.network.simulation import simulate
 
     patterns = {_name(network): simulate(check_points=0, **network.arguments()).truth for network in networks}
     if len(patterns) < len(networks):
@@ -119,8 +122,8 @@ def _check_alone(network: NetworkOptions, against: Control, *others: float | Non
 def _adjusted(projects: list[Path]) -> dict[str, Block]:
     """Read projects; what stands in their files is adjusted first, so that all points have positions."""
     from photogram import adjust
+    from photogram.adjustment.prediction import at_adjusted
     from photogram.giant import read_project
-    from photogram.prediction import at_adjusted
 
     patterns = {}
     for name, directory in _names(projects).items():
@@ -142,10 +145,10 @@ def _names(projects: list[Path]) -> dict[str, Path]:
     return {place.name if short else str(place): given for place, given in zip(places, projects, strict=True)}
 
 
-def _documents(made: Plan, json: Path | None, plot: Path | None) -> dict[Path, bytes]:
+def _documents(made: Plan, json: Path | None, pictures: list[Path]) -> dict[Path, bytes]:
     documents = {json: made.to_json()} if json else {}
-    if plot:
-        from photogram.pictures import drawn
+    if pictures:
+        from photogram.show.pictures import drawn
 
-        documents[plot] = drawn(made.plot(), plot)
+        documents |= {path: drawn(made.plot(), path) for path in pictures}
     return documents

@@ -11,12 +11,13 @@ from rich.markup import escape
 
 from photogram.cli.console import output, print_remark
 from photogram.cli.job import Job, Writes, with_job
+from photogram.cli.options import Quiet
 from photogram.cli.simulated import NetworkOptions, takes_network
 
 if TYPE_CHECKING:
-    from photogram.block import Block
     from photogram.giant.common import Common
-    from photogram.simulation import Simulation
+    from photogram.network.block import Block
+    from photogram.network.simulation import Simulation
 
 __all__ = ["simulate"]
 
@@ -28,7 +29,7 @@ def simulate(
     out: Annotated[
         Path,
         Writes.DIRECTORY,
-        typer.Argument(metavar="OUT", help="Directory for the project; it is made if need be."),
+        typer.Argument(metavar="DIR", help="Directory for the project; it is made if need be."),
     ],
     network: NetworkOptions,
     check_points: Annotated[int, typer.Option(help="Points with known positions that are not held.")] = 20,
@@ -43,6 +44,7 @@ def simulate(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a project that is there already.")
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write a simulated block as a GIANT project, and the truth behind it as truth.json.
 
@@ -55,7 +57,7 @@ def simulate(
     with job:
         from photogram.giant import Project
         from photogram.giant.project import project_files
-        from photogram.simulation import simulate as make
+        from photogram.network.simulation import simulate as make
 
         simulation = make(
             check_points=check_points,
@@ -71,18 +73,19 @@ def simulate(
         job.write(written)
         for message in project.messages:
             print_remark(message)
-        output.print(
-            f"{escape(str(out))}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
-            f" {len(block.image_xy)} image points"
-        )
+        if not quiet:
+            output.print(
+                f"{escape(str(out))}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
+                f" {len(block.image_xy)} image points"
+            )
 
 
 def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[Block, Common]:
     """Return a simulated block as files can state it, and the job: no initial value is free in them."""
     import numpy as np
 
-    from photogram.geometry import lengths_of_units
     from photogram.giant.common import Common
+    from photogram.network.geometry import lengths_of_units
 
     weighted = [np.isfinite(sd).all() for sd in (block.photo_position_sd, block.photo_attitude_sd)]
     if not any(weighted):
@@ -98,7 +101,8 @@ def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[
 def _truth(simulation: Simulation) -> bytes:
     """Make the document of what is true in a simulated block."""
     import numpy as np
-    import orjson
+
+    from photogram.io import json
 
     truth, blunders = simulation.truth, simulation.blunders
     degrees = np.array([math.degrees(1), math.degrees(1), 1.0]) if truth.geographic else np.ones(3)
@@ -135,4 +139,4 @@ def _truth(simulation: Simulation) -> bytes:
             for row, amount in zip(blunders.images.tolist(), blunders.amounts.tolist(), strict=True)
         ],
     }
-    return orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+    return json.to_json(document)

@@ -97,8 +97,8 @@ class NetworkOptions:
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments of :func:`photogram.simulate`."""
-        from photogram.geometry import Spheroid
-        from photogram.refraction import Refraction
+        from photogram.network.geometry import Spheroid
+        from photogram.network.refraction import Refraction
 
         arguments: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         arguments["control"] = self.control.value

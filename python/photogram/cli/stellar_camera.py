@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, ExitStack
-from importlib.resources import as_file, files
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.console import NOT_CONVERGED, print_sections, print_written
+from photogram.cli.console import print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Quiet, Threads
+from photogram.cli.options import JsonFile, Plots, Quiet, Threads, out_option
 
 if TYPE_CHECKING:
     from photogram.stellar.night import CalibratedNight
@@ -23,13 +22,8 @@ __all__ = ["exposures", "stellar_camera"]
 Out = Annotated[
     Path | None,
     Writes.DIRECTORY,
-    typer.Option(
-        metavar="OUT",
-        help="Directory for listing, camera and plots. Default: INPUT-calibrated, here.",
-        show_default=False,
-    ),
+    out_option("Directory for listing, camera and pictures. Default: INPUT-calibrated, here."),
 ]
-Plots = Annotated[bool, typer.Option("--plots", help="Draw the plots (needs matplotlib).")]
 
 
 @with_job
@@ -60,39 +54,33 @@ def stellar_camera(
 
     `photogram stellar-camera exposures` does so by digital exposures of the sky.
     """
-    if example == (deck is not None):
-        raise typer.BadParameter("give a deck, or --example", param_hint="DECK")
-    with job, ExitStack() as resources:
-        from dataclasses import replace
-
+    with job:
         from photogram.stellar import calibrate
         from photogram.stellar.document import to_json
-        from photogram.stellar.listing import summary
 
         if deck is None:
-            deck = resources.enter_context(_example("stellar")) / "plate.toml"
+            deck = job.packaged("stellar") / "plate.toml"
         problems, inputs = _read(deck)
         job.reads(*inputs)
         target = out or Path(f"{deck.stem}-calibrated")
         written: dict[Path, bytes] = {}
         documents: dict[Path, bytes] = {}
-        converged = True
+        results = []
         for number, problem in enumerate(problems, 1):
             if as_published:
                 problem = replace(problem, options=replace(problem.options, as_published=True))
             result = calibrate(problem)
-            converged = converged and result.converged
+            results.append(result)
             mark = f"-{number}" if len(problems) > 1 else ""
             written |= _files(result, target, mark, plots)
             if json is not None:
                 documents[json.with_stem(json.stem + mark)] = to_json(result)
-            if not quiet:
-                print_sections(summary(result), "the listing")
-        job.write(written, documents)
-        if not quiet:
-            print_written([*written, *documents])
-    if not converged:
-        raise typer.Exit(NOT_CONVERGED)
+        job.finish(
+            written,
+            documents,
+            summary=lambda: _summarize(results),
+            good=all(result.converged for result in results),
+        )
 
 
 @with_job
@@ -118,31 +106,31 @@ def exposures(
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a digital camera by exposures of the sky: pinhole and Brown distortion (needs pyerfa)."""
-    if example == (night is not None):
-        raise typer.BadParameter("give a file, or --example", param_hint="FILE")
-    with job, ExitStack() as resources:
+    with job:
         from photogram.stellar.night import calibrate_night
         from photogram.stellar.night_document import to_json
         from photogram.stellar.night_file import inputs, read_night
         from photogram.stellar.night_report import summary
 
         if night is None:
-            night = resources.enter_context(_example("exposures")) / "night.toml"
+            night = job.packaged("exposures") / "night.toml"
         job.reads(*inputs(night))
         result = calibrate_night(read_night(night), threads)
         written = _night_files(result, out or Path(f"{night.stem}-calibrated"), plots)
         documents = {json: to_json(result)} if json is not None else {}
-        if not quiet:
-            print_sections(summary(result), "the report")
-        job.write(written, documents)
-        if not quiet:
-            print_written([*written, *documents])
-    if not result.usable:
-        raise typer.Exit(NOT_CONVERGED)
+        job.finish(
+            written,
+            documents,
+            summary=lambda: print_sections(summary(result), "the report"),
+            good=result.usable,
+        )
 
 
-def _example(name: str) -> AbstractContextManager[Path]:
-    return as_file(files("photogram") / "examples" / name)
+def _summarize(results: list[Result]) -> None:
+    from photogram.stellar.listing import summary
+
+    for result in results:
+        print_sections(summary(result), "the listing")
 
 
 def _read(deck: Path) -> tuple[list[Problem], list[Path]]:

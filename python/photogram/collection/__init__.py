@@ -1,6 +1,6 @@
 """Collections of photos of unknown cameras: bundle adjustment "in the large"."""
 
-from photogram.arguments import check_arguments
+from photogram.arguments.annotations import check_arguments
 from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.bal import read, to_bytes

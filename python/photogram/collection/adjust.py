@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjusted import Iteration
-from photogram.adjustment import Ordering, Progress, core_threads, teller
+from photogram.adjustment.adjustment import Ordering, Progress, core_threads, teller
+from photogram.adjustment.ends import hidden, rounded, too_coarse
+from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory
 from photogram.messages import Message, listed
-from photogram.robust import Loss, loss_row, remark
+from photogram.results.adjusted import Iteration
 
 __all__ = ["adjust"]
 
@@ -36,7 +37,9 @@ def adjust(
     """Adjust a collection by Levenberg-Marquardt steps from given values, however far.
 
     Points with a free coordinate and images on one photo only are left out, and so are points that run into
-    the station of a photo, where rays that fit badly meet: they would take all digits from the others.
+    the station of a photo, where rays that fit badly meet: they would take all digits from the others. They
+    are known by being a hundred times nearer than the other points while every other photo has the images of
+    point and station within three standard deviations, before and after a step.
     Photos that have no image then stay as they are. Where nothing weighted or fixed gives a datum, cofactors
     are those of minimum constraints: position and attitude of the first photo and one component of the
     translation of another are held. Residuals, redundancy
@@ -76,7 +79,8 @@ def adjust(
     RankError
         Damping does not help: an unknown has no observation.
     AdjustmentError
-        There is nothing to adjust, or the initial values give no finite image coordinates.
+        There is nothing to adjust, the initial values give no finite image coordinates, or double precision
+        is too coarse for values so large; names the photos and points concerned.
     InputError
         An option that cannot be.
     KeyboardInterrupt
@@ -150,6 +154,7 @@ def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
     if solution.undetermined is not None:
         error = _named(*solution.undetermined)
         messages.append(Message(f"there are no covariances: {error}"))
+    messages += rounded(solution.redundancy_excess)
     if (solution.photo_images == 0).any():
         messages.append(
             Message(f"left as they are, photos without image points: {_numbers(solution.photo_images == 0)}")
@@ -161,9 +166,8 @@ def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
         out[solution.collapsed] = False
     if out.any():
         messages.append(Message(f"left out, points with images on fewer than two photos: {_numbers(out)}"))
-    if solution.point_rays_behind.any():
-        rays, names = solution.point_rays_behind.sum(), _numbers(solution.point_rays_behind > 0)
-        messages.append(Message(f"{rays} image points have their point behind the camera: points {names}"))
+    behind = solution.point_rays_behind
+    messages += hidden(int(behind.sum()), [str(point) for point in np.flatnonzero(behind)], [])
     if solution.datum:
         held = ", ".join(f"{PARAMETERS[parameter]} of photo {photo}" for photo, parameter in solution.datum)
         messages.append(Message(f"nothing gives a datum; covariances hold for fixed {held}"))
@@ -183,6 +187,8 @@ def _named(kind: str, message: str, photos: list[list[int]], points: list[int]) 
         names = [str(photo) for photo in sorted({photo for each in photos for photo in each})]
         text = f"the observations leave {len(photos)} combinations of unknowns undetermined, moving photos"
         return RankError(f"{text} {listed(names)}", names, [])
+    if kind == "coarse":
+        return too_coarse([str(photo) for photo in photos[0]], [str(point) for point in points])
     if kind == "memory":
         return OutOfMemoryError(message)
     return AdjustmentError(message)

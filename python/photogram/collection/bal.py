@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Floats
 from photogram.collection.collection import Collection
 from photogram.errors import InputError
 from photogram.memory import require, turned
 
 __all__ = ["read", "to_bytes"]
 
-Floats = NDArray[np.float64]
 
 COMPRESSED: dict[bytes, Callable[[BinaryIO], BinaryIO]] = {
     b"BZh": lambda file: cast("BinaryIO", bz2.BZ2File(file)),

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arrays import indices, shaped
+from photogram.arguments.arrays import indices, shaped
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 
 __all__ = ["PARAMETERS", "Collection"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 PARAMETERS = ("w1", "w2", "w3", "t1", "t2", "t3", "f", "k1", "k2")
 """Of a photo: angle-axis vector w (rad), translation t, focal length f (pixels), distortion k1, k2."""

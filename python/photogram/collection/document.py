@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import orjson
 
 from photogram import _photocore
 from photogram.collection.collection import PARAMETERS
-
-if TYPE_CHECKING:
-    from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.solution import CollectionSolution
+from photogram.io import json
 
 __all__ = ["to_json"]
 
 
-def to_json(result: AdjustedCollection) -> bytes:
+def to_json(result: CollectionSolution) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""
-    return orjson.dumps(_document(result), option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
+    return json.to_json(_document(result))
 
 
-def _document(result: AdjustedCollection) -> dict[str, Any]:
+def _document(result: CollectionSolution) -> dict[str, Any]:
     return {
         "program": f"photogram {_photocore.__version__}",
         "units": {
@@ -69,7 +67,7 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
     }
 
 
-def _photos(result: AdjustedCollection) -> list[dict[str, Any]]:
+def _photos(result: CollectionSolution) -> list[dict[str, Any]]:
     columns = zip(
         result.photo_parameters, result.photo_covariances, result.photo_images.tolist(), strict=True
     )
@@ -79,7 +77,7 @@ def _photos(result: AdjustedCollection) -> list[dict[str, Any]]:
     ]
 
 
-def _points(result: AdjustedCollection) -> list[dict[str, Any]]:
+def _points(result: CollectionSolution) -> list[dict[str, Any]]:
     used = np.flatnonzero(result.used_points)
     columns = zip(
         used.tolist(),
@@ -94,7 +92,7 @@ def _points(result: AdjustedCollection) -> list[dict[str, Any]]:
     ]
 
 
-def _observations(result: AdjustedCollection) -> list[dict[str, Any]]:
+def _observations(result: CollectionSolution) -> list[dict[str, Any]]:
     collection, used = result.collection, result.used_images
     columns = zip(
         collection.image_photos[used].tolist(),

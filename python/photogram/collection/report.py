@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.collection.collection import PARAMETERS
-from photogram.outliers import Observations, outliers
-from photogram.reliability import TESTABLE
-from photogram.sections import Section, composed, headline, problems
-from photogram.statistics import externally_studentized, global_test, studentized_limit
-
-if TYPE_CHECKING:
-    from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.solution import CollectionSolution
+from photogram.show.sections import Section, composed, headline, problems
+from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
+from photogram.statistics.outliers import Observations, outliers
+from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["report", "summary"]
 
@@ -25,7 +22,7 @@ NOTABLE = 3.0
 UNITS = ("rad",) * 3 + ("",) * 3 + ("px", "", "")
 
 
-def report(result: AdjustedCollection) -> str:
+def report(result: CollectionSolution) -> str:
     """Return the report of an adjusted collection."""
     sections = [
         *summary(result),
@@ -37,7 +34,7 @@ def report(result: AdjustedCollection) -> str:
     return composed(headline("collection of photos"), sections)
 
 
-def summary(result: AdjustedCollection) -> list[Section]:
+def summary(result: CollectionSolution) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, suspects."""
     return [
         ("Problems", _problems(result)),
@@ -46,7 +43,7 @@ def summary(result: AdjustedCollection) -> list[Section]:
     ]
 
 
-def _problems(result: AdjustedCollection) -> list[str]:
+def _problems(result: CollectionSolution) -> list[str]:
     """Return a failed test and outliers before other remarks.
 
     Standard deviations of pixels are guesses: single residuals are tested against all others.
@@ -74,7 +71,7 @@ def _problems(result: AdjustedCollection) -> list[str]:
     )
 
 
-def _adjustment(result: AdjustedCollection) -> list[str]:
+def _adjustment(result: CollectionSolution) -> list[str]:
     collection, variance = result.collection, result.variance_of_unit_weight
     residuals = result.residuals[result.used_images]
     rows = [
@@ -100,7 +97,7 @@ def _adjustment(result: AdjustedCollection) -> list[str]:
     return [f"{name:<36}{value}" for name, value in rows]
 
 
-def _suspects(result: AdjustedCollection) -> list[str]:
+def _suspects(result: CollectionSolution) -> list[str]:
     """List the image points that fit worst, in units of what the others have."""
     sigma0 = math.sqrt(result.covariance_scale)
     with np.errstate(invalid="ignore"):
@@ -121,7 +118,7 @@ def _suspects(result: AdjustedCollection) -> list[str]:
     return lines
 
 
-def _iterations(result: AdjustedCollection) -> list[str]:
+def _iterations(result: CollectionSolution) -> list[str]:
     head = [" no.            cost   damping", f"   0{0.5 * result.initial_weighted_sum_of_squares:16.6e}"]
     lines = [
         f"{each.number:4d}{0.5 * each.weighted_sum_of_squares:16.6e}{each.damping:10.1e}"
@@ -130,7 +127,7 @@ def _iterations(result: AdjustedCollection) -> list[str]:
     return head + lines
 
 
-def _photos(result: AdjustedCollection) -> list[str]:
+def _photos(result: CollectionSolution) -> list[str]:
     head = [f"{name}, {unit}" if unit else name for name, unit in zip(PARAMETERS, UNITS, strict=True)]
     lines = ["  photo images" + "".join(f"{name:>14}" for name in head)]
     for photo, (values, deviations) in enumerate(zip(result.photo_parameters, result.photo_sd, strict=True)):
@@ -142,7 +139,7 @@ def _photos(result: AdjustedCollection) -> list[str]:
     return lines
 
 
-def _points(result: AdjustedCollection) -> list[str]:
+def _points(result: CollectionSolution) -> list[str]:
     """Say how the standard deviations are spread; the JSON document has every one."""
     deviations = result.point_sd[np.isfinite(result.point_sd).all(axis=1)]
     if not len(deviations):
@@ -154,7 +151,7 @@ def _points(result: AdjustedCollection) -> list[str]:
     return lines
 
 
-def _work(result: AdjustedCollection) -> list[str]:
+def _work(result: CollectionSolution) -> list[str]:
     tried = ", ".join(f"{name} {operations:.2g}" for name, operations in result.predictions.items())
     return [
         f"ordering                            {result.ordering} (multiply-adds predicted: {tried})",

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.collection.collection import Collection, Floats
+from photogram.arguments.types import Floats
+from photogram.collection.collection import Collection
 from photogram.errors import InputError
 
 __all__ = ["Simulation", "simulate"]

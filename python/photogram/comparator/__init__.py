@@ -5,7 +5,7 @@ calibration = comparator.calibrate(session)
 calibration.correction.apply(xy_um)
 """
 
-from photogram.arguments import check_arguments
+from photogram.arguments.annotations import check_arguments
 from photogram.comparator.calibration import Calibration, CaseResult, PlateResult, Pointing, calibrate
 from photogram.comparator.cards import read_cards, to_cards
 from photogram.comparator.correction import Correction
@@ -19,7 +19,7 @@ from photogram.comparator.readings import Case, Reading, Session, collect_cases
 from photogram.comparator.simulation import Simulation, simulate_calibration
 from photogram.comparator.source import read
 from photogram.comparator.tables import read_csv, to_csv
-from photogram.places import Place
+from photogram.io.places import Place
 
 __all__ = [
     "Calibration",

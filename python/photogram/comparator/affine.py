@@ -12,7 +12,7 @@ from photogram.comparator.residuals import Residuals
 from photogram.errors import AdjustmentError
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.readings import Integers
 
 __all__ = ["AffineFit", "fit_affine"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.comparator.readings import LARGEST_UM
 from photogram.errors import InputError
-from photogram.rows import cells
+from photogram.io.rows import cells
 
 if TYPE_CHECKING:
     from photogram.comparator.correction import Correction

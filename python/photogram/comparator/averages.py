@@ -12,7 +12,7 @@ import numpy as np
 from photogram.comparator.orientation import exchanged, locations
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers

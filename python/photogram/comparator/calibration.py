@@ -43,12 +43,16 @@ from photogram.comparator.significance import (
 )
 from photogram.comparator.variance import VarianceAnalysis, analyse_variance
 from photogram.errors import AdjustmentError
+from photogram.memory import require
 from photogram.messages import Message
 
 if TYPE_CHECKING:
     from photogram.comparator.readings import Session
 
-__all__ = ["Calibration", "CaseResult", "PlateResult", "Pointing", "calibrate"]
+__all__ = ["Calibration", "CaseResult", "PlateResult", "Pointing", "calibrate", "needed_memory"]
+
+BASE, PER_POINTING = 64 << 20, 3500
+"""Bytes that any calibration takes, and what each pointing adds, with listing and document."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,6 +207,11 @@ def _chosen_sigma(result: PlateResult, options: Options) -> float:
     return of_choice[options.grid_sigma]
 
 
+def needed_memory(pointings: int) -> int:
+    """Return the bytes that a calibration of so many pointings takes at the most, with some to spare."""
+    return BASE + PER_POINTING * pointings
+
+
 def calibrate(session: Session, options: Options | None = None) -> Calibration:
     """Calibrate a comparator.
 
@@ -219,9 +228,13 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
         Measurements that cannot be used; file, record number and record are named as far as they are known.
     AdjustmentError
         Too few points, or placements that do not determine the parameters.
+    OutOfMemoryError
+        There is less memory than so many pointings take.
     """
     options = options or Options()
     session.check()
+    pointings = sum(len(case.points) for case in session.cases)
+    require(needed_memory(pointings), f"a calibration of {pointings} pointings")
     messages = list(session.messages)
     cases = [_case(session, index, options, messages) for index in range(len(session.cases))]
     _check_handedness(session, cases)

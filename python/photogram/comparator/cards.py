@@ -15,8 +15,8 @@ import numpy as np
 from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid
 from photogram.comparator.readings import Reading, Session, collect_cases
 from photogram.errors import InputError
+from photogram.io.records import Record, Source
 from photogram.messages import Message
-from photogram.records import Record, Source
 
 __all__ = ["Header", "join_least_count", "read_cards", "to_cards"]
 

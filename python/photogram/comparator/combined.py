@@ -17,7 +17,7 @@ from photogram.comparator.residuals import Residuals
 from photogram.comparator.rigid import RigidFit, fit_rigid
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.placed import PlacedCase
 
 __all__ = ["CombinedLinear", "CombinedPolynomial", "SinglePolynomial", "combine_linear", "combine_polynomial"]

@@ -13,11 +13,12 @@ import orjson
 
 from photogram.comparator.polynomial import Frame, Polynomial, design
 from photogram.errors import InputError
-from photogram.files import read_bytes
+from photogram.io import json
+from photogram.io.files import read_bytes
 from photogram.messages import quoted
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
 
 __all__ = ["Correction"]
 
@@ -207,7 +208,7 @@ class Correction:
 
     def to_json(self) -> bytes:
         """Return the correction as a JSON document (UTF-8)."""
-        return orjson.dumps(self.document(), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+        return json.to_json(self.document())
 
     @classmethod
     def read(cls, path: Path) -> Correction:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.polynomial import Polynomial
 
 __all__ = ["STEP_UM", "inside", "table_nodes", "table_values"]

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from photogram import rows
+from photogram.io import rows
+from photogram.io.numbers import finite_number, whole_number
+from photogram.io.places import Place
+from photogram.io.rows import Row
 from photogram.messages import quoted
-from photogram.numbers import finite_number, whole_number
-from photogram.places import Place
-from photogram.rows import Row
 
 __all__ = ["Setting", "Table", "read_table"]
 

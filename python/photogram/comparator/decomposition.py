@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
 
 __all__ = ["Decomposition", "rotation_matrix"]
 

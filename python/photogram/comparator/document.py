@@ -6,9 +6,8 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-import orjson
-
 from photogram import _photocore
+from photogram.io import json
 
 if TYPE_CHECKING:
     from photogram.comparator.calibration import Calibration, CaseResult, PlateResult
@@ -44,8 +43,7 @@ CONVENTIONS = {
 
 def to_json(calibration: Calibration) -> bytes:
     """Return the whole calibration as JSON (UTF-8). What is not a number is null."""
-    option = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2 | orjson.OPT_NON_STR_KEYS
-    return orjson.dumps(to_document(calibration), option=option | orjson.OPT_APPEND_NEWLINE)
+    return json.to_json(to_document(calibration))
 
 
 def to_document(calibration: Calibration) -> dict[str, Any]:

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments import path
+from photogram.arguments.annotations import path
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
-from photogram.numbers import is_whole_number, whole_number
+from photogram.io.numbers import is_whole_number, whole_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
 
 __all__ = ["BUILT_IN", "Grid", "built_in_grid", "find_grid", "read_grid"]
 

@@ -21,10 +21,10 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import COUNT, Frame, Polynomial
 from photogram.comparator.residuals import Residuals
 from photogram.errors import AdjustmentError
-from photogram.statistics import GlobalTest, global_test
+from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.combined import CombinedLinear
     from photogram.comparator.grid import Grid
     from photogram.comparator.placed import PlacedCase

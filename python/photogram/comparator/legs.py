@@ -12,7 +12,7 @@ from photogram.comparator.readings import Case
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.messages import Message
 
 __all__ = ["LegPoint", "intersect_legs", "reduce_legs"]

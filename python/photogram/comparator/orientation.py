@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.neighbours import mutually_nearest
+from photogram.network.neighbours import mutually_nearest
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.readings import Integers
 

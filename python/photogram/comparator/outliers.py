@@ -26,12 +26,12 @@ from photogram.comparator.orientation import exchanged
 from photogram.comparator.reduction import Reduction
 from photogram.comparator.rigid import fit_rigid
 from photogram.errors import AdjustmentError
-from photogram.statistics import externally_studentized, studentized_limit
+from photogram.statistics.limits import externally_studentized, studentized_limit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Case

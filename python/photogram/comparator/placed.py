@@ -14,7 +14,7 @@ from photogram.comparator.pointing import PointReadings, pool, read_points
 from photogram.errors import InputError
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.pointing import Precision
     from photogram.comparator.readings import Case, Integers

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.comparator.grouping import group
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.readings import Integers
 
 __all__ = [

@@ -16,7 +16,7 @@ import numpy as np
 from photogram.errors import AdjustmentError
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
 
 __all__ = ["TERMS", "Frame", "Polynomial", "fit_polynomial"]
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.errors import InputError
+from photogram.io.places import Place
 from photogram.messages import Message
-from photogram.places import Place
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
 
     Integers = NDArray[np.int64]

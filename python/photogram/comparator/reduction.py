@@ -24,7 +24,7 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import Frame, design
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
+from photogram.io.places import Place
 from photogram.messages import Message
-from photogram.places import Place
 
 if TYPE_CHECKING:
     from photogram.comparator.joint import JointFit

@@ -12,7 +12,7 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.residuals import Residuals
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.readings import Integers
 
 __all__ = ["RigidFit", "fit_rigid"]

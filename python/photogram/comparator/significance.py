@@ -18,7 +18,7 @@ import numpy as np
 from photogram.comparator.polynomial import TERMS
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.combined import CombinedLinear, CombinedPolynomial
 
 __all__ = ["CaseVarianceTest", "PolynomialTest", "TermTest", "compare_case_variances", "polynomial_tests"]

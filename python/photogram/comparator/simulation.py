@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arrays import shaped
+from photogram.arguments.arrays import shaped
 from photogram.comparator.correction import Correction
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.readings import Case, Session
 from photogram.errors import InputError
-from photogram.places import Place
+from photogram.io.places import Place
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.grid import Grid
     from photogram.comparator.readings import Integers
 

@@ -9,8 +9,8 @@ from photogram.comparator.csvfile import Setting, Table, read_table
 from photogram.comparator.grid import Grid, find_grid
 from photogram.comparator.readings import LARGEST_UM, Case, Reading, Session, collect_cases
 from photogram.errors import InputError
-from photogram.numbers import is_whole_number
-from photogram.rows import Row
+from photogram.io.numbers import is_whole_number
+from photogram.io.rows import Row
 
 __all__ = ["read_csv", "to_csv"]
 

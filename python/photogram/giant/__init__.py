@@ -1,8 +1,9 @@
 """The files of GIANT (Elassal and Malhotra, NOAA 1987): COMMON, CAMERAS, IMAGES, FRAMES and GROUND."""
 
-from photogram.arguments import check_arguments
+from photogram.arguments.annotations import check_arguments
+from photogram.checks import Check, Finding, Section
 from photogram.giant.cameras import Camera
-from photogram.giant.checks import Check, Finding, Section, check
+from photogram.giant.checking import check
 from photogram.giant.common import Common
 from photogram.giant.diagnostics import ErrorWarning, error_warnings
 from photogram.giant.frames import Frame

@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.block import Block
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.geometry import Spheroid
 from photogram.giant.frames import ATTITUDE_SD, Frame
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.limits import Limits, allowed_images, check_bandwidth, check_files, check_points
 from photogram.giant.records import error_at, message_at
 from photogram.giant.remarks import plain_name, remarks
 from photogram.messages import Message
-from photogram.refraction import Air, Refraction, Water, metres_per_unit
-from photogram.structuring import structure
+from photogram.network.block import Block
+from photogram.network.geometry import Spheroid
+from photogram.network.refraction import Air, Refraction, Water, metres_per_unit
+from photogram.network.structuring import structure
 
 if TYPE_CHECKING:
     from photogram.giant.common import Common
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["assemble", "job_refraction"]
 
-Floats = NDArray[np.float64]
 
 LONGEST_METRES = 1e7
 """No semi-major axis in metres is longer than this; in feet all are."""

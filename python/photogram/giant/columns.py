@@ -15,14 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.angles import ARCSEC
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.giant.fields import MOST_ANGLE, format_angle, format_deviations, format_real
+from photogram.show.angles import ARCSEC
 
 __all__ = ["Columns", "angle_fields", "deviation_fields", "position_fields", "real_fields", "texts"]
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 Table = NDArray[np.uint8]
 
 POWERS = 10 ** np.arange(19, dtype=np.int64)
@@ -53,9 +51,9 @@ class Columns:
         self._first = first
         self.plain = np.ones(len(records), dtype=bool)
 
-    def blank(self, first: int, last: int) -> Flags:
+    def blank(self, first: int, last: int) -> Bools:
         """Return which fields are blank."""
-        blank: Flags = (self._field(first, last) == BLANK).all(axis=1)
+        blank: Bools = (self._field(first, last) == BLANK).all(axis=1)
         return blank
 
     def real(self, first: int, last: int, decimals: int = 3) -> Floats:
@@ -107,7 +105,7 @@ class Columns:
     def _field(self, first: int, last: int) -> Table:
         return self._table[:, first - self._first : last - self._first + 1]
 
-    def _number(self, first: int, last: int, decimals: int) -> tuple[Flags, Integers, Integers]:
+    def _number(self, first: int, last: int, decimals: int) -> tuple[Bools, Indices, Indices]:
         """Read a sign, the digits as a whole number, and how many of them are decimals."""
         field = self._field(first, last)
         negative = np.zeros(len(field), dtype=bool)
@@ -252,29 +250,29 @@ def _in_runs(values: ArrayLike, width: int, write: Callable[[Floats], Table]) ->
     return table.reshape(len(values), values.shape[1] * width)
 
 
-def _rounded(values: Floats, places: Integers) -> tuple[Integers, Flags]:
+def _rounded(values: Floats, places: Indices) -> tuple[Indices, Bools]:
     """Round to decimals: whole units of the last one, and which are too near to the middle of two to tell."""
     scaled = values * POWERS[places]
     units = np.rint(scaled)
     return units.astype(np.int64), np.abs(scaled - units) > 0.5 - TIE
 
 
-def _fitting(units: Integers, places: Integers, room: Integers) -> tuple[Integers, Integers]:
+def _fitting(units: Indices, places: Indices, room: Indices) -> tuple[Indices, Indices]:
     """Give up the last decimal, a zero, where rounding up made one more digit than there is room for."""
     carried = (units >= POWERS[np.clip(room, 0, 18)]) & (places > 0)
     return np.where(carried, units // 10, units), places - carried
 
 
-def _packed(units: Integers, places: Integers) -> Integers:
+def _packed(units: Indices, places: Indices) -> Indices:
     """Turn seconds of arc into degrees, minutes and seconds, DDDMMSS; both in units of the last decimal."""
     unit = POWERS[places]
     minutes, seconds = np.divmod(units, 60 * unit)
     degrees, minutes = np.divmod(minutes, 60)
-    packed: Integers = (10000 * degrees + 100 * minutes) * unit + seconds
+    packed: Indices = (10000 * degrees + 100 * minutes) * unit + seconds
     return packed
 
 
-def _characters(negative: Flags, units: Integers, places: Integers, least: int, width: int) -> Table:
+def _characters(negative: Bools, units: Indices, places: Indices, least: int, width: int) -> Table:
     """Write units of the last decimal with an explicit point, right-justified.
 
     Zeros at the end go, down to `least` decimals; the zero before the point only where there is no room.
@@ -303,7 +301,7 @@ def _characters(negative: Flags, units: Integers, places: Integers, least: int, 
     return np.ascontiguousarray(table.T)
 
 
-def _with_others(table: Table, values: Floats, plain: Flags, write: Callable[[float], str]) -> Table:
+def _with_others(table: Table, values: Floats, plain: Bools, write: Callable[[float], str]) -> Table:
     """Write the values that are not plain one by one."""
     for row in np.flatnonzero(~plain).tolist():
         table[row] = np.frombuffer(write(float(values[row])).encode("ascii"), dtype=np.uint8)

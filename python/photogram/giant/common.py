@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from photogram.angles import ARCSEC
 from photogram.giant.fields import format_deviations, format_real
 from photogram.giant.records import Record, Source
+from photogram.show.angles import ARCSEC
 
 __all__ = ["Common", "common_records", "parse_common"]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.block import Block
 from photogram.giant.contents import Contents
 from photogram.giant.limits import Limits
+from photogram.network.block import Block
 
 __all__ = ["ErrorWarning", "error_warnings"]
 

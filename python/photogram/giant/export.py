@@ -8,9 +8,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.block import Block
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
@@ -20,14 +19,14 @@ from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
 from photogram.giant.images import ImageFrame
 from photogram.messages import Message
-from photogram.refraction import Refraction, metres_per_unit
+from photogram.network.block import Block
+from photogram.network.refraction import Refraction, metres_per_unit
 
 if TYPE_CHECKING:
     from photogram.giant.contents import Contents
 
 __all__ = ["adjusted_frames", "adjusted_ground", "adjusted_records", "block_files"]
 
-Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 

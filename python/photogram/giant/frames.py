@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from photogram.angles import ARCSEC
 from photogram.giant.columns import Columns, angle_fields, deviation_fields, position_fields, texts
 from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
+from photogram.show.angles import ARCSEC
 
 __all__ = ["ATTITUDE_SD", "Frame", "frame_records", "parse_frames"]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from photogram.giant.contents import Contents
     from photogram.giant.frames import Frame
     from photogram.giant.ground import GroundPoint
-    from photogram.structuring import Structure
+    from photogram.network.structuring import Structure
 
 __all__ = ["Limits", "allowed_images", "check_bandwidth", "check_files", "check_points"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from photogram.block import Block
 from photogram.errors import InputError
 from photogram.giant.assembly import assemble
 from photogram.giant.cameras import parse_cameras
@@ -18,7 +17,8 @@ from photogram.giant.ground import parse_ground
 from photogram.giant.images import parse_images
 from photogram.giant.limits import Limits
 from photogram.giant.records import Source
-from photogram.writing import write_whole
+from photogram.io.writing import write_whole
+from photogram.network.block import Block
 
 __all__ = ["Project", "project_files", "read_project", "write_project"]
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import geometry
-from photogram.block import Block
 from photogram.giant.frames import Frame
 from photogram.giant.records import message_at
 from photogram.messages import Message, listed
+from photogram.network import geometry
+from photogram.network.block import Block
+from photogram.network.ties import FEWEST_TIES, ties
 
-__all__ = ["FEWEST_TIES", "plain_name", "remarks", "ties"]
+__all__ = ["plain_name", "remarks"]
 
-FEWEST_TIES = 3
-"""Points that the orientation of a photo needs at least."""
 EARTH_RADIUS = 6.371e6
 """Metres."""
 FALSE_ORIGIN = 1e5
@@ -67,13 +66,6 @@ def _alike(block: Block) -> list[Message]:
                 )
             )
     return messages
-
-
-def ties(block: Block) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """(P,) points of each photo that another photo or control ties."""
-    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
-    useful = (rays >= 2) | np.isfinite(block.point_sd).any(axis=1)
-    return np.bincount(block.image_photos[useful[block.image_points]], minlength=len(block.photo_ids))
 
 
 def _map_projection(block: Block) -> list[Message]:

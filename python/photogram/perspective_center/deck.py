@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
+from photogram.io.records import Record, Source
 from photogram.messages import Message
 from photogram.perspective_center.formats import CardFormat
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Coordinatograph, Grid, reduce
-from photogram.records import Record, Source
 
 __all__ = ["OUT_OF_ORDER", "Deck", "Job", "read_deck"]
 
-Floats = NDArray[np.float64]
 
 OUT_OF_ORDER = "ERROR - CARDS ARE OUT OF ORDER AT POINT NO."
 SPECIFICATIONS = CardFormat("(3I5,2F10.0)", integers=3, reals=2)

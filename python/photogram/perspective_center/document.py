@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import orjson
-
 from photogram import _photocore
+from photogram.io import json
 from photogram.perspective_center.batch import Run
 from photogram.perspective_center.solution import PerspectiveCenter
 
@@ -35,7 +34,7 @@ def to_json(run: Run) -> bytes:
         "error": None if run.stop is None else str(run.stop.error),
         "sets": [_set(result) for result in run.results],
     }
-    return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
+    return json.to_json(document)
 
 
 def _set(result: PerspectiveCenter) -> dict[str, Any]:

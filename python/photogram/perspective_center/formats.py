@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import fortranformat
 
-from photogram.records import Record
+from photogram.io.records import Record
 
 __all__ = ["CardFormat"]
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arrays import names, number, shaped
+from photogram.arguments.arrays import names, number, shaped
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "reduce"]
 
-Floats = NDArray[np.float64]
 
 MINUTES_PER_RADIAN = 3437.7468
 """CONV of the program, too large by 8.5e-9 of itself; all its angles in minutes are meant by it."""

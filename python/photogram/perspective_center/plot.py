@@ -6,17 +6,19 @@ matplotlib is an extra (`pip install 'photogram[plots]'`) and is imported only h
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from photogram.errors import InputError
-from photogram.pictures import drawn, round_length
+from photogram.show.pictures import arrows, drawn, new_figure, open_frame, round_length
 
 if TYPE_CHECKING:
-    from photogram.perspective_center.solution import Floats, PerspectiveCenter
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from photogram.arguments.types import Floats
+    from photogram.perspective_center.solution import PerspectiveCenter
 
 __all__ = ["draw", "figure"]
 
@@ -45,7 +47,7 @@ def draw(results: list[PerspectiveCenter], path: Path) -> bytes:
 
 def figure(results: list[PerspectiveCenter]) -> Figure:
     """Return a figure with a row for each set: residual vectors, radial distortion."""
-    drawing = Figure(figsize=(WIDTH, ROW * len(results)), layout="constrained", dpi=150)
+    drawing = new_figure(WIDTH, ROW * len(results))
     axes = drawing.subplots(len(results), 2, squeeze=False, width_ratios=(1.0, 1.15))
     # One scale for all sets, so that they can be compared.
     longest = max(float(np.hypot(*result.residual.T).max()) for result in results)
@@ -68,18 +70,11 @@ def residual_vectors(axes: Axes, result: PerspectiveCenter, longest: float) -> N
     extent = float(np.ptp(result.projected, axis=0).max()) or 1.0
     enlargement = LONGEST * extent / longest if longest > 0 else 1.0
     axes.plot(x, y, "o", color=INK, markersize=2.5)
-    arrows: dict[str, Any] = {
-        "angles": "xy",
-        "scale_units": "xy",
-        "scale": 1.0,
-        "width": 0.004,
-        "color": ACCENT,
-    }
-    axes.quiver(x, y, *(result.residual.T * enlargement), **arrows)
+    arrows(axes, result.projected, result.residual * enlargement, width=0.004, color=ACCENT)
     known = round_length(longest)
     margin = 0.12 * extent
     corner = np.array([x.min(), y.min() - 1.35 * margin])
-    axes.quiver(*corner, known * enlargement, 0.0, **arrows)
+    arrows(axes, corner[None], np.array([[known * enlargement, 0.0]]), width=0.004, color=ACCENT)
     axes.annotate(
         f"{known:g} model units (x {enlargement:,.0f})",
         (corner[0] + known * enlargement, corner[1]),
@@ -140,4 +135,4 @@ def _quiet(axes: Axes) -> None:
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=8)
     axes.title.set_fontsize(10)
-    axes.spines[["top", "right"]].set_visible(False)
+    open_frame(axes)

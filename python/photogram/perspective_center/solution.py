@@ -12,20 +12,21 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arrays import one_of, shaped
+from photogram.adjustment.ends import hidden
+from photogram.adjustment.resection import Observed, solve
+from photogram.arguments.arrays import one_of, shaped
+from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError
-from photogram.geometry import rotation_matrix
 from photogram.messages import Message, listed
+from photogram.network.geometry import rotation_matrix
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
-from photogram.resection import Observed, solve
-from photogram.statistics import externally_studentized, studentized_limit
+from photogram.statistics.limits import externally_studentized, studentized_limit
 
 __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]
 
-Floats = NDArray[np.float64]
 Weights = Literal["equal", "readings", "deviations"]
 
 MOST_CYCLES = 6
@@ -228,16 +229,10 @@ def _strictly(grid: Grid, observed: Observed) -> Solved:
             if start is None:
                 raise
         else:
-            if start is None or (solution.status == "converged" and _in_front(grid, solution.pose)):
+            if start is None or (solution.status == "converged" and not solution.points_behind.size):
                 break
         messages = [Message("the initial approximations lead to no solution; a direct one was taken instead")]
     return solution, messages
-
-
-def _in_front(grid: Grid, pose: Floats) -> bool:
-    """Whether the projector looks at all points; the equations hold for points behind it as well."""
-    ahead = -rotation_matrix(pose[np.newaxis, 3:])[0, 2]
-    return bool(((grid.model - pose[:3]) @ ahead > 0).all())
 
 
 def _as_published(grid: Grid, observed: Observed) -> Solved:
@@ -311,6 +306,8 @@ def _result(
         studentized=externally_studentized(reduced, squares, freedom),
         messages=messages,
     )
+    behind = [str(grid.ids[point]) for point in solution.points_behind]
+    messages += hidden(len(behind), behind, [])
     if result.outliers:
         messages.append(Message(_outliers_named(result)))
     return result

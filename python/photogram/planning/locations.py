@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
+
 __all__ = ["LOCATIONS", "locations"]
 
-Floats = NDArray[np.float64]
 
 LOCATIONS = ("corner", "edge", "interior")
 

@@ -6,17 +6,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-import orjson
-
 from photogram import _photocore
-from photogram.adjustment import Progress
-from photogram.arguments import check_arguments
-from photogram.block import Block
+from photogram.adjustment.adjustment import Progress
+from photogram.adjustment.prediction import predict
+from photogram.arguments.annotations import check_arguments
 from photogram.errors import InputError, RankError
+from photogram.io import json
+from photogram.network.block import Block
 from photogram.planning.pattern import Pattern
 from photogram.planning.text import report
-from photogram.prediction import predict
-from photogram.reliability import TESTABLE, noncentrality
+from photogram.statistics.reliability import TESTABLE, noncentrality
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,7 +90,7 @@ class Plan:
             "unchecked_below": TESTABLE,
             "patterns": [_pattern(pattern) for pattern in self.patterns],
         }
-        return orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+        return json.to_json(document)
 
 
 def plan(

@@ -8,8 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram import geometry
-from photogram.block import Block
+from photogram.adjustment.prediction import image_depths
+from photogram.arguments.types import Floats
+from photogram.network import geometry
+from photogram.network.block import Block
 from photogram.planning.locations import locations
 from photogram.planning.statistics import (
     ControlQuality,
@@ -19,12 +21,9 @@ from photogram.planning.statistics import (
     photo_quality,
     point_quality,
 )
-from photogram.prediction import image_depths
-from photogram.result import Result
+from photogram.results.result import Result
 
 __all__ = ["Pattern"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,21 +9,20 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.errors import PhotogramError
+from photogram.show.pictures import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.collections import PathCollection
+    from matplotlib.figure import Figure
 
     from photogram.planning.pattern import Pattern
 
 __all__ = ["figure"]
-
-Floats = NDArray[np.float64]
 
 
 _PANEL = 6.0
@@ -58,7 +57,7 @@ def _panels(count: int, width: float, height: float) -> tuple[Figure, list[Axes]
     across = max(2 * _PANEL if stacked else min(_PANEL, _PANEL * width / height), 3.5)
     up = min(across * height / width, _PANEL)
     size = (columns * (across + 0.5) + 1.5, rows * (up + 0.8) + 0.6)
-    made = Figure(figsize=size, layout="constrained", dpi=120)
+    made = new_figure(*size)
     axes = made.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for each in axes.ravel():
         each.set_aspect("equal")

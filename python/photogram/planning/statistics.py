@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.adjusted import AdjustedBlock
+from photogram.arguments.types import Bools, Floats
 from photogram.planning.locations import LOCATIONS
-from photogram.reliability import TESTABLE, largest_effect, minimal_detectable_error
+from photogram.results.adjusted import AdjustedBlock
+from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
 __all__ = [
     "ControlQuality",
@@ -21,8 +22,6 @@ __all__ = [
     "point_quality",
 ]
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Triple = tuple[float, float, float]
 
 _CLASSES = (
@@ -120,7 +119,7 @@ class ControlQuality:
 
 
 def point_quality(
-    result: AdjustedBlock, point_sd: Floats, locations: NDArray[np.str_], new: Mask
+    result: AdjustedBlock, point_sd: Floats, locations: NDArray[np.str_], new: Bools
 ) -> list[PointQuality]:
     """Return the quality of new points by number of rays, by location, and of all; groups without points too.
 
@@ -142,7 +141,7 @@ def point_quality(
     return [_group(result, point_sd, grouping, name, new & chosen) for grouping, name, chosen in groups]
 
 
-def _group(result: AdjustedBlock, point_sd: Floats, grouping: str, group: str, chosen: Mask) -> PointQuality:
+def _group(result: AdjustedBlock, point_sd: Floats, grouping: str, group: str, chosen: Bools) -> PointQuality:
     images = chosen[result.block.image_points]
     redundancy = result.redundancy[images]
     checked = redundancy >= TESTABLE

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from itertools import compress
 from typing import TYPE_CHECKING
 
-from photogram.angles import ARCSEC
 from photogram.planning.statistics import PointQuality
-from photogram.sections import composed, headline
+from photogram.show.angles import ARCSEC
+from photogram.show.sections import composed, headline
 
 if TYPE_CHECKING:
     from photogram.planning.pattern import Pattern

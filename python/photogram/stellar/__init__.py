@@ -1,6 +1,6 @@
 """Stellar camera calibration (NOAA Technical Report NOS 55, 1972)."""
 
-from photogram.arguments import check_arguments
+from photogram.arguments.annotations import check_arguments
 from photogram.stellar.adjustment import calibrate
 from photogram.stellar.cameras import BrownCamera, PlateCamera
 from photogram.stellar.options import Options

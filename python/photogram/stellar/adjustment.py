@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.stellar import published, strict
@@ -22,9 +22,6 @@ from photogram.stellar.result import PreRun, Result, Stage
 from photogram.stellar.state import Solved
 
 __all__ = ["calibrate"]
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 def calibrate(

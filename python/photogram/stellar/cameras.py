@@ -12,8 +12,10 @@ import orjson
 from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.files import read_bytes
+from photogram.io import json
+from photogram.io.files import read_bytes
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.sky import TAU
 from photogram.stellar.transformation import transformed_angles
@@ -24,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["BrownCamera", "PlateCamera", "camera_document"]
 
-Floats = NDArray[np.float64]
 
 _INTERIOR = NAMES[9:22]
 _BROWN = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
@@ -32,7 +33,6 @@ BROWN_PLACE = (3, 4, 1, 2, 7, 8, 9, 11, 10)
 """Places of these among the common parameters of the core, whose P1 is the p2 of computer vision."""
 COMMON = 17
 """Parameters of the core that all images share."""
-_FORMAT = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
 
 
 def weight_of(covariance: Floats) -> Floats:
@@ -160,7 +160,7 @@ class PlateCamera:
 
     def to_json(self) -> bytes:
         """Return the camera as a JSON document."""
-        return orjson.dumps(self.document(), option=_FORMAT)
+        return json.to_json(self.document())
 
     def as_prior(self, problem: Problem, unit: float | None = None) -> Problem:
         """Return a calibration that begins with this camera and gives it the weight of its covariance.
@@ -234,7 +234,7 @@ def camera_document(result: Result) -> bytes:
             "matrix": result.covariance[np.ix_(chosen, chosen)],
         },
     }
-    return orjson.dumps(document, option=_FORMAT)
+    return json.to_json(document)
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,7 +287,7 @@ class BrownCamera:
             "parameters": dict(zip(_BROWN, self.values.tolist(), strict=True)),
             "covariance": {"order": _BROWN, "matrix": self.covariance},
         }
-        return orjson.dumps(document, option=_FORMAT)
+        return json.to_json(document)
 
     @classmethod
     def read(cls, path: Path) -> BrownCamera:

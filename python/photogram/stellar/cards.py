@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.errors import InputError
-from photogram.giant.fields import parse_integer, parse_real
-from photogram.records import Record, Source
+from photogram.io.fields import parse_integer, parse_real
+from photogram.io.records import Record, Source
 
 __all__ = ["Card", "Cards"]
 

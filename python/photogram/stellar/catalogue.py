@@ -10,13 +10,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.rows import Row, read_rows
+from photogram.io.rows import Row, read_rows
+from photogram.show.angles import ARCSEC
 
 __all__ = ["Catalogue"]
 
-Floats = NDArray[np.float64]
 _MAS = 1e-3 * ARCSEC
 _ERRORS = ("ra_error_mas", "dec_error_mas", "pm_ra_error_mas", "pm_dec_error_mas")
 _COLUMNS = ("id", "ra_deg", "dec_deg", "pm_ra_mas", "pm_dec_mas", "parallax_mas", "magnitude")

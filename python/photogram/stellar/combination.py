@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.stellar import published, strict
 from photogram.stellar.parameters import GROUPS, NAMES
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from photogram.stellar.state import Solved
 
 __all__ = ["combine", "constraints", "modify"]
-
-Floats = NDArray[np.float64]
 
 
 def constraints(pairs: tuple[tuple[str, str], ...], parameters: int) -> Floats:
@@ -86,8 +84,16 @@ def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
     misclosure = -(np.remainder(off + np.pi, 2 * np.pi) - np.pi)
     step, cofactors = modify(solved.cofactors, np.zeros(len(solved.parameters)), c, misclosure)
     parameters = solved.parameters + step
-    again = published.residual_cycle(problem, parameters, solved.free, cofactors=cofactors)
-    return replace(again, stop=solved.stop, converged=solved.converged, levels=solved.levels)
+    return published.residual_cycle(
+        problem,
+        parameters,
+        solved.free,
+        cofactors=cofactors,
+        log_determinant=solved.log_determinant,
+        stop=solved.stop,
+        converged=solved.converged,
+        levels=solved.levels,
+    )
 
 
 def _iterated(result: Result, pairs: tuple[tuple[str, str], ...], threads: int | None) -> Solved:
@@ -117,14 +123,18 @@ def _iterated(result: Result, pairs: tuple[tuple[str, str], ...], threads: int |
         limit=problem.options.max_iterations,
         threads=threads,
     )
-    final = strict.residual_cycle(
-        problem,
-        spread @ again.parameters,
-        solved.free,
-        again.places,
+    # Of what weights of several groups say, the common values keep their distance to each.
+    off, axis = spread @ again.parameters - problem.initial, again.axis_residual
+    weighted = float(off @ problem.parameter_weights @ off)
+    if problem.axis is not None and axis is not None:
+        weighted += float(axis @ problem.axis.weight @ axis)
+    return replace(
+        again,
+        parameters=spread @ again.parameters,
+        free=solved.free,
         cofactors=spread @ again.cofactors @ spread.T,
+        sums=(again.sums[0], again.sums[1], weighted),
     )
-    return replace(final, stop=again.stop, converged=again.converged, levels=again.levels)
 
 
 def _common_weights(problem: Problem, spread: Floats, near: Floats) -> tuple[Floats, Floats]:

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Floats
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import Earth
 from photogram.stellar.skies import Exposure, SkyCalibration, partials
@@ -23,7 +23,6 @@ from photogram.stellar.sky import Site
 
 __all__ = ["HeldOut", "held_out"]
 
-Floats = NDArray[np.float64]
 
 LEVEL = 0.05
 """Probability that any exposure of a good night is found unlike the others."""

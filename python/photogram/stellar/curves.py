@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.stellar.parameters import INDEX
 from photogram.stellar.sky import TAU, refraction
 
@@ -26,8 +27,6 @@ __all__ = [
     "residual_classes",
     "star_means",
 ]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

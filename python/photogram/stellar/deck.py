@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.show.angles import ARCSEC
 from photogram.stellar.cards import Card, Cards
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, NAMES
@@ -23,7 +23,6 @@ from photogram.stellar.sky import Air, Site
 
 __all__ = ["read_deck"]
 
-Floats = NDArray[np.float64]
 
 _DEGREE = np.pi / 180.0
 _HOUR = np.pi / 12.0

@@ -7,10 +7,10 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-import orjson
 
 from photogram import _photocore
-from photogram.angles import ARCSEC
+from photogram.io import json
+from photogram.show.angles import ARCSEC
 from photogram.stellar.comparator_frame import comparator_frame
 from photogram.stellar.curves import (
     distortion_curves,
@@ -26,12 +26,10 @@ from photogram.stellar.transformation import transformed_angles
 
 __all__ = ["to_json"]
 
-_FORMAT = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
-
 
 def to_json(result: Result) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""
-    return orjson.dumps(_document(result), option=_FORMAT)
+    return json.to_json(_document(result))
 
 
 def _document(result: Result) -> dict[str, Any]:

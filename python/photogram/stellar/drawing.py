@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
+from photogram.show.pictures import arrows, new_figure
 from photogram.stellar.curves import histogram
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "band", "bell", "new_figure", "png", "vectors"]
+__all__ = ["COLOURS", "band", "bell", "panels", "vectors"]
 
-Floats = NDArray[np.float64]
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _LENGTH = 0.05
 """Length of a residual of the mean size, of the extent of the picture."""
 
 
-def new_figure(width: float, height: float, columns: int = 1) -> tuple[Figure, Any]:
-    """Return a figure (inches) with its axes."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
+def panels(width: float, height: float, columns: int = 1) -> tuple[Figure, Any]:
+    """Return a figure (inches) with its axes, one beside the other."""
+    figure = new_figure(width, height)
     return figure, figure.subplots(1, columns)
-
-
-def png(figure: Figure) -> bytes:
-    """Return a figure as a PNG file."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return buffer.getvalue()
 
 
 def band(axes: Any, x: Floats, y: Floats, error: Floats, colour: str, label: str) -> None:
@@ -63,16 +53,8 @@ def vectors(
     size = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))) or 1.0
     scale = size / (_LENGTH * extent)
     for k, (label, chosen) in enumerate(groups):
-        axes.quiver(
-            *places[chosen].T,
-            *residuals[chosen].T,
-            angles="xy",
-            scale_units="xy",
-            scale=scale,
-            color=COLOURS[k % len(COLOURS)],
-            width=0.0022,
-            label=label,
-        )
+        style = {"color": COLOURS[k % len(COLOURS)], "width": 0.0022, "label": label}
+        arrows(axes, places[chosen], residuals[chosen], scale, **style)
     bar = float(f"{2 * size:.0e}")
     axes.margins(0.08)
     axes.autoscale_view()

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
@@ -21,7 +20,6 @@ from photogram.stellar.sky import Site
 
 __all__ = ["Hint", "Setting", "find_hint"]
 
-Floats = NDArray[np.float64]
 
 _TRIED = 3
 """Exposures on which the mistakes are tried, those with the most images."""

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.neighbours import mutually_nearest
+from photogram.arguments.types import Floats, Indices
+from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import STRETCH, Match, match
@@ -19,8 +19,6 @@ from photogram.stellar.sky import Site
 
 __all__ = ["Found", "Sighting", "identify", "identify_again"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 _STILL = Earth()
 
 

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from photogram.angles import ARCSEC
-from photogram.sections import Section, composed, headline
+from photogram.arguments.types import Floats
+from photogram.show.angles import ARCSEC
+from photogram.show.sections import Section, composed, headline
 from photogram.stellar import tables
 from photogram.stellar.parameters import GROUPS
 from photogram.stellar.result import SIGNIFICANT, Result, Stage
@@ -174,7 +175,7 @@ def _descriptors(result: Result) -> list[str]:
     return [yes if state else no for state, yes, no in states]
 
 
-def _common(weights: tables.Floats) -> bool:
+def _common(weights: Floats) -> bool:
     return bool((weights == weights[:1]).all())
 
 
@@ -214,7 +215,7 @@ def _adjustment(result: Result) -> list[str]:
     return [f"{name:<40}{value}" for name, value in rows]
 
 
-def _before(result: Result, weights: tables.Floats, unit: float, name: str) -> str:
+def _before(result: Result, weights: Floats, unit: float, name: str) -> str:
     """Write the mean errors before the adjustment that a common weight stands for."""
     if not len(weights) or not _common(weights):
         return "individual weights" if len(weights) else "-"

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.neighbours import mutually_nearest
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CROWDED, expected_false
 
 __all__ = ["Match", "match"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _SEEDS = 25
 """Brightest images that make hypotheses; three times as many vote for them."""

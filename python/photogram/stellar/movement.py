@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Floats
 from photogram.stellar.moved import FictitiousPoint, Movement
 from photogram.stellar.parameters import GROUPS
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["fictitious_points", "movement", "pairs_to_combine"]
 
-Floats = NDArray[np.float64]
 
 _DIAGONAL = np.arange(9) * 0.01
 """x = y of the fictitious points, metres."""

@@ -14,9 +14,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import Message, listed
-from photogram.statistics import GlobalTest, global_test
+from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.comparison import held_out
@@ -29,8 +30,6 @@ from photogram.stellar.sky import Site
 
 __all__ = ["CalibratedNight", "Night", "calibrate_night"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 CORRELATED = 0.95
 """Correlations above this are named."""

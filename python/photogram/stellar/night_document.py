@@ -6,24 +6,22 @@ import math
 from typing import Any
 
 import numpy as np
-import orjson
 
 from photogram import _photocore
-from photogram.angles import ARCSEC
+from photogram.io import json
+from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.night import CalibratedNight
 from photogram.stellar.pointing import axis_of
 
 __all__ = ["to_json"]
 
-_FORMAT = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
-
 
 def to_json(result: CalibratedNight) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""
     found, night = result.calibration, result.night
     errors = np.sqrt(np.diag(result.camera.covariance))
-    return orjson.dumps(
+    return json.to_json(
         {
             "program": f"photogram {_photocore.__version__}",
             "title": night.title,
@@ -64,8 +62,7 @@ def to_json(result: CalibratedNight) -> bytes:
             "exposures": _exposures(result),
             "stars": _stars(result),
             "images": _images(result),
-        },
-        option=_FORMAT,
+        }
     )
 
 

@@ -7,11 +7,11 @@ from collections.abc import Set
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.rows import Row, read_rows
+from photogram.io.rows import Row, read_rows
+from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.night import Night
@@ -23,7 +23,6 @@ from photogram.stellar.tomlfile import Document, Table, pole_arcsec, read_docume
 
 __all__ = ["inputs", "read_night"]
 
-Floats = NDArray[np.float64]
 
 _TABLES = {
     "labels": ("title",),

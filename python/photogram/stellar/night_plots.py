@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.stellar.drawing import COLOURS, band, bell, new_figure, png, vectors
+from photogram.show.pictures import drawn
+from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,13 +28,13 @@ def figures(result: CalibratedNight) -> dict[str, bytes]:
         "histogram.png": _histogram(result),
         "distortion.png": _distortion(result),
     }
-    return {name: png(figure) for name, figure in made.items()}
+    return {name: drawn(figure) for name, figure in made.items()}
 
 
 def _frame(result: CalibratedNight, title: str) -> tuple[Figure, Any]:
     """Draw the frame as the picture is seen: y downward."""
     width, height = result.night.frame
-    figure, axes = new_figure(7.5, 1.8 + 6.5 * height / width)
+    figure, axes = panels(7.5, 1.8 + 6.5 * height / width)
     axes.set(xlabel="x (px)", ylabel="y (px)", aspect="equal")
     axes.set_title(title, loc="left")
     axes.plot([0, width, width, 0, 0], [0, 0, height, height, 0], color="0.8", linewidth=0.8)
@@ -68,7 +69,7 @@ def _residuals(result: CalibratedNight) -> Figure:
 
 
 def _histogram(result: CalibratedNight) -> Figure:
-    figure, every = new_figure(11.0, 3.8, 3)
+    figure, every = panels(11.0, 3.8, 3)
     x, y = result.calibration.residuals.T
     for axes, (name, values) in zip(
         every, {"x": x, "y": y, "x and y": np.concatenate([x, y])}.items(), strict=True
@@ -90,7 +91,7 @@ def _distortion(result: CalibratedNight) -> Figure:
     size = float(np.hypot(*p))
     along = p / size if size else np.array([1.0, 0.0])
     size_error = float(np.sqrt(along @ camera.covariance[7:9, 7:9] @ along))
-    figure, (axes, errors) = new_figure(11.0, 4.4, 2)
+    figure, (axes, errors) = panels(11.0, 4.4, 2)
     used = np.linalg.norm(result.calibration.xy - camera.values[2:4], axis=1).max()
     for panel in (axes, errors):
         panel.axvline(used, color="0.5", linestyle=":", linewidth=1, label="outermost star")

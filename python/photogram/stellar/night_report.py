@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from photogram.angles import ARCSEC
-from photogram.sections import Section, composed, headline
+from photogram.show.angles import ARCSEC
+from photogram.show.sections import Section, composed, headline
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.night import SIGNIFICANT, CalibratedNight
 from photogram.stellar.parameters import GRAD

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from photogram.angles import ARCSEC
 from photogram.errors import InputError
+from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import Site
 
 __all__ = ["Options"]

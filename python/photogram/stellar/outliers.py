@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
 from photogram.messages import listed
-from photogram.statistics import externally_studentized, normal_limit, studentized_limit
+from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
 
 if TYPE_CHECKING:
     from photogram.stellar.problem import Problem
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Tests", "culprits", "outliers", "studentized"]
 
-Floats = NDArray[np.float64]
 
 _TESTABLE = 0.01
 """Redundancy numbers below this test nothing."""

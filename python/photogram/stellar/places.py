@@ -8,17 +8,16 @@ import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.show.angles import ARCSEC
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.sky import Site
 from photogram.stellar.transformation import pole_matrix, terrestrial
 
 __all__ = ["Earth", "apparent_places", "epoch", "sidereal_time"]
 
-Floats = NDArray[np.float64]
 
 _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:\.\d*)?)Z?")
 

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.rows import Row, read_rows
 from photogram.messages import listed
-from photogram.rows import Row, read_rows
+from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
@@ -22,8 +23,6 @@ from photogram.stellar.rejection import rejected
 from photogram.stellar.tomlfile import Document, Table, pole_arcsec, read_document, site
 
 __all__ = ["inputs", "read_plain"]
-
-Floats = NDArray[np.float64]
 
 
 _OPTIONS: dict[str, Callable[[Table, str], Any]] = {

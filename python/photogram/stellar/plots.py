@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
+from photogram.show.pictures import drawn
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes
-from photogram.stellar.drawing import COLOURS, band, bell, new_figure, png, vectors
+from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
 from photogram.stellar.parameters import GROUPS
 
 if TYPE_CHECKING:
@@ -29,11 +30,11 @@ def figures(result: Result) -> dict[str, bytes]:
         made["distortion.png"] = _distortion(result)
     if result.problem.options.refraction:
         made["refraction.png"] = _refraction(result)
-    return {name: png(figure) for name, figure in made.items()}
+    return {name: drawn(figure) for name, figure in made.items()}
 
 
 def _plate(title: str) -> tuple[Figure, Any]:
-    figure, axes = new_figure(7.0, 6.6)
+    figure, axes = panels(7.0, 6.6)
     axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
     axes.set_title(title, loc="left")
     axes.axhline(0, color="0.85", linewidth=0.8, zorder=0)
@@ -69,7 +70,7 @@ def _residuals(result: Result) -> Figure:
 
 
 def _histogram(result: Result) -> Figure:
-    figure, every = new_figure(11.0, 3.8, 3)
+    figure, every = panels(11.0, 3.8, 3)
     for axes, (name, values) in zip(every, residual_classes(result).items(), strict=True):
         bell(axes, 1e6 * values, f"residuals in {name}", "µm")
     return figure
@@ -80,7 +81,7 @@ def _distortion(result: Result) -> Figure:
     problem = result.problem
     fine = replace(problem.options, interval=(problem.options.extent or 0.1) / 200)
     curves = distortion_curves(replace(result, problem=replace(problem, options=fine)))
-    figure, axes = new_figure(7.5, 4.8)
+    figure, axes = panels(7.5, 4.8)
     d = 1e3 * curves.distance
     band(axes, d, 1e6 * curves.radial, 1e6 * curves.radial_error, COLOURS[0], "radial")
     band(axes, d, 1e6 * curves.transformed, 1e6 * curves.transformed_error, COLOURS[1], "radial, transformed")
@@ -97,7 +98,7 @@ def _distortion(result: Result) -> Figure:
 
 def _refraction(result: Result) -> Figure:
     """Draw one curve, for all attitudes look through the same air, and where each of them looks."""
-    figure, axes = new_figure(7.5, 4.8)
+    figure, axes = panels(7.5, 4.8)
     groups = [group for group in range(3) if result.solved.free[3 * group]]
     every = {group: refraction_curves(result, group) for group in groups}
     z = np.concatenate([curves.zenith_distance for curves in every.values()])

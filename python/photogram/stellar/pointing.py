@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+
+from photogram.arguments.types import Floats
 
 __all__ = ["attitude_of", "axis_of", "roll_of"]
-
-Floats = NDArray[np.float64]
 
 
 def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:

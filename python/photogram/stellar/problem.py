@@ -183,6 +183,15 @@ class Problem:
             image_times=self.image_times[keep_images],
         )
 
+    def places_at(self, parameters: Floats, free: Bools) -> Floats:
+        """Return (S, 2) catalogue places; of directions that are not known those of their first images."""
+        places = self.star_places.copy()
+        stars, first = np.unique(self.image_stars, return_index=True)
+        seen = ~self.known[stars]
+        if seen.any():
+            places[stars[seen]] = self.core(parameters, places, ~free).directions()[first[seen]]
+        return places
+
     def core(self, parameters: Floats, places: Floats, fixed: Bools) -> _photocore.StellarProblem:
         """Return the problem as the core takes it, at given values."""
         weighted = np.flatnonzero(self.weighted & ~fixed)

@@ -6,20 +6,17 @@ catalogue places while the parameters are iterated, and the change of refraction
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram import _photocore
 from photogram.stellar.counts import degrees_of_freedom
-from photogram.stellar.parameters import NAMES
+from photogram.stellar.failures import failure, singular
 from photogram.stellar.problem import Problem
-from photogram.stellar.reduction import Reduced, invert, log_determinant, reduce, singular
-from photogram.stellar.residuals import complete
 from photogram.stellar.state import Level, Solved
 
 __all__ = ["DIVERGED", "SETTLED", "iterate", "residual_cycle", "stop_reason"]
@@ -57,37 +54,13 @@ def stop_reason(levels: Sequence[float], tolerance: float, limit: int) -> str | 
     return f"{limit} ITERATIONS COMPLETED" if len(levels) > limit else None
 
 
-@dataclass(frozen=True, eq=False)
-class _Formed:
-    """Equations at some values."""
-
-    equations: dict[str, Any]
-    reduced: Reduced
-    places: Floats
-
-
-def _form(problem: Problem, parameters: Floats, free: Bools) -> _Formed:
-    """Form the equations; directions that are not known come from their first images."""
-    places = problem.star_places.copy()
-    unknown = ~problem.known
-    if unknown.any():
-        directions = problem.core(parameters, places, ~free).directions()
-        stars, first = np.unique(problem.image_stars, return_index=True)
-        seen = unknown[stars]
-        places[stars[seen]] = directions[first[seen]]
-    core = problem.core(parameters, places, ~free)
-    equations = _published(problem, core)
-    return _Formed(equations, reduce(problem, core, equations, places), places)
-
-
-def _published(problem: Problem, core: Any) -> dict[str, Any]:
+def _tolerances(problem: Problem) -> dict[str, Any]:
     options = problem.options
-    found: dict[str, Any] = core.published(
-        refraction=options.refraction_tolerance,
-        distortion=options.distortion_tolerance,
-        passes=PASSES,
-    )
-    return found
+    return {
+        "refraction": options.refraction_tolerance,
+        "distortion": options.distortion_tolerance,
+        "passes": PASSES,
+    }
 
 
 def iterate(
@@ -116,49 +89,44 @@ def iterate(
         A star or the parameters are not determined (errors 2 and 4).
     """
     parameters, dof = initial.copy(), degrees_of_freedom(problem, free).usable
-    weights = problem.parameter_weights
+    known = problem.known[problem.image_stars]
     levels: list[float] = []
-    inverse, determinant, touched = None, math.nan, free
+    correction: dict[str, Any] = {}
+    limit = 1 if once else limit
     while True:
-        formed = _form(problem, parameters, free)
-        known = problem.known[problem.image_stars]
-        levels.append(float(np.sqrt(np.sum(formed.equations["constant"][known] ** 2) / dof)))
-        limit_now = 1 if once else limit
-        stop = stop_reason(levels, 0.0 if once else problem.options.tolerance, limit_now)
+        core = problem.core(parameters, problem.places_at(parameters, free), ~free)
+        constant = core.published(**_tolerances(problem))["constant"]
+        levels.append(float(np.sqrt(np.sum(constant[known] ** 2) / dof)))
+        stop = stop_reason(levels, 0.0 if once else problem.options.tolerance, limit)
         if stop:
             break
-        normal = formed.reduced.normal + weights
-        right = formed.reduced.right - weights @ (parameters - problem.initial)
         # What the equations do not touch yet (a direction of no decentering) is not corrected.
-        touched = free & (np.diag(normal) > 0)
-        inverse, determinant = invert(normal, touched), log_determinant(normal, touched)
-        parameters = parameters + inverse @ right
-        parameters[21] = (
-            np.mod(parameters[21], 2 * np.pi) if abs(parameters[21]) > 2 * np.pi else parameters[21]
-        )
+        try:
+            correction = core.correction(**_tolerances(problem))
+        except _photocore.StellarError as error:
+            raise failure(problem, error) from None
+        parameters = parameters + correction["parameters"]
+        if abs(parameters[21]) > 2 * np.pi:
+            parameters[21] = np.mod(parameters[21], 2 * np.pi)
         if problem.options.common_scale:
             parameters[13] = parameters[12]
-    if (free & ~touched).any():
-        raise singular([NAMES[i] for i in np.flatnonzero(free & ~touched)])
-    history = tuple(Level(solution, i + 1, level) for i, level in enumerate(levels))
+    if correction["without_effect"]:
+        raise singular(correction["without_effect"])
     # Covariance and determinant are those of the last correction; the equations after it serve the residuals.
-    solved = residual_cycle(problem, parameters, free, cofactors=inverse, formed=formed)
-    return replace(
-        solved,
+    return residual_cycle(
+        problem,
+        parameters,
+        free,
+        cofactors=correction["cofactors"],
+        log_determinant=correction["log_determinant"],
         stop=stop,
         converged=stop == SETTLED or once,
-        levels=history,
-        log_determinant=determinant,
+        levels=tuple(Level(solution, i + 1, level) for i, level in enumerate(levels)),
     )
 
 
 def residual_cycle(
-    problem: Problem,
-    parameters: Floats,
-    free: Bools,
-    *,
-    cofactors: Floats | None = None,
-    formed: _Formed | None = None,
+    problem: Problem, parameters: Floats, free: Bools, *, cofactors: Floats, **rest: Any
 ) -> Solved:
     """Compute star corrections, residuals and their tests at final parameters (the report's v-cycle).
 
@@ -170,30 +138,27 @@ def residual_cycle(
     problem, parameters, free
         As for `iterate`.
     cofactors
-        (26, 26) of the parameters, where they do not come from the equations themselves.
-    formed
-        The equations at these parameters, where they are there already.
+        (26, 26) of the parameters.
+    rest
+        The other attributes of the solution: how it was found.
+
+    Raises
+    ------
+    AdjustmentError
+        A star is not determined by its images (error 2), or has none at these parameters.
     """
-    formed = formed or _form(problem, parameters, free)
-    reduced = formed.reduced
-    if cofactors is None:
-        cofactors = invert(reduced.normal + problem.parameter_weights, free)
-    corrections = reduced.star_corrections()
-    core = problem.core(parameters, formed.places + corrections, ~free)
-    final = _published(problem, core)
+    tolerances = _tolerances(problem)
+    core = problem.core(parameters, problem.places_at(parameters, free), ~free)
+    try:
+        found = core.residual_cycle(np.ascontiguousarray(cofactors), **tolerances)
+    except _photocore.StellarError as error:
+        raise failure(problem, error) from None
+    final = problem.core(parameters, found["places"], ~free).published(**tolerances)
     remarks = tuple(
         f"DISTORTION NOT CONVERGING FOR POINT NUMBER {problem.image_points[i]}: "
         f"last changes {a:.3g}, {b:.3g} m"
         for i, (a, b) in final["unsettled"]
     )
-    return complete(
-        problem,
-        core,
-        reduced,
-        parameters=parameters,
-        free=free,
-        places=formed.places + corrections,
-        residuals=-final["constant"],
-        cofactors=cofactors,
-        remarks=remarks,
+    return Solved.of(
+        problem, found, parameters=parameters, free=free, cofactors=cofactors, remarks=remarks, **rest
     )

@@ -10,8 +10,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.messages import Message
-from photogram.statistics import GlobalTest, global_test
+from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.counts import Counts
 from photogram.stellar.moved import Movement
 from photogram.stellar.parameters import INDEX, NAMES
@@ -20,7 +21,6 @@ from photogram.stellar.state import Level, Solved
 
 __all__ = ["Direction", "Ellipse", "PreRun", "Result", "Stage", "ellipse"]
 
-Floats = NDArray[np.float64]
 
 CORRELATED = 0.95
 """Correlations above this are named."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import available_memory
 from photogram.stellar.cameras import BROWN_PLACE, COMMON, BrownCamera, weight_of
@@ -34,8 +35,6 @@ __all__ = [
     "stars_near",
 ]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 _STILL = Earth()
 _SLACK = math.radians(2.0)
 _PER_IMAGE = 2000
@@ -348,23 +347,15 @@ def _core(
 def _result(found: dict[str, Any], images: _Images, count: int, freedom: int) -> SkyCalibration:
     mean_error = math.sqrt(sum(found["sums_of_squares"]) / freedom) if freedom > 0 else 1.0
     held = ~images.weighted[:, None]
-    cofactors = mean_error**2 * found["cofactors"]
-    place = list(BROWN_PLACE)
-    if count <= 3:
-        full = cofactors.reshape(3 * count + COMMON, -1)
-        own = np.array([full[3 * e : 3 * e + 3, 3 * e : 3 * e + 3] for e in range(count)])
-        cross = np.array([full[3 * e : 3 * e + 3, 3 * count :] for e in range(count)])
-        common = full[3 * count :, 3 * count :]
-    else:
-        rows = cofactors[: count * 3 * (3 + COMMON)].reshape(count, 3, 3 + COMMON)
-        own, cross = rows[:, :, :3], rows[:, :, 3:]
-        common = cofactors[count * 3 * (3 + COMMON) :].reshape(COMMON, COMMON)
+    place, variance = list(BROWN_PLACE), mean_error**2
     parameters = found["parameters"]
     return SkyCalibration(
-        camera=BrownCamera(parameters[3 * count :][place], common[np.ix_(place, place)]),
+        camera=BrownCamera(
+            parameters[3 * count :][place], variance * found["common_cofactors"][np.ix_(place, place)]
+        ),
         attitudes=parameters[: 3 * count].reshape(count, 3),
-        attitude_covariances=np.ascontiguousarray(own),
-        cross_covariances=np.ascontiguousarray(cross[:, :, place]),
+        attitude_covariances=variance * found["pointing_cofactors"],
+        cross_covariances=variance * np.take(found["cross_cofactors"], place, axis=2),
         exposures=images.exposures,
         stars=images.stars,
         xy=images.xy,

@@ -9,16 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.angles import ARCSEC
-from photogram.arrays import shaped
+from photogram.arguments.arrays import shaped
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.show.angles import ARCSEC
 
 __all__ = ["ABERRATION", "TAU", "Air", "Site", "refraction"]
 
-Floats = NDArray[np.float64]
 
 TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)
 """Coefficients of refraction in seconds of arc, the report's fit to Garfinkel's tables."""

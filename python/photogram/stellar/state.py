@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from photogram.stellar.problem import Problem
 
 __all__ = ["Level", "Solved"]
 
@@ -91,3 +94,36 @@ class Solved:
     converged: bool
     levels: tuple[Level, ...]
     remarks: tuple[str, ...] = field(default=())
+
+    @classmethod
+    def of(cls, problem: Problem, found: dict[str, Any], *, unit: float = 1.0, **rest: Any) -> Solved:
+        """Take stars and images from what the core has found.
+
+        Parameters
+        ----------
+        problem
+            The problem.
+        found
+            What `StellarProblem.adjust` or `residual_cycle` returns.
+        unit
+            Mean error of unit weight that the standardized residuals count in.
+        rest
+            The other attributes.
+        """
+        tested = (problem.known & ~problem.held)[:, None]
+        plate, stars, weighted, axis = found["sums_of_squares"]
+        axis_residual = found["axis_residual"]
+        # The residuals of the core are observed minus computed.
+        return cls(
+            places=found["places"],
+            star_cofactors=found["place_cofactors"],
+            star_inverse=found["place_inverses"],
+            residuals=-found["residuals"],
+            redundancy=found["image_redundancy"],
+            standardized=-unit * found["image_standardized"],
+            star_redundancy=np.where(tested, found["place_redundancy"], np.nan),
+            star_standardized=np.where(tested, -unit * found["place_standardized"], np.nan),
+            axis_residual=None if axis_residual is None else -np.array(axis_residual),
+            sums=(plate, stars, weighted + axis),
+            **rest,
+        )

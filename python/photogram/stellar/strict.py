@@ -10,15 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.errors import AdjustmentError
 from photogram.stellar.counts import degrees_of_freedom
-from photogram.stellar.parameters import NAMES
+from photogram.stellar.failures import failure
 from photogram.stellar.problem import Problem
-from photogram.stellar.reduction import log_determinant, reduce, singular, undetermined
-from photogram.stellar.residuals import complete
 from photogram.stellar.state import Level, Solved
 
-__all__ = ["iterate", "residual_cycle"]
+__all__ = ["iterate"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -59,12 +56,12 @@ def iterate(
     AdjustmentError
         Stars or parameters are not determined, or the initial values give no image.
     """
-    parameters, places = initial.copy(), _first_places(problem, initial, free)
+    parameters, places = initial.copy(), problem.places_at(initial, free)
     dof = degrees_of_freedom(problem, free).usable
     unit = _EXPECTED * parameters[12] * float(np.sqrt(np.median(problem.image_weights[:, 0, 0])))
     run = _Run(problem, solution, limit or _LIMIT, dof, threads or 0, progress)
     for _ in range(3):
-        active = free & run.effective(parameters, places, free)
+        active = run.effective(parameters, places, free)
         found = run.settle(parameters, places, active, unit, _ROUGH)
         parameters, places = found["parameters"], found["places"]
         if (active == free).all() or found["status"] not in ("converged", "still"):
@@ -85,47 +82,6 @@ def _rounding(problem: Problem, parameters: Floats) -> float:
     stars = np.einsum("sii,si->", problem.star_weights[tested], problem.star_places[tested] ** 2)
     weighted = np.diag(problem.parameter_weights) @ parameters**2
     return float(np.finfo(float).eps * np.sqrt(plate + stars + weighted))
-
-
-def _first_places(problem: Problem, parameters: Floats, free: Bools) -> Floats:
-    places = problem.star_places.copy()
-    unknown = ~problem.known
-    if unknown.any():
-        directions = problem.core(parameters, places, ~free).directions()
-        first = {int(star): i for i, star in reversed(list(enumerate(problem.image_stars)))}
-        for star in np.flatnonzero(unknown):
-            places[star] = directions[first[int(star)]]
-    return places
-
-
-def residual_cycle(
-    problem: Problem, parameters: Floats, free: Bools, places: Floats, *, cofactors: Floats
-) -> Solved:
-    """Compute star corrections, residuals and their tests at final parameters, without iterating again.
-
-    Parameters
-    ----------
-    problem, parameters, free
-        As for `iterate`.
-    places
-        (S, 2) places near the final ones.
-    cofactors
-        (26, 26) of the parameters.
-    """
-    core = problem.core(parameters, places, ~free)
-    reduced = reduce(problem, core, core.equations(), places)
-    places = places + reduced.star_corrections()
-    final = problem.core(parameters, places, ~free)
-    return complete(
-        problem,
-        final,
-        reduced,
-        parameters=parameters,
-        free=free,
-        places=places,
-        residuals=-final.equations()["constant"],
-        cofactors=cofactors,
-    )
 
 
 class _Run:
@@ -167,10 +123,13 @@ class _Run:
         return bool(np.ptp(sums) <= max(_STILL, self.dof * self.rounding))
 
     def effective(self, parameters: Floats, places: Floats, free: Bools) -> Bools:
-        """Find the parameters that have an effect at some values, or a weight."""
-        core = self.problem.core(parameters, places, ~free)
-        normal = reduce(self.problem, core, core.equations(), places).normal
-        return (np.diag(normal + self.problem.parameter_weights) > 0) | ~free
+        """Find the free parameters that have an effect at some values, or a weight."""
+        active = free.copy()
+        try:
+            active[self.problem.core(parameters, places, ~free).without_effect()] = False
+        except _photocore.StellarError as error:
+            raise failure(self.problem, error) from None
+        return active
 
     def adjust(
         self,
@@ -192,9 +151,10 @@ class _Run:
                 covariance=covariance,
                 threads=self.threads,
                 progress=self.progress,
+                whole=covariance,
             )
         except _photocore.StellarError as error:
-            raise self._named(core, places, free, *error.args) from None
+            raise failure(self.problem, error) from None
         # A sum of squares of the engine counts in units of the expected mean error.
         sums = [found["initial_sum_of_squares"], *(row[1] for row in found["iterations"])]
         levels = [math.sqrt(value / self.dof) * unit for value in sums]
@@ -203,48 +163,21 @@ class _Run:
             found["parameters"][13] = found["parameters"][12]
         return dict(found)
 
-    def _named(
-        self, core: Any, places: Floats, free: Bools, kind: str, message: str, stars: list[int]
-    ) -> AdjustmentError:
-        if kind == "undetermined stars":
-            names = ", ".join(self.problem.star_ids[i] for i in stars)
-            return AdjustmentError(f"ERROR 2: no inverse for the submatrix of star {names}")
-        if kind == "undetermined":
-            normal = reduce(self.problem, core, core.equations(), places).normal
-            return singular(undetermined(normal + self.problem.parameter_weights, free, 1e-10))
-        return AdjustmentError(message)
-
     def solved(self, found: dict[str, Any], free: Bools, unit: float) -> Solved:
-        problem = self.problem
-        plate, stars, weighted, axis = found["sums_of_squares"]
-        status = found["status"]
-        count = len(self.levels) - 1
+        status, count = found["status"], len(self.levels) - 1
         stops = {
             "converged": "NO UNKNOWN CHANGES BY MORE THAN 1E-4 OF ITS MEAN ERROR",
             "still": "THE SUM OF SQUARES STANDS STILL: NO CHANGE BY 1E-6 OF THE SQUARED MEAN ERROR",
             "diverged": "NO STEP LOWERS THE SUM OF SQUARES",
         }
-        cofactors = found["cofactors"].reshape(len(NAMES), len(NAMES)) if len(found["cofactors"]) else None
-        core = problem.core(found["parameters"], found["places"], ~free)
-        reduced = reduce(problem, core, core.equations(), found["places"])
-        tested = (problem.known & ~problem.held)[:, None]
-        axis_residual = found["axis_residual"]
-        return Solved(
+        return Solved.of(
+            self.problem,
+            found,
+            unit=unit,
             parameters=found["parameters"],
-            places=found["places"],
             free=free,
-            cofactors=np.full((len(NAMES), len(NAMES)), np.nan) if cofactors is None else cofactors,
-            star_cofactors=found["place_cofactors"],
-            star_inverse=reduced.star_inverse,
-            residuals=-found["residuals"],
-            redundancy=found["image_redundancy"],
-            # The engine's residuals are observed minus computed, in units of the expected mean error.
-            standardized=-unit * found["image_standardized"],
-            star_redundancy=np.where(tested, found["place_redundancy"], np.nan),
-            star_standardized=np.where(tested, -unit * found["place_standardized"], np.nan),
-            axis_residual=None if axis_residual is None else -np.array(axis_residual),
-            sums=(plate, stars, weighted + axis),
-            log_determinant=log_determinant(reduced.normal + problem.parameter_weights, free),
+            cofactors=found.get("cofactors", np.full((len(free), len(free)), np.nan)),
+            log_determinant=found.get("log_determinant", math.nan),
             stop=stops.get(status, f"{count} ITERATIONS COMPLETED"),
             converged=status in ("converged", "still"),
             levels=tuple(Level(self.solution, i + 1, level) for i, level in enumerate(self.levels)),

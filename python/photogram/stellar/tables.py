@@ -6,9 +6,9 @@ import math
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.angles import ARCSEC, degrees_minutes_seconds
+from photogram.arguments.types import Floats
+from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.stellar.comparator_frame import comparator_frame
 from photogram.stellar.curves import (
     distortion_curves,
@@ -41,8 +41,6 @@ __all__ = [
     "stars",
     "transformed",
 ]
-
-Floats = NDArray[np.float64]
 
 
 def _shown(name: str, value: float) -> float:

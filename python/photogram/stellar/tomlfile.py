@@ -9,10 +9,10 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from photogram.angles import ARCSEC
 from photogram.errors import InputError
-from photogram.files import read_bytes
+from photogram.io.files import read_bytes
 from photogram.messages import listed
+from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import ABERRATION, Air, Site
 
 __all__ = ["Document", "Table", "pole_arcsec", "read_document", "site"]

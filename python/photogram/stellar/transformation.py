@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Floats
 from photogram.stellar.sky import Site
 
 __all__ = ["pole_matrix", "terrestrial", "transformed_angles"]
-
-Floats = NDArray[np.float64]
 
 
 def transformed_angles(

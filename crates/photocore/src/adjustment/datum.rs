@@ -17,9 +17,9 @@ use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 use rayon::ThreadPool;
 
-use super::problem::{Linearized, Model, Problem};
+use super::normal_equations::NormalEquations;
+use super::problem::{Model, Problem};
 use super::result::{AdjustError, Adjustment};
-use super::run::unless_stopped;
 use crate::normals::{Cofactors, Layout};
 
 /// A datum of a network whose observations leave one open.
@@ -76,12 +76,8 @@ pub fn in_datum<M: Model>(
         datum.carriers.iter().filter(free).for_each(|&carrier| rights[k * count + carrier] = b[(carrier, k)]);
     }
     let unknowns = &adjustment.unknowns;
-    let equations = pool.install(|| Linearized::new(problem, unknowns, held, None));
-    let prior = problem.prior_equations(unknowns, held);
-    let factor = unless_stopped(problem.system.factor(pool, &equations, &prior, 0.0, between))?;
-    let solved = problem.system.solve_for(pool, &factor, &equations, &prior, 0.0, &rights, between);
-    let columns = unless_stopped(solved)?;
-    factor.recycle(&problem.system);
+    let normal = NormalEquations::form(problem, unknowns, held, pool, between)?;
+    let columns = normal.solve_for(&rights, between)?;
     let p = Mat::from_fn(count, vectors, |i, k| columns[k * count + i]);
     let common = b.transpose() * &p;
 

@@ -7,6 +7,7 @@
 mod datum;
 mod distributions;
 mod loss;
+mod normal_equations;
 mod options;
 mod problem;
 mod published;
@@ -22,6 +23,7 @@ pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
 };
 pub use loss::Loss;
+pub use normal_equations::NormalEquations;
 pub use options::{Criterion, Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Problem};
 pub(crate) use result::gib;

@@ -57,6 +57,9 @@ pub struct Adjustment {
     pub redundancy: Option<Vec<f64>>,
     /// Redundancy number of each unknown as an observation of itself (zero unless weighted), when asked for.
     pub prior_redundancy: Option<Vec<f64>>,
+    /// Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero. In networks that hardly hold
+    /// together cofactors and redundancy numbers lose about as many digits. None without cofactors, and with a loss.
+    pub redundancy_excess: Option<f64>,
     /// Counts for the degrees of freedom.
     pub counts: Counts,
     /// Predicted multiply-adds of each phase, once.

@@ -233,8 +233,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
             _ => None,
         };
         let (cofactors, prior_redundancy) = cofactors.unzip();
-        let redundancy =
-            |cofactors: &Cofactors| cofactors.equations.iter().map(|share| 1.0 - share).collect();
+        let redundancy: Option<Vec<f64>> = cofactors
+            .as_ref()
+            .map(|cofactors: &Cofactors| cofactors.equations.iter().map(|share| 1.0 - share).collect());
+        let counts = problem.counts(self.datum.len());
+        let all = redundancy.iter().chain(&prior_redundancy).flatten();
+        let excess = all.sum::<f64>() - counts.degrees_of_freedom() as f64;
         Ok(Adjustment {
             status: end.status,
             initial_sum_of_squares,
@@ -247,11 +251,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 .map(|loss| problem.group_squares(&residuals).map(|square| loss.weight(square)).collect()),
             unknowns,
             residuals,
-            redundancy: cofactors.as_ref().map(redundancy),
+            redundancy_excess: (cofactors.is_some() && self.options.loss.is_none()).then_some(excess),
+            redundancy,
             prior_redundancy,
             cofactors,
             undetermined: end.undetermined,
-            counts: problem.counts(self.datum.len()),
+            counts,
             datum: self.datum,
             weak: self.weak,
             collapsed: self.collapsed,

@@ -12,9 +12,10 @@ use rayon::prelude::*;
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
 use super::front::Front;
+use super::layout::Layout;
 use super::panels::{Handover, Panels, lock};
 use super::stack::Stack;
-use super::symbolic::Symbolic;
+use super::symbolic::{Supernode, Symbolic};
 use super::system::System;
 use super::tie_equations::TieEquations;
 use super::watch::{Between, Control, Stopped, watched};
@@ -349,17 +350,44 @@ impl Factor {
     /// The unknowns that are not local and that a solution of the equations moves, ascending: those that take at least a tenth of
     /// the largest share, each in units of what its equations alone determine.
     pub fn moved(&self, system: &System, solution: &[f64]) -> Vec<usize> {
-        let symbolic = &*self.panels.symbolic;
-        let all = (0..symbolic.blocks()).flat_map(|position| symbolic.unknowns_at(&system.layout, position));
-        let unknowns: Vec<usize> = all.collect();
-        let mut vector: Vec<f64> = unknowns.iter().map(|&unknown| solution[unknown]).collect();
+        let unknowns = self.unknowns(&system.layout).map(|unknown| solution[unknown]);
+        self.taking_part(&system.layout, unknowns.collect())
+    }
+
+    /// The unknowns that take part in a vector over the unknowns that are not local, in the order of elimination.
+    fn taking_part(&self, layout: &Layout, mut vector: Vec<f64>) -> Vec<usize> {
         self.scale(&mut vector);
         let largest = vector.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-        let shares = unknowns.into_iter().zip(&vector);
-        let mut moved: Vec<usize> =
+        let shares = self.unknowns(layout).zip(&vector);
+        let mut found: Vec<usize> =
             shares.filter(|(_, value)| value.abs() >= 0.1 * largest).map(|(unknown, _)| unknown).collect();
-        moved.sort_unstable();
-        moved
+        found.sort_unstable();
+        found
+    }
+
+    /// The unknowns that are not local, in the order of elimination.
+    fn unknowns<'a>(&'a self, layout: &'a Layout) -> impl Iterator<Item = usize> + 'a {
+        let symbolic = &*self.panels.symbolic;
+        (0..symbolic.blocks()).flat_map(|position| symbolic.unknowns_at(layout, position))
+    }
+
+    /// The unknowns, none of them local, that neither an equation nor a weight touches, ascending.
+    pub fn without_effect(&self, layout: &Layout) -> Vec<usize> {
+        let diagonal = self.unknowns(layout).zip(&self.diagonal);
+        let mut found: Vec<usize> =
+            diagonal.filter(|&(_, &n)| n == 0.0).map(|(unknown, _)| unknown).collect();
+        found.sort_unstable();
+        found
+    }
+
+    /// Natural logarithm of the determinant of the normal equations, the local unknowns reduced out; None where it is zero.
+    pub fn log_determinant(&self) -> Option<f64> {
+        let logarithm = |(index, s): (usize, &Supernode)| {
+            let columns = self.panels.panel(index).chunks_exact(s.height().max(1)).enumerate();
+            columns.map(|(j, column)| 2.0 * column[j].ln()).sum::<f64>()
+        };
+        let supernodes = self.panels.symbolic.supernodes().iter().enumerate();
+        self.lost.is_empty().then(|| supernodes.map(logarithm).sum())
     }
 
     /// Takes each unknown in units of what its equations alone determine.
@@ -444,6 +472,12 @@ impl Deficiency<'_> {
             blocks_moved(symbolic, &vector)
         });
         vectors.collect()
+    }
+
+    /// For each of them the unknowns that it moves, ascending: those that take at least a tenth of the largest share.
+    pub fn unknowns(&self, layout: &Layout) -> Vec<Vec<usize>> {
+        let Factor { lost, .. } = self.factor;
+        lost.iter().map(|&pivot| self.factor.taking_part(layout, self.factor.combination(pivot))).collect()
     }
 }
 

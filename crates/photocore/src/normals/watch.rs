@@ -72,8 +72,8 @@ pub(super) fn watched<T: Send>(
         return ControlFlow::Break(Stopped::Interrupted);
     }
     let control = Control::default();
-    if rayon::current_thread_index().is_some() {
-        // A thread at work must not wait for another; whoever put it to work watches.
+    if pool.current_thread_index().is_some() {
+        // A thread of the pool must not wait for another; whoever put it to work watches.
         return control.ended(work(&control));
     }
     let (sender, receiver) = channel();

@@ -1,7 +1,5 @@
-//! The photogrammetric models.
+//! The photogrammetric models beside the network.
 
-pub mod block;
-pub mod collection;
 pub mod comparator;
 pub mod resection;
 pub mod similarity;

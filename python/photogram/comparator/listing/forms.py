@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.angles import degrees_minutes_seconds
+from photogram.show.angles import degrees_minutes_seconds
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import CaseResult
 
 __all__ = ["angle", "centred", "nearest", "number", "triangle"]

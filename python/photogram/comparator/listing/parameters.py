@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.angles import ARCSEC
 from photogram.comparator.listing.forms import angle, centred, nearest, triangle
 from photogram.comparator.listing.residuals import residual_lines
 from photogram.comparator.polynomial import TERMS
+from photogram.show.angles import ARCSEC
 
 if TYPE_CHECKING:
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration, CaseResult
     from photogram.comparator.combined import SinglePolynomial
 

@@ -25,6 +25,7 @@ from photogram.comparator.pictures.vectors import (
     grid_vectors,
     joint_grid,
 )
+from photogram.show.pictures import drawn, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["figures", "html_report", "pdf_report"]
 
-DPI = 130
 STYLE = """
 body { font-family: system-ui, sans-serif; color: #1b2733; }
 body { max-width: 1150px; margin: 2em auto; padding: 0 1em; }
@@ -106,9 +106,7 @@ def html_report(calibration: Calibration, run_date: str = "") -> bytes:
     """
     parts = []
     for name, figure in figures(calibration):
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
-        data = base64.b64encode(buffer.getvalue()).decode()
+        data = base64.b64encode(drawn(figure)).decode()
         parts.append(f'<figure id="{name}"><img alt="{name}" src="data:image/png;base64,{data}"></figure>')
     title = html.escape(_title(calibration))
     pages = [
@@ -142,8 +140,6 @@ def pdf_report(calibration: Calibration, run_date: str = "") -> bytes:
 
 
 def _text_page(calibration: Calibration, run_date: str) -> Figure:
-    from photogram.comparator.pictures.style import new_figure
-
     lines = [
         _title(calibration),
         _made(run_date),

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.correction_table import table_nodes
-from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, new_figure, plain
-from photogram.pictures import round_length
+from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, plain
+from photogram.show.pictures import new_figure, round_length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
     from photogram.comparator.polynomial import Polynomial
 

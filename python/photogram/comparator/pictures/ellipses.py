@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN, MM, key, new_figure, panels, plain
+from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN, MM, key, panels, plain
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
-from photogram.pictures import round_length
+from photogram.show.pictures import new_figure, round_length
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
     from photogram.comparator.pointing import Ellipse, Precision
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN, new_figure
+from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN
+from photogram.show.pictures import new_figure, open_frame
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,8 +44,7 @@ def residual_histogram(calibration: Calibration) -> Figure:
         )
         panel.set_xlabel("residual, µm", fontsize=8)
         panel.tick_params(labelsize=7, color=FAINT)
-        for side in ("top", "right"):
-            panel.spines[side].set_visible(False)
+        open_frame(panel)
     axes[0].yaxis.set_major_locator(MaxNLocator(integer=True))
     axes[0].set_ylabel("number", fontsize=8)
     figure.suptitle("Final residuals in the comparator system and the normal curve", fontsize=11)
@@ -72,7 +72,6 @@ def variance_bars(calibration: Calibration) -> Figure:
     axes.set_xlim(0, 1.25 * (max(values) or 1.0))
     axes.set_xlabel("variance, µm²", fontsize=8)
     axes.tick_params(labelsize=8, color=FAINT)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    open_frame(axes)
     axes.set_title(f"Components of the error: {components['total']:.3f} µm before calibration", fontsize=11)
     return figure

@@ -8,28 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram.show import pictures
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
 
-__all__ = ["ACCENT", "FAINT", "MAIN", "arrows", "key", "new_figure", "panels", "plain"]
+__all__ = ["ACCENT", "FAINT", "MAIN", "arrows", "key", "panels", "plain"]
 
 MAIN = "#1f4e79"
 ACCENT = "#b5432a"
 FAINT = "#9aa5b1"
 MM = 1000.0
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """Return a figure that belongs to no window (inches)."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def panels(
@@ -38,7 +30,7 @@ def panels(
     """Return a figure of square panels, and its axes; their limits are shared, or each has its own."""
     columns = min(count, across)
     rows = -(-count // columns)
-    figure = new_figure(max(side * columns, 5.0), side * rows + 0.6)
+    figure = pictures.new_figure(max(side * columns, 5.0), side * rows + 0.6)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=shared, sharey=shared).ravel().tolist()
     for unused in axes[count:]:
         unused.set_visible(False)
@@ -52,8 +44,7 @@ def plain(axes: Axes, xlabel: str, ylabel: str) -> None:
     axes.set_ylabel(ylabel, fontsize=8)
     axes.tick_params(labelsize=7, length=2, color=FAINT)
     axes.margins(0.08)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    pictures.open_frame(axes)
     for side in ("left", "bottom"):
         axes.spines[side].set_color(FAINT)
 
@@ -70,21 +61,7 @@ def arrows(axes: Axes, places_um: Floats, vectors_um: Floats, scale: float, colo
     """Draw vectors from places, `scale` millimetres of the picture for each micrometre."""
     places, vectors = places_um / MM, vectors_um * scale
     axes.plot(*places.T, ".", color=FAINT, markersize=5, zorder=1)
-    axes.quiver(
-        *places.T,
-        *vectors.T,
-        angles="xy",
-        scale_units="xy",
-        scale=1,
-        color=colour,
-        width=0.006,
-        headwidth=3.5,
-        headlength=4.5,
-        zorder=2,
-    )
-    # Quiver does not count its heads when limits are set.
-    axes.update_datalim(places + vectors)
-    axes.autoscale_view()
+    pictures.arrows(axes, places, vectors, color=colour, width=0.006, headwidth=3.5, headlength=4.5, zorder=2)
 
 
 def key(panels: Sequence[Axes], scale: float, length_um: float) -> None:

@@ -15,16 +15,15 @@ from photogram.comparator.pictures.style import (
     arrows,
     key,
     magnification,
-    new_figure,
     panels,
     plain,
 )
-from photogram.pictures import round_length
+from photogram.show.pictures import new_figure, round_length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from photogram.adjusted import Floats
+    from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
 
 __all__ = ["average_vectors", "comparator_vectors", "grid_vectors", "joint_grid"]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.adjusted import Floats
+from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import Space
 from photogram.giant.listing.pages import Page, headed, paginate
 from photogram.giant.listing.summaries import counts_and_rms

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from photogram.angles import degrees_minutes_seconds
+from photogram.show.angles import degrees_minutes_seconds
 
 __all__ = ["VALUE", "Space", "attitude", "attitude_name", "dms", "exponential", "fixed"]
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.adjusted import Floats, Iteration
+from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import Space, Values, fixed
 from photogram.giant.listing.pages import Page, headed, paginate
+from photogram.results.adjusted import Iteration
 
 __all__ = ["iteration_pages"]
 

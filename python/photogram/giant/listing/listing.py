@@ -23,10 +23,10 @@ from photogram.giant.listing.stations import station_pages
 from photogram.giant.listing.warnings import warning_pages
 
 if TYPE_CHECKING:
-    from photogram.adjusted import AdjustedBlock
-    from photogram.block import Block
     from photogram.giant.contents import Contents
     from photogram.giant.limits import Limits
+    from photogram.network.block import Block
+    from photogram.results.adjusted import AdjustedBlock
 
 __all__ = ["listing"]
 

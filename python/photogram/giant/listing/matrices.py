@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.adjusted import Floats
+from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import exponential
 
 __all__ = ["MATRIX", "matrix_rows"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from photogram.giant.common import Common, UnitVariance
 from photogram.giant.listing.formats import Space
 from photogram.giant.listing.pages import Page
-from photogram.refraction import Refraction
+from photogram.network.refraction import Refraction
 
 __all__ = ["options_page"]
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.adjusted import Floats
+from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import VALUE, Space
 from photogram.giant.listing.matrices import MATRIX, matrix_rows
 from photogram.giant.listing.pages import Page, headed, paginate

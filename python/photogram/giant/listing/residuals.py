@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from photogram.adjusted import Floats, SumsOfSquares
+from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import fixed
 from photogram.giant.listing.pages import Page, headed, paginate
+from photogram.results.adjusted import SumsOfSquares
 
 __all__ = ["PointResiduals", "residual_pages", "statistics"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.adjusted import Floats
+from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import VALUE, Space, attitude, attitude_name
 from photogram.giant.listing.matrices import MATRIX, matrix_rows
 from photogram.giant.listing.pages import Page, headed, paginate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.adjusted import Floats
+from photogram.arguments.types import Floats
 
 __all__ = ["counts_and_rms"]
 

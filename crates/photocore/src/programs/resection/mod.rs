@@ -16,7 +16,7 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Options, Problem, Status};
-use crate::geometry::{ObjectSpace, Photo, RotationSense, rotation, rotation_angles};
+use crate::geometry::{ObjectSpace, RotationSense, rotation, rotation_angles};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 pub use degenerate::Degeneracy;
@@ -163,6 +163,10 @@ impl Solved {
         last.map_or(self.adjustment.initial_sum_of_squares, |iteration| iteration.sum_of_squares)
     }
 
+    fn behind(&self) -> Vec<usize> {
+        self.problem.model.behind(&self.adjustment.unknowns)
+    }
+
     fn converged(&self) -> bool {
         self.adjustment.status == Status::Converged
     }
@@ -201,7 +205,7 @@ impl Resection {
                 adjusted = self.adjust_from(turned, options, pool, watch);
             }
             match adjusted {
-                Ok(adjusted) if self.start.is_none() && !self.in_front(&adjusted.pose()) => {}
+                Ok(adjusted) if self.start.is_none() && !adjusted.behind().is_empty() => {}
                 Ok(adjusted) => solved.push(adjusted),
                 Err(stop @ (ResectionError::Interrupted | ResectionError::OutOfMemory(_))) => {
                     return Err(stop);
@@ -247,12 +251,6 @@ impl Resection {
         let beyond = attitude[1].abs() > std::f64::consts::FRAC_PI_2;
         let free = self.attitude.sd.iter().all(|sd| sd.is_infinite());
         (beyond && free).then(|| Pose { position, attitude: rotation_angles(&rotation(attitude)) })
-    }
-
-    /// Whether all points lie in front of the camera.
-    fn in_front(&self, pose: &Pose) -> bool {
-        let photo = Photo::new(self.space, self.sense, pose.position, pose.attitude, self.principal_distance);
-        self.sight().points.iter().all(|point| photo.depth(point) > 0.0)
     }
 
     /// What is degenerate about the points seen from a pose.

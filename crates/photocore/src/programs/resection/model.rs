@@ -26,6 +26,16 @@ impl SinglePhoto {
             Partials::AtMeasured => photo.linearize_at_measured(point, self.points[index].xy),
         }
     }
+
+    /// The points that stand behind the camera, ascending; the equations hold for them as well.
+    pub fn behind(&self, unknowns: &[f64]) -> Vec<usize> {
+        let (photo, _) = self.prepare(unknowns);
+        let points = unknowns[..3 * self.points.len()].as_chunks().0.iter().enumerate();
+        points
+            .filter(|&(_, &coordinates)| photo.depth(&self.space.cartesian(coordinates)) < 0.0)
+            .map(|(point, _)| point)
+            .collect()
+    }
 }
 
 impl Model for SinglePhoto {

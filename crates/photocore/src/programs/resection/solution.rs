@@ -53,6 +53,8 @@ pub struct Solution {
     pub points: Vec<AdjustedControl>,
     /// Their images.
     pub images: Vec<AdjustedImage>,
+    /// The points that stand behind the camera, ascending: the equations hold for them as well.
+    pub behind: Vec<usize>,
     /// Weighted sum of squares of everything observed.
     pub sum_of_squares: f64,
     /// Observations and weighted unknowns less unknowns.
@@ -132,6 +134,7 @@ impl Solution {
             redundancy: std::array::from_fn(|k| redundancy_of(first + k)),
             points: (0..resection.points.len()).map(control).collect(),
             images: images(&problem.model, &unknowns, &problem.observation_sd, &mut adjustment),
+            behind: problem.model.behind(&unknowns),
             sum_of_squares,
             degrees_of_freedom: adjustment.counts.degrees_of_freedom(),
             start,

@@ -102,17 +102,19 @@ impl Moments {
     /// Gauss-Newton with damping (Levenberg-Marquardt) on three small rotations; the scale is eliminated.
     pub fn descend(&self, from: &Matrix3) -> Option<Similarity> {
         let mut at = *from;
-        let mut damping = 1e-3;
+        let (mut damping, mut value) = (1e-3, self.value(&at));
+        let (mut normal, mut gradient) = self.linearize(&at);
         for _ in 0..STEPS {
-            let (normal, gradient) = self.linearize(&at);
             let damped = normal + damping * Matrix3::from_diagonal(&normal.diagonal());
             let Some(step) = solve(&damped, &-gradient, 0.0) else { break };
             let next = rotation(step.into()) * at;
-            if self.value(&next) <= self.value(&at) + ROUNDING * self.size() {
-                (at, damping) = (next, damping / 10.0);
+            let next_value = self.value(&next);
+            if next_value <= value + ROUNDING * self.size() {
+                (at, value, damping) = (next, next_value, damping / 10.0);
                 if step.iter().all(|angle| angle.abs() < ARRIVED) {
                     break;
                 }
+                (normal, gradient) = self.linearize(&at);
             } else {
                 damping *= 10.0;
             }

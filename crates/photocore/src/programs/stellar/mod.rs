@@ -1,12 +1,14 @@
 //! Calibration of a camera by stars (NOAA TR NOS 55): directions of stars, attitudes of the camera and its interior parameters
 //! adjusted together.
 //!
-//! Stars are the local unknowns, two each. A few attitudes on one plate and the interior parameters form one kept block, so that
-//! their whole covariance comes out; many attitudes are a kept block each, and the interior parameters the border.
+//! Stars are the local unknowns, two each; attitudes are a kept block each, and the interior parameters and coefficients of refraction
+//! the border. A direction of the axis and weights of parameters are ties. A star that is held ties no attitudes to each other: each
+//! of its images has a local block of its own.
 //!
 //! Unit weight is that of the plate coordinates' weights: its mean error has their unit over the root of theirs.
 
 mod camera;
+mod cycle;
 mod model;
 mod published;
 mod solution;
@@ -16,23 +18,21 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use crate::adjustment::{self, AdjustError, Event, Problem};
+use crate::adjustment::{self, AdjustError, Event, NormalEquations, Phase, Problem};
 use crate::geometry::Station;
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
-use model::{Group, StarImages};
+use model::{Partials, StarImages};
 
 pub use camera::{Attitude, Camera, Decentering, Form, INTERIOR, Kind, PlateImage};
 pub use model::Rows;
-pub use published::{PublishedRows, Tolerances};
-pub use solution::{Solution, Tested};
+pub use published::{Correction, PublishedRows, Tolerances};
+pub use solution::{Observations, ParameterCofactors, Solution, Tested};
 
 /// Number of coefficients of refraction.
 pub const TAU: usize = 4;
 /// Number of unknowns that all images share.
 pub const COMMON: usize = INTERIOR + TAU;
-/// Attitudes at the most that form one block with the interior parameters.
-const JOINT: usize = 3;
 
 /// A star as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
@@ -80,7 +80,7 @@ pub struct Axis {
 /// Weighted parameters: given values and their weight matrix.
 #[derive(Debug, Clone)]
 pub struct Weights {
-    /// Which parameters: attitudes three each, then the common ones. Only common ones where the attitudes are many.
+    /// Which parameters: attitudes three each, then the common ones.
     pub parameters: Vec<usize>,
     /// Their given values.
     pub values: Vec<f64>,
@@ -118,6 +118,8 @@ pub struct Options {
     pub adjustment: adjustment::Options,
     /// Mean error of unit weight that is expected.
     pub unit: f64,
+    /// Whether to compute the cofactors of every two parameters, where there are cofactors: so many further right-hand sides.
+    pub whole: bool,
 }
 
 /// Why a calibration cannot be adjusted.
@@ -132,12 +134,12 @@ pub enum StellarError {
     /// Stars without images enough.
     #[error("{} stars are not determined by their images", .0.len())]
     UndeterminedStars(Vec<usize>),
-    /// Parameters that the stars do not determine.
-    #[error("{0} combinations of parameters are not determined by the stars")]
-    Undetermined(usize),
-    /// The initial values give images that are not finite.
+    /// Combinations that the stars do not determine: for each the parameters that take part in it.
+    #[error("{} combinations of parameters are not determined by the stars", .0.len())]
+    Undetermined(Vec<Vec<usize>>),
+    /// Stars that the initial values put where they have no image.
     #[error("the initial values put a star below the horizon or behind the camera")]
-    NotFinite,
+    NotFinite(Vec<usize>),
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
@@ -162,27 +164,92 @@ impl Calibration {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, StellarError> {
-        self.check()?;
-        let problem = self.problem(options)?;
-        let adjusted =
-            adjustment::adjust(&problem, &options.adjustment, pool, watch).map_err(|error| match error {
-                AdjustError::UndeterminedLocals(stars) => StellarError::UndeterminedStars(stars),
-                AdjustError::Undetermined(combinations) => StellarError::Undetermined(combinations.len()),
-                AdjustError::NotFinite => StellarError::NotFinite,
-                AdjustError::Interrupted => StellarError::Interrupted,
-                AdjustError::OutOfMemory(bytes) => StellarError::OutOfMemory(bytes),
-            })?;
-        Ok(Solution::new(self, options, &problem, adjusted))
+        let problem = self.problem(options.unit, Partials::Exact)?;
+        let adjusted = adjustment::adjust(&problem, &options.adjustment, pool, watch)
+            .map_err(|error| self.named(&problem, error, pool))?;
+        let whole = if options.whole && adjusted.cofactors.is_some() {
+            let total = problem.layout().locals();
+            let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
+            let normal = NormalEquations::form(&problem, &adjusted.unknowns, &[], pool, &mut between);
+            let whole = normal.and_then(|normal| self.whole(&normal, &problem, &mut between));
+            whole.map_err(|error| self.named(&problem, error, pool))?
+        } else {
+            None
+        };
+        Solution::new(self, options, &problem, adjusted, whole)
+    }
+
+    /// The parameters that no image, no weight and not the axis touches at the initial values, fixed ones excepted: the centre of a
+    /// distortion that is zero.
+    ///
+    /// # Errors
+    /// A calibration that contradicts itself; stars without images at the initial values.
+    pub fn without_effect(&self, pool: &ThreadPool) -> Result<Vec<usize>, StellarError> {
+        let problem = self.problem(1.0, Partials::Exact)?;
+        self.see(&problem.model)?;
+        let normal = NormalEquations::form(&problem, &problem.initial, &[], pool, &mut go_on);
+        let normal = normal.map_err(|error| self.named(&problem, error, pool))?;
+        Ok(parameters_of(&problem, normal.without_effect()))
+    }
+
+    /// Natural logarithm of the determinant of the reduced normal equations for the unit weight of the problem, and the cofactors of
+    /// every two parameters; None where some are not determined.
+    fn whole(
+        &self,
+        normal: &NormalEquations<'_, StarImages<'_>>,
+        problem: &Problem<StarImages<'_>>,
+        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Option<(f64, Vec<f64>)>, AdjustError> {
+        let Some(log_determinant) = normal.log_determinant() else { return Ok(None) };
+        let layout = problem.layout();
+        let parameters: Vec<usize> = (layout.all_locals().end..layout.unknowns()).collect();
+        Ok(Some((log_determinant, normal.cofactors(&parameters, between)?)))
+    }
+
+    /// Says of which stars and parameters an error of the engine tells.
+    fn named(
+        &self,
+        problem: &Problem<StarImages<'_>>,
+        error: AdjustError,
+        pool: &ThreadPool,
+    ) -> StellarError {
+        match error {
+            AdjustError::UndeterminedLocals(locals) => {
+                let mut stars: Vec<usize> = locals.iter().map(|&local| problem.model.stars[local]).collect();
+                stars.dedup();
+                StellarError::UndeterminedStars(stars)
+            }
+            // The initial values are those that leave parameters undetermined.
+            AdjustError::Undetermined(_) => {
+                let normal = NormalEquations::form(problem, &problem.initial, &[], pool, &mut go_on);
+                let found = normal.map_or(vec![], |normal| normal.undetermined());
+                let named = found.into_iter().map(|unknowns| parameters_of(problem, unknowns));
+                StellarError::Undetermined(named.collect())
+            }
+            AdjustError::NotFinite => match self.see(&problem.model) {
+                Err(unseen) => unseen,
+                Ok(()) => StellarError::NotFinite(vec![]),
+            },
+            AdjustError::Interrupted => StellarError::Interrupted,
+            AdjustError::OutOfMemory(bytes) => StellarError::OutOfMemory(bytes),
+        }
+    }
+
+    /// Refuses initial values that leave stars without images.
+    fn see(&self, model: &StarImages<'_>) -> Result<(), StellarError> {
+        let sight = self.initial();
+        let unseen =
+            |image: &usize| model.image(&sight, *image).constant.iter().any(|value| !value.is_finite());
+        let mut stars: Vec<usize> =
+            (0..self.images.len()).filter(unseen).map(|image| self.images[image].star).collect();
+        stars.sort_unstable();
+        stars.dedup();
+        if stars.is_empty() { Ok(()) } else { Err(StellarError::NotFinite(stars)) }
     }
 
     /// Number of parameters: attitudes and common ones.
     pub fn parameters(&self) -> usize {
         3 * self.pointings.len() + COMMON
-    }
-
-    /// Whether attitudes and common parameters form one block.
-    fn joint(&self) -> bool {
-        self.pointings.len() <= JOINT
     }
 
     fn check(&self) -> Result<(), StellarError> {
@@ -193,10 +260,9 @@ impl Calibration {
         if self.axis.is_some_and(|axis| axis.pointing >= counts.1) {
             return Err(StellarError::Index("the axis".into()));
         }
-        let first = if self.joint() { 0 } else { 3 * counts.1 };
         let Weights { parameters, values, root } = &self.weights;
         let count = parameters.len();
-        let known = parameters.iter().all(|&parameter| (first..self.parameters()).contains(&parameter));
+        let known = parameters.iter().all(|&parameter| parameter < self.parameters());
         if !known
             || values.len() != count
             || root.len() != count * count
@@ -207,38 +273,48 @@ impl Calibration {
         Ok(())
     }
 
-    /// The least-squares problem: the stars, and a fixed local block for what concerns no star.
-    fn problem(&self, options: &Options) -> Result<Problem<StarImages<'_>>, StellarError> {
-        let model = StarImages::new(self)?;
-        let layout = self.layout(&model.groups, &model.start)?;
-        let places = self.stars.iter().flat_map(|star| star.place).chain([0.0; 2]);
-        let parameters = self.pointings.iter().flatten().chain(&self.common).copied();
-        let initial: Vec<f64> = places.chain(parameters).collect();
+    /// The least-squares problem: a local block for each star that is not held, and for each image of one that is; the catalogue
+    /// places are weights of decorrelated coordinates of the stars.
+    fn problem(&self, unit: f64, partials: Partials) -> Result<Problem<StarImages<'_>>, StellarError> {
+        self.check()?;
+        let model = StarImages::new(self, partials)?;
+        let layout = self.layout(&model)?;
+        let parameters = || self.pointings.iter().flatten().chain(&self.common).copied();
+        let locals = |place: fn(&Star) -> [f64; 2]| {
+            let unknowns = |&star: &usize| model.decorrelated(star, place(&self.stars[star]));
+            model.stars.iter().flat_map(unknowns).chain(parameters()).collect::<Vec<f64>>()
+        };
         let free = |fixed: bool| if fixed { 0.0 } else { f64::INFINITY };
-        let stars = self.stars.iter().flat_map(|star| [free(star.fixed); 2]).chain([0.0; 2]);
+        let of_star = |&star: &usize| match model.catalogue[star] {
+            Some([[first, _], [_, second]]) => [unit / first, unit / second],
+            None => [free(self.stars[star].fixed); 2],
+        };
         let scale = if self.kind.common_scale { Some(3 * self.pointings.len() + 4) } else { None };
         let held = self.fixed.iter().enumerate().map(|(k, &fixed)| free(fixed || Some(k) == scale));
         Ok(Problem {
-            observation_sd: vec![options.unit; 2 * model.groups.len()],
-            sd: stars.chain(held).collect(),
-            prior: initial.clone(),
-            initial,
+            observation_sd: vec![unit; layout.equations()],
+            sd: model.stars.iter().flat_map(of_star).chain(held).collect(),
+            prior: locals(|star| star.catalogue),
+            initial: locals(|star| star.place),
             system: System::new(layout, Ordering::Auto),
             model,
         })
     }
 
-    fn layout(&self, groups: &[Group], start: &[usize]) -> Result<Layout, LayoutError> {
-        if self.joint() {
-            return Layout::new(2, 2, &[self.parameters()], start.to_vec(), vec![0; groups.len()]);
-        }
-        let pointing_of = |group: &Group| match *group {
-            Group::Image(image) => self.images[image].pointing as u32,
-            Group::Axis => self.axis.map_or(0, |axis| axis.pointing as u32),
-            Group::Star(_) | Group::Parameters(_) => 0,
-        };
-        let kept = groups.iter().map(pointing_of).collect();
-        let layout = Layout::new(2, 2, &vec![3; self.pointings.len()], start.to_vec(), kept)?;
-        layout.with_border(COMMON, vec![0..COMMON as u32; groups.len()])
+    fn layout(&self, model: &StarImages<'_>) -> Result<Layout, LayoutError> {
+        let kept = model.images.iter().map(|&image| self.images[image].pointing as u32).collect();
+        Layout::new(2, 2, &vec![3; self.pointings.len()], model.start.clone(), kept)?
+            .with_border(COMMON, vec![0..COMMON as u32; model.images.len()])?
+            .with_ties(model.ties.iter().map(|(_, tie)| tie.clone()).collect())
     }
+}
+
+/// The parameters among unknowns.
+fn parameters_of(problem: &Problem<StarImages<'_>>, unknowns: Vec<usize>) -> Vec<usize> {
+    let first = problem.layout().all_locals().end;
+    unknowns.into_iter().map(|unknown| unknown - first).collect()
+}
+
+fn go_on(_: usize) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }

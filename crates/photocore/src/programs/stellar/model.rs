@@ -1,32 +1,48 @@
 //! The observation equations of stars, with exact partials.
 
-use super::{Attitude, COMMON, Calibration, Camera, INTERIOR, PlateImage, StellarError, TAU};
+use super::published::Tolerances;
+use super::{Attitude, COMMON, Calibration, Camera, INTERIOR, PlateImage, StellarError, TAU, Weights};
 use crate::adjustment::Model;
-use crate::normals::GroupRows;
+use crate::normals::{GroupRows, Tie, TieRows};
 
-/// What a group of two equations observes.
+/// Root R, upper triangular, of a weight matrix P = R^T R.
+pub type Root = [[f64; 2]; 2];
+
+/// What a tie observes.
 #[derive(Debug, Clone, Copy)]
-pub enum Group {
-    /// The plate coordinates of an image.
-    Image(usize),
-    /// The catalogue place of a star.
-    Star(usize),
-    /// The direction of the axis.
-    Axis,
-    /// Two rows, from the given one on, of the root of the parameters' weight matrix.
+pub enum Tied {
+    /// The direction of the axis, with the root of its weights.
+    Axis(Root),
+    /// A row of the root of the parameters' weight matrix.
     Parameters(usize),
 }
 
-/// Images of stars, star by star, and what is known beforehand, each as rows of unit weight.
+/// Which discrepancies and partials images have.
+#[derive(Debug, Clone, Copy)]
+pub enum Partials {
+    /// The exact ones.
+    Exact,
+    /// Those of the report's program.
+    Published(Tolerances),
+}
+
+/// Images of stars, local block by local block, and what is known beforehand, each as rows of unit weight.
 #[derive(Debug)]
 pub struct StarImages<'a> {
     calibration: &'a Calibration,
-    /// Star by star; those of no star at the end.
-    pub groups: Vec<Group>,
-    /// The groups of star i are `groups[start[i]..start[i + 1]]`.
+    partials: Partials,
+    /// The star of each local block.
+    pub stars: Vec<usize>,
+    /// The images of all local blocks, a group each.
+    pub images: Vec<usize>,
+    /// Those of local block i are `images[start[i]..start[i + 1]]`.
     pub start: Vec<usize>,
-    /// Root R of the weight P = R^T R of each group.
-    pub roots: Vec<[[f64; 2]; 2]>,
+    /// Root of the weights of each of them.
+    pub roots: Vec<Root>,
+    /// Root of the weights of each star's catalogue place; None where it has none or is held.
+    pub catalogue: Vec<Option<Root>>,
+    /// What concerns no star.
+    pub ties: Vec<(Tied, Tie)>,
 }
 
 /// Camera, attitudes and stars at given values of the unknowns.
@@ -35,8 +51,8 @@ pub struct Sight {
     pub camera: Camera,
     pub attitudes: Vec<Attitude>,
     pub tau: [f64; TAU],
-    places: Vec<[f64; 2]>,
-    parameters: Vec<f64>,
+    pub places: Vec<[f64; 2]>,
+    pub parameters: Vec<f64>,
 }
 
 /// The two equations of a group before weighting; the first index is the row.
@@ -53,16 +69,15 @@ pub struct Rows {
 }
 
 impl Sight {
-    /// Takes the vector of unknowns apart.
-    pub fn new(calibration: &Calibration, unknowns: &[f64]) -> Self {
-        let (places, parameters) = unknowns.split_at(2 * calibration.stars.len() + 2);
+    /// Everything at the given places of the stars and values of the parameters.
+    pub fn new(calibration: &Calibration, places: Vec<[f64; 2]>, parameters: &[f64]) -> Self {
         let (pointings, common) = parameters.split_at(3 * calibration.pointings.len());
         let interior = std::array::from_fn::<_, INTERIOR, _>(|k| common[k]);
         Self {
             camera: Camera::new(calibration.kind, interior),
             attitudes: pointings.as_chunks().0.iter().map(|&angles| Attitude::new(angles)).collect(),
             tau: std::array::from_fn(|k| common[INTERIOR + k]),
-            places: places.as_chunks().0.to_vec(),
+            places,
             parameters: parameters.to_vec(),
         }
     }
@@ -104,75 +119,131 @@ impl Sight {
             common: std::array::from_fn(common),
         })
     }
-
-    fn star(&self, calibration: &Calibration, star: usize) -> Rows {
-        let catalogue = calibration.stars[star].catalogue;
-        Rows {
-            constant: std::array::from_fn(|k| catalogue[k] - self.places[star][k]),
-            star: [[1.0, 0.0], [0.0, 1.0]],
-            pointing: [[0.0; 3]; 2],
-            common: [[0.0; COMMON]; 2],
-        }
-    }
 }
 
 impl<'a> StarImages<'a> {
     /// Sorts the images by stars and finds the roots of all weights.
-    pub fn new(calibration: &'a Calibration) -> Result<Self, StellarError> {
+    pub fn new(calibration: &'a Calibration, partials: Partials) -> Result<Self, StellarError> {
         let mut of_star = vec![Vec::new(); calibration.stars.len()];
         for (index, image) in calibration.images.iter().enumerate() {
             of_star[image.star].push(index);
         }
-        let mut model = Self { calibration, groups: vec![], start: vec![0], roots: vec![] };
-        for (star, images) in of_star.into_iter().enumerate() {
-            for image in images {
-                let name = || format!("image {image}");
-                model.push(Group::Image(image), calibration.images[image].weight, name)?;
+        let mut model = Self {
+            calibration,
+            partials,
+            stars: vec![],
+            images: vec![],
+            start: vec![0],
+            roots: vec![],
+            catalogue: vec![],
+            ties: calibration.ties()?,
+        };
+        for (index, images) in of_star.into_iter().enumerate() {
+            let star = &calibration.stars[index];
+            // A star that is held ties nothing together.
+            let most = if star.fixed { 1 } else { images.len().max(1) };
+            let free = (images.is_empty() && !star.fixed).then_some(&images[..]);
+            for images in images.chunks(most).chain(free) {
+                model.stars.push(index);
+                model.images.extend_from_slice(images);
+                model.start.push(model.images.len());
             }
-            if let (Some(weight), false) = (calibration.stars[star].weight, calibration.stars[star].fixed) {
-                model.push(Group::Star(star), weight, || format!("star {star}"))?;
-            }
-            model.start.push(model.groups.len());
+            let weight = star.weight.filter(|_| !star.fixed);
+            model.catalogue.push(weight.map(|weight| root(weight, || format!("star {index}"))).transpose()?);
         }
-        if let Some(axis) = calibration.axis {
-            model.push(Group::Axis, axis.weight, || "the axis".into())?;
+        for &image in &model.images {
+            model.roots.push(root(calibration.images[image].weight, || format!("image {image}"))?);
         }
-        for first in (0..calibration.weights.parameters.len()).step_by(2) {
-            model.push(Group::Parameters(first), [[1.0, 0.0], [0.0, 1.0]], String::new)?;
-        }
-        model.start.push(model.groups.len());
         Ok(model)
     }
 
-    fn push(
-        &mut self,
-        group: Group,
-        weight: [[f64; 2]; 2],
-        name: impl Fn() -> String,
-    ) -> Result<(), StellarError> {
-        let [[xx, xy], [_, yy]] = weight;
-        let rest = yy - xy * xy / xx;
-        let positive = xx > 0.0 && rest > 0.0 && xx.is_finite() && rest.is_finite();
-        if !positive {
-            return Err(StellarError::Weight(name()));
-        }
-        self.groups.push(group);
-        self.roots.push([[xx.sqrt(), xy / xx.sqrt()], [0.0, rest.sqrt()]]);
-        Ok(())
+    /// Coordinates of a star whose catalogue values are not correlated, from its place.
+    pub fn decorrelated(&self, star: usize, [ra, dec]: [f64; 2]) -> [f64; 2] {
+        [ra + self.shear(star) * dec, dec]
     }
 
-    /// Rows of the root of the parameters' weights; the place of each parameter within the row is `offset` less.
-    fn parameters(&self, sight: &Sight, first: usize, offset: usize, constant: &mut [f64], rows: &mut [f64]) {
-        let weights = &self.calibration.weights;
-        let count = weights.parameters.len();
-        let width = rows.len() / 2;
-        for row in 0..2.min(count - first) {
-            let root = &weights.root[(first + row) * count..][..count];
-            for ((&factor, &parameter), value) in root.iter().zip(&weights.parameters).zip(&weights.values) {
-                constant[row] += factor * (value - sight.parameters[parameter]);
-                rows[row * width + parameter - offset] = factor;
+    /// With the root R of the weights, what the first row has of the declination for one of the right ascension.
+    pub fn shear(&self, star: usize) -> f64 {
+        self.catalogue[star].map_or(0.0, |root| root[0][1] / root[0][0])
+    }
+
+    /// Catalogue place of a star minus its place.
+    pub fn off_catalogue(&self, star: usize, place: [f64; 2]) -> [f64; 2] {
+        let catalogue = self.calibration.stars[star].catalogue;
+        [catalogue[0] - place[0], catalogue[1] - place[1]]
+    }
+
+    /// Camera, attitudes and stars at given values of the unknowns.
+    pub fn sight(&self, unknowns: &[f64]) -> Sight {
+        let (locals, parameters) = unknowns.split_at(2 * self.stars.len());
+        let mut places: Vec<[f64; 2]> = self.calibration.stars.iter().map(|star| star.place).collect();
+        for (&star, &[first, dec]) in self.stars.iter().zip(locals.as_chunks().0) {
+            places[star] = [first - self.shear(star) * dec, dec];
+        }
+        Sight::new(self.calibration, places, parameters)
+    }
+
+    /// Discrepancies and partials of an image.
+    pub fn image(&self, sight: &Sight, image: usize) -> Rows {
+        match self.partials {
+            Partials::Exact => sight.image(self.calibration, image),
+            Partials::Published(tolerances) => {
+                self.calibration.published_image(sight, image, &tolerances).rows
             }
         }
+    }
+}
+
+/// The root of a weight matrix.
+fn root(weight: [[f64; 2]; 2], name: impl Fn() -> String) -> Result<Root, StellarError> {
+    let [[xx, xy], [_, yy]] = weight;
+    let rest = yy - xy * xy / xx;
+    if xx > 0.0 && rest > 0.0 && xx.is_finite() && rest.is_finite() {
+        Ok([[xx.sqrt(), xy / xx.sqrt()], [0.0, rest.sqrt()]])
+    } else {
+        Err(StellarError::Weight(name()))
+    }
+}
+
+/// Common parameters that the direction of the axis depends on: epsilon, principal point and principal distances.
+const OF_AXIS: usize = 5;
+
+impl Calibration {
+    /// The axis, and the weights of parameters, each with what it touches.
+    fn ties(&self) -> Result<Vec<(Tied, Tie)>, StellarError> {
+        let mut ties = Vec::new();
+        if let Some(axis) = self.axis {
+            let root = root(axis.weight, || "the axis".into())?;
+            let tie = Tie { rows: 2, kept: vec![axis.pointing as u32], border: 0..OF_AXIS as u32 };
+            ties.push((Tied::Axis(root), tie));
+        }
+        for row in 0..self.weights.parameters.len() {
+            let touched = self.weighted(row).map(|(parameter, ..)| parameter as u32);
+            let attitudes = 3 * self.pointings.len() as u32;
+            let (own, common): (Vec<u32>, Vec<u32>) = touched.partition(|&parameter| parameter < attitudes);
+            let mut kept: Vec<u32> = own.iter().map(|parameter| parameter / 3).collect();
+            kept.sort_unstable();
+            kept.dedup();
+            let ends = common.iter().min().zip(common.iter().max());
+            let border = ends.map_or(0..0, |(first, last)| first - attitudes..last + 1 - attitudes);
+            ties.push((Tied::Parameters(row), Tie { rows: 1, kept, border }));
+        }
+        Ok(ties)
+    }
+
+    /// The parameters that a row of the root of their weights touches: parameter, given value, element of the root.
+    pub(super) fn weighted(&self, row: usize) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
+        let Weights { parameters, values, root } = &self.weights;
+        let count = parameters.len();
+        let elements = root[row * count..][..count].iter();
+        let all = parameters.iter().zip(values).zip(elements);
+        all.map(|((&parameter, &value), &element)| (parameter, value, element))
+            .filter(|&(.., element)| element != 0.0)
+    }
+
+    /// A row of the root times given minus present values of the weighted parameters.
+    pub(super) fn off_given(&self, sight: &Sight, row: usize) -> f64 {
+        self.weighted(row).map(|(parameter, given, r)| r * (given - sight.parameters[parameter])).sum()
     }
 }
 
@@ -180,66 +251,64 @@ impl Model for StarImages<'_> {
     type Prepared = Sight;
 
     fn prepare(&self, unknowns: &[f64]) -> Sight {
-        Sight::new(self.calibration, unknowns)
+        self.sight(unknowns)
     }
 
     /// Computes directions that are not known afresh from their first images.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
-        let sight = Sight::new(self.calibration, unknowns);
-        for (star, groups) in self.start.windows(2).take(self.calibration.stars.len()).enumerate() {
-            let known = self.calibration.stars[star];
-            if let (None, false, Some(Group::Image(image))) =
-                (known.weight, known.fixed, self.groups[groups[0]..groups[1]].first())
-            {
-                let place = self.calibration.direction(&sight, *image);
-                unknowns[2 * star..][..2].copy_from_slice(&place);
+        let sight = self.sight(unknowns);
+        for (local, &star) in self.stars.iter().enumerate() {
+            let known = &self.calibration.stars[star];
+            let images = &self.images[self.start[local]..self.start[local + 1]];
+            if let (None, false, Some(&image)) = (known.weight, known.fixed, images.first()) {
+                unknowns[2 * local..][..2].copy_from_slice(&self.calibration.direction(&sight, image));
             }
         }
         true
     }
 
-    fn observe(&self, sight: &Sight, _local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        rows.constant.fill(0.0);
-        rows.local.fill(0.0);
-        rows.kept.fill(0.0);
-        rows.border.fill(0.0);
-        let joint = rows.border.is_empty();
-        let pointings = 3 * self.calibration.pointings.len();
-        let (found, pointing) = match self.groups[group] {
-            Group::Image(image) => {
-                (Some(sight.image(self.calibration, image)), self.calibration.images[image].pointing)
-            }
-            Group::Star(star) => (Some(sight.star(self.calibration, star)), 0),
-            Group::Axis => {
-                (sight.axis(self.calibration), self.calibration.axis.map_or(0, |axis| axis.pointing))
-            }
-            Group::Parameters(first) => {
-                let (offset, part) =
-                    if joint { (0, &mut *rows.kept) } else { (pointings, &mut *rows.border) };
-                self.parameters(sight, first, offset, rows.constant, part);
-                return;
-            }
-        };
-        let Some(found) = found else { return };
-        let root = self.roots[group];
-        for row in 0..2 {
-            let mix = |a: f64, b: f64| root[row][0] * a + root[row][1] * b;
+    fn observe(&self, sight: &Sight, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let found = self.image(sight, self.images[group]);
+        let (root, shear) = (self.roots[group], self.shear(self.stars[local]));
+        for (row, root) in root.iter().enumerate() {
+            let mix = |a: f64, b: f64| root[0] * a + root[1] * b;
+            let [ra, dec] = [0, 1].map(|k| mix(found.star[0][k], found.star[1][k]));
             rows.constant[row] = mix(found.constant[0], found.constant[1]);
-            for k in 0..2 {
-                rows.local[2 * row + k] = mix(found.star[0][k], found.star[1][k]);
-            }
-            let (pointing_part, common_part) = if joint {
-                let (before, common) =
-                    rows.kept[row * (pointings + COMMON)..][..pointings + COMMON].split_at_mut(pointings);
-                (&mut before[3 * pointing..][..3], common)
-            } else {
-                (&mut rows.kept[3 * row..][..3], &mut rows.border[COMMON * row..][..COMMON])
-            };
-            for (k, value) in pointing_part.iter_mut().enumerate() {
+            rows.local[2 * row..][..2].copy_from_slice(&[ra, dec - shear * ra]);
+            for (k, value) in rows.kept[3 * row..][..3].iter_mut().enumerate() {
                 *value = mix(found.pointing[0][k], found.pointing[1][k]);
             }
-            for (k, value) in common_part.iter_mut().enumerate() {
+            for (k, value) in rows.border[COMMON * row..][..COMMON].iter_mut().enumerate() {
                 *value = mix(found.common[0][k], found.common[1][k]);
+            }
+        }
+    }
+
+    fn observe_tie(&self, sight: &Sight, tie: usize, rows: &mut TieRows<'_>) {
+        let (tied, Tie { kept, border, .. }) = &self.ties[tie];
+        rows.coefficients.fill(0.0);
+        match tied {
+            Tied::Axis(root) => {
+                let Some(found) = sight.axis(self.calibration) else { return rows.constant.fill(0.0) };
+                let columns = rows.coefficients.as_chunks_mut::<{ 3 + OF_AXIS }>().0;
+                for ((root, constant), columns) in root.iter().zip(&mut *rows.constant).zip(columns) {
+                    let mix = |a: f64, b: f64| root[0] * a + root[1] * b;
+                    *constant = mix(found.constant[0], found.constant[1]);
+                    let [x, y] = [0, 1].map(|i| found.pointing[i].iter().chain(&found.common[i]));
+                    columns.iter_mut().zip(x.zip(y)).for_each(|(value, (x, y))| *value = mix(*x, *y));
+                }
+            }
+            Tied::Parameters(row) => {
+                rows.constant[0] = self.calibration.off_given(sight, *row);
+                for (parameter, _, element) in self.calibration.weighted(*row) {
+                    let block = kept.iter().position(|&block| block as usize == parameter / 3);
+                    let common = parameter.checked_sub(3 * self.calibration.pointings.len());
+                    let column = match (common, block) {
+                        (Some(common), _) => 3 * kept.len() + common - border.start as usize,
+                        (None, block) => 3 * block.unwrap_or_default() + parameter % 3,
+                    };
+                    rows.coefficients[column] = element;
+                }
             }
         }
     }
@@ -282,8 +351,7 @@ impl Calibration {
 
     /// Everything at the initial values.
     pub(super) fn initial(&self) -> Sight {
-        let places = self.stars.iter().flat_map(|star| star.place).chain([0.0; 2]);
-        let parameters = self.pointings.iter().flatten().chain(&self.common).copied();
-        Sight::new(self, &places.chain(parameters).collect::<Vec<f64>>())
+        let parameters: Vec<f64> = self.pointings.iter().flatten().chain(&self.common).copied().collect();
+        Sight::new(self, self.stars.iter().map(|star| star.place).collect(), &parameters)
     }
 }

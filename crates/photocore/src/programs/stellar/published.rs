@@ -3,8 +3,11 @@
 //! Distortion is that of the image undistorted from the measurement, so that discrepancies live on the undistorted plate; the
 //! change of refraction with direction is neglected in the partials.
 
-use super::model::{Rows, Sight};
-use super::{Attitude, COMMON, Calibration, Camera, Image, StellarError};
+use rayon::ThreadPool;
+
+use super::model::{Partials, Rows, Sight};
+use super::{Attitude, COMMON, Calibration, Camera, StellarError, go_on, parameters_of};
+use crate::adjustment::{AdjustError, NormalEquations};
 use crate::geometry::Displacement;
 
 /// Tolerances of the inner iterations.
@@ -31,16 +34,65 @@ pub struct PublishedRows {
     pub unsettled: Option<[f64; 2]>,
 }
 
+/// One correction of all parameters.
+#[derive(Debug, Clone)]
+pub struct Correction {
+    /// Corrections of the parameters: attitudes three each, then the common ones.
+    pub parameters: Vec<f64>,
+    /// Cofactors of every two parameters, row by row; zero for those that are fixed or have no effect.
+    pub cofactors: Vec<f64>,
+    /// Natural logarithm of the determinant of the reduced normal equations.
+    pub log_determinant: f64,
+    /// Parameters that no image and no weight touches yet: they are not corrected.
+    pub without_effect: Vec<usize>,
+}
+
 impl Calibration {
+    /// Corrects the parameters with the equations as the report's program formed them at the initial values.
+    ///
+    /// # Errors
+    /// Stars or parameters that are not determined, stars without images.
+    pub fn correction(&self, tolerances: &Tolerances, pool: &ThreadPool) -> Result<Correction, StellarError> {
+        let problem = self.problem(1.0, Partials::Published(*tolerances))?;
+        self.see(&problem.model)?;
+        let failed = |error| self.named(&problem, error, pool);
+        let form = |held| NormalEquations::form(&problem, &problem.initial, held, pool, &mut go_on);
+        let first = form(&[]).map_err(failed)?;
+        let idle = first.without_effect();
+        let normal = if idle.is_empty() { first } else { form(&idle).map_err(failed)? };
+        if !normal.undetermined_locals().is_empty() {
+            return Err(failed(AdjustError::UndeterminedLocals(normal.undetermined_locals().to_vec())));
+        }
+        let undetermined = || {
+            let combinations = normal.undetermined().into_iter();
+            StellarError::Undetermined(combinations.map(|each| parameters_of(&problem, each)).collect())
+        };
+        let whole = self.whole(&normal, &problem, &mut go_on).map_err(failed)?;
+        let (log_determinant, cofactors) = whole.ok_or_else(undetermined)?;
+        let corrections = normal.corrections(&mut go_on).map_err(failed)?;
+        Ok(Correction {
+            parameters: corrections[problem.layout().all_locals().end..].to_vec(),
+            cofactors,
+            log_determinant,
+            without_effect: parameters_of(&problem, idle.clone()),
+        })
+    }
+
     /// The equations of all images at the initial values as the report's program formed them.
     pub fn published(&self, tolerances: &Tolerances) -> Result<Vec<PublishedRows>, StellarError> {
         self.check()?;
         let sight = self.initial();
-        Ok(self.images.iter().map(|image| self.published_image(&sight, image, tolerances)).collect())
+        Ok((0..self.images.len()).map(|image| self.published_image(&sight, image, tolerances)).collect())
     }
 
-    fn published_image(&self, sight: &Sight, image: &Image, tolerances: &Tolerances) -> PublishedRows {
-        let place = self.stars[image.star].place;
+    pub(super) fn published_image(
+        &self,
+        sight: &Sight,
+        image: usize,
+        tolerances: &Tolerances,
+    ) -> PublishedRows {
+        let image = &self.images[image];
+        let place = sight.places[image.star];
         let place = [place[0] + image.shift[0], place[1] + image.shift[1]];
         let (equatorial, _) = self.station.aberrated(place, image.sidereal_time);
         let direction = self.station.direction(equatorial);

@@ -1,13 +1,14 @@
 //! The adjusted calibration.
 
-use super::model::{Group, Sight, StarImages};
-use super::{COMMON, Calibration, Options};
+use super::model::{Root, Sight, StarImages, Tied};
+use super::{Calibration, Options, StellarError};
 use crate::adjustment::{Adjustment, Problem, standardized};
+use crate::normals::Cofactors;
 
-/// What an equation of unit weight shows after the adjustment.
+/// What an observation of two components of unit weight shows after the adjustment.
 #[derive(Debug, Clone, Copy)]
 pub struct Tested {
-    /// Redundancy numbers of its two rows; NaN when not asked for.
+    /// Redundancy numbers of its two components; NaN when not asked for.
     pub redundancy: [f64; 2],
     /// Weighted residual over the root of the redundancy number, for the expected mean error of unit weight; NaN without
     /// redundancy.
@@ -15,33 +16,55 @@ pub struct Tested {
 }
 
 impl Tested {
-    const NONE: Self = Self { redundancy: [f64::NAN; 2], standardized: [f64::NAN; 2] };
+    pub(super) const NONE: Self = Self { redundancy: [f64::NAN; 2], standardized: [f64::NAN; 2] };
 }
 
-/// An adjusted calibration; cofactors are for the unit weight of the plate coordinates.
+/// Stars, images and axis after an adjustment; cofactors are for the unit weight of the plate coordinates.
 #[derive(Debug)]
-pub struct Solution {
+pub struct Observations {
     /// Right ascension and declination of every star.
     pub places: Vec<[f64; 2]>,
     /// Their cofactors; NaN when not asked for.
     pub place_cofactors: Vec<[[f64; 2]; 2]>,
+    /// What of these would be left if all parameters were known; zero for stars that are held.
+    pub place_inverses: Vec<[[f64; 2]; 2]>,
     /// Tests of their catalogue places.
     pub place_tests: Vec<Tested>,
-    /// Attitudes three each, then the common parameters.
-    pub parameters: Vec<f64>,
-    /// Cofactors of all parameters where the attitudes are few; else of each attitude with itself and the common parameters,
-    /// 3 x (3 + common) each, then of the common parameters. Row by row; empty when not asked for.
-    pub cofactors: Vec<f64>,
     /// Measured minus computed plate coordinates.
     pub residuals: Vec<[f64; 2]>,
     /// Tests of the images.
     pub image_tests: Vec<Tested>,
-    /// Test of the axis.
-    pub axis_test: Tested,
     /// Measured minus computed plate coordinates of the axis.
     pub axis_residual: Option<[f64; 2]>,
     /// Weighted sums of squares: images, stars, parameters, axis.
     pub sums_of_squares: [f64; 4],
+}
+
+/// Cofactors of the parameters for the unit weight of the plate coordinates, row by row.
+#[derive(Debug, Clone, Default)]
+pub struct ParameterCofactors {
+    /// Of each attitude (3 x 3).
+    pub own: Vec<f64>,
+    /// Of each attitude with the common parameters (3 x common).
+    pub cross: Vec<f64>,
+    /// Of the common parameters.
+    pub common: Vec<f64>,
+}
+
+/// An adjusted calibration.
+#[derive(Debug)]
+pub struct Solution {
+    /// Attitudes three each, then the common parameters.
+    pub parameters: Vec<f64>,
+    /// Stars and images.
+    pub observations: Observations,
+    /// Test of the axis.
+    pub axis_test: Tested,
+    /// Cofactors, where they were asked for.
+    pub cofactors: Option<ParameterCofactors>,
+    /// Natural logarithm of the determinant of the normal equations reduced to the parameters, and the cofactors of every two
+    /// parameters, both for the unit weight of the plate coordinates; where they were asked for.
+    pub whole: Option<(f64, Vec<f64>)>,
     /// Status, iterations, times.
     pub adjustment: Adjustment,
 }
@@ -53,67 +76,137 @@ impl Solution {
         options: &Options,
         problem: &Problem<StarImages<'_>>,
         mut adjustment: Adjustment,
-    ) -> Self {
+        whole: Option<(f64, Vec<f64>)>,
+    ) -> Result<Self, StellarError> {
         let unknowns = std::mem::take(&mut adjustment.unknowns);
-        let (places, parameters) = unknowns.split_at(2 * calibration.stars.len() + 2);
-        let sight = Sight::new(calibration, &unknowns);
+        let model = &problem.model;
+        let sight = model.sight(&unknowns);
         let unit = options.unit * options.unit;
+        let scaled = |values: Vec<f64>| values.into_iter().map(|value| value / unit).collect::<Vec<f64>>();
+        let cofactors = adjustment.cofactors.take();
+        let place_cofactors = place_cofactors(calibration, model, cofactors.as_ref(), unit);
+        let free = problem.sd[problem.layout().all_locals().end..].iter().filter(|&&sd| sd != 0.0).count();
         let mut solution = Self {
-            places: places.as_chunks().0[..calibration.stars.len()].to_vec(),
-            place_cofactors: vec![[[f64::NAN; 2]; 2]; calibration.stars.len()],
-            place_tests: vec![Tested::NONE; calibration.stars.len()],
-            parameters: parameters.to_vec(),
-            cofactors: vec![],
-            residuals: (0..calibration.images.len()).map(|i| sight.image(calibration, i).constant).collect(),
-            image_tests: vec![Tested::NONE; calibration.images.len()],
+            observations: calibration.observations(&sight, model, place_cofactors)?,
+            parameters: sight.parameters,
             axis_test: Tested::NONE,
-            axis_residual: sight.axis(calibration).map(|rows| rows.constant),
-            sums_of_squares: [0.0; 4],
+            cofactors: cofactors.map(|found| ParameterCofactors {
+                own: scaled(found.kept),
+                cross: scaled(found.kept_border),
+                common: scaled(found.border),
+            }),
+            whole: whole
+                .map(|(logarithm, cofactors)| (logarithm + free as f64 * unit.ln(), scaled(cofactors))),
             adjustment,
         };
         solution.test(problem, options.unit);
-        if let Some(cofactors) = solution.adjustment.cofactors.take() {
-            for (own, values) in solution.place_cofactors.iter_mut().zip(cofactors.local.as_chunks::<4>().0) {
-                let [a, b, c, d] = values.map(|value| value / unit);
-                *own = [[a, b], [c, d]];
-            }
-            let scaled = |values: &[f64]| values.iter().map(|value| value / unit).collect::<Vec<f64>>();
-            solution.cofactors = if cofactors.border.is_empty() {
-                scaled(&cofactors.kept)
-            } else {
-                let own = cofactors.kept.chunks_exact(9).zip(cofactors.kept_border.chunks_exact(3 * COMMON));
-                let rows = own.flat_map(|(own, cross)| {
-                    (0..3).flat_map(|i| [&own[3 * i..][..3], &cross[COMMON * i..][..COMMON]].concat())
-                });
-                scaled(&rows.chain(cofactors.border.iter().copied()).collect::<Vec<f64>>())
-            };
-        }
-        solution
+        Ok(solution)
     }
 
-    /// Hands redundancy numbers, test values and sums of squares to images, stars, axis and parameters.
+    /// Hands redundancy numbers and test values to images, stars and axis.
     fn test(&mut self, problem: &Problem<StarImages<'_>>, unit: f64) {
         let residuals = std::mem::take(&mut self.adjustment.residuals);
-        let redundancy = self.adjustment.redundancy.take();
-        for (group, kind) in problem.model.groups.iter().enumerate() {
-            let weighted = [residuals[2 * group], residuals[2 * group + 1]];
-            let redundancy: [f64; 2] =
-                std::array::from_fn(|row| redundancy.as_ref().map_or(f64::NAN, |all| all[2 * group + row]));
-            let standardized = std::array::from_fn(|row| standardized(weighted[row], unit, redundancy[row]));
-            let tested = Tested { redundancy, standardized };
-            let square = weighted[0] * weighted[0] + weighted[1] * weighted[1];
-            match *kind {
-                Group::Image(image) => {
-                    (self.image_tests[image], self.sums_of_squares[0]) =
-                        (tested, self.sums_of_squares[0] + square)
-                }
-                Group::Star(star) => {
-                    (self.place_tests[star], self.sums_of_squares[1]) =
-                        (tested, self.sums_of_squares[1] + square)
-                }
-                Group::Parameters(_) => self.sums_of_squares[2] += square,
-                Group::Axis => (self.axis_test, self.sums_of_squares[3]) = (tested, square),
+        let (model, redundancy) = (&problem.model, self.adjustment.redundancy.take());
+        let of_rows = |first: usize| {
+            let number = |row| redundancy.as_ref().map_or(f64::NAN, |all: &Vec<f64>| all[first + row]);
+            tested([residuals[first], residuals[first + 1]], unit, [0, 1].map(number))
+        };
+        let Observations { places, place_tests, image_tests, .. } = &mut self.observations;
+        for (group, &image) in model.images.iter().enumerate() {
+            image_tests[image] = of_rows(2 * group);
+        }
+        for (local, &star) in model.stars.iter().enumerate() {
+            if let Some(root) = model.catalogue[star] {
+                let weighted = root_times(&root, model.off_catalogue(star, places[star]));
+                place_tests[star] = tested(weighted, unit, self.adjustment.prior_redundancy(2 * local));
             }
         }
+        if let Some(tie) = model.ties.iter().position(|(tied, _)| matches!(tied, Tied::Axis(_))) {
+            let layout = problem.layout();
+            self.axis_test = of_rows(layout.groups() * layout.rows() + layout.tie_rows(tie).start);
+        }
+    }
+}
+
+fn tested(weighted: [f64; 2], unit: f64, redundancy: [f64; 2]) -> Tested {
+    let standardized = std::array::from_fn(|row| standardized(weighted[row], unit, redundancy[row]));
+    Tested { redundancy, standardized }
+}
+
+/// R v.
+pub(super) fn root_times(root: &Root, v: [f64; 2]) -> [f64; 2] {
+    root.map(|row| row[0] * v[0] + row[1] * v[1])
+}
+
+fn square(v: [f64; 2]) -> f64 {
+    v[0] * v[0] + v[1] * v[1]
+}
+
+/// Cofactors of places from those of the decorrelated coordinates (u, declination), right ascension being u - s declination.
+fn place_cofactors(
+    calibration: &Calibration,
+    model: &StarImages<'_>,
+    cofactors: Option<&Cofactors>,
+    unit: f64,
+) -> Vec<[[f64; 2]; 2]> {
+    let Some(cofactors) = cofactors else {
+        return vec![[[f64::NAN; 2]; 2]; calibration.stars.len()];
+    };
+    let mut found = vec![[[0.0; 2]; 2]; calibration.stars.len()];
+    for (&star, values) in model.stars.iter().zip(cofactors.local.as_chunks::<4>().0) {
+        if !calibration.stars[star].fixed {
+            let ([uu, ud, _, dd], s) = (values.map(|value| value / unit), model.shear(star));
+            let cross = ud - s * dd;
+            found[star] = [[uu - s * (ud + cross), cross], [cross, dd]];
+        }
+    }
+    found
+}
+
+impl Calibration {
+    /// Stars and images, not yet tested.
+    pub(super) fn observations(
+        &self,
+        sight: &Sight,
+        model: &StarImages<'_>,
+        place_cofactors: Vec<[[f64; 2]; 2]>,
+    ) -> Result<Observations, StellarError> {
+        let rows: Vec<_> = (0..self.images.len()).map(|image| model.image(sight, image)).collect();
+        let residuals: Vec<[f64; 2]> = rows.iter().map(|rows| rows.constant).collect();
+        let axis_residual = sight.axis(self).map(|rows| rows.constant);
+        Ok(Observations {
+            places: sight.places.clone(),
+            place_cofactors,
+            place_inverses: self.star_inverses(model, &rows)?,
+            place_tests: vec![Tested::NONE; self.stars.len()],
+            sums_of_squares: self.sums_of_squares(sight, model, &residuals, axis_residual),
+            residuals,
+            image_tests: vec![Tested::NONE; self.images.len()],
+            axis_residual,
+        })
+    }
+
+    /// Weighted sums of squares: images, stars, parameters, axis.
+    fn sums_of_squares(
+        &self,
+        sight: &Sight,
+        model: &StarImages<'_>,
+        residuals: &[[f64; 2]],
+        axis_residual: Option<[f64; 2]>,
+    ) -> [f64; 4] {
+        let images = model.images.iter().zip(&model.roots);
+        let stars = (0..self.stars.len()).filter_map(|star| {
+            let off = model.off_catalogue(star, sight.places[star]);
+            model.catalogue[star].map(|root| square(root_times(&root, off)))
+        });
+        let (mut parameters, mut axis) = (0.0, 0.0);
+        for (tied, _) in &model.ties {
+            match tied {
+                Tied::Axis(root) => axis = axis_residual.map_or(0.0, |v| square(root_times(root, v))),
+                Tied::Parameters(row) => parameters += self.off_given(sight, *row).powi(2),
+            }
+        }
+        let images = images.map(|(&image, root)| square(root_times(root, residuals[image]))).sum();
+        [images, stars.sum(), parameters, axis]
     }
 }

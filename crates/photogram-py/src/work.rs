@@ -1,0 +1,139 @@
+//! Work without the GIL: the threads that share it, and the signals and the progress that are looked after meanwhile.
+
+use std::cell::Cell;
+use std::ops::ControlFlow;
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use photocore::adjustment::{Event, Phase};
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::memory;
+use crate::solution::iteration_row;
+
+/// Between two looks at signals and progress.
+const PATIENCE: Duration = Duration::from_millis(50);
+/// Threads for each processor at the most: more only wait for each other, and thousands of them take minutes to start.
+const THREADS_EACH: usize = 4;
+/// Observed points up to which work stays on the calling thread, where the number of threads is not asked for: it takes some
+/// milliseconds, and to start threads and to hand work over takes as long.
+const SMALL: usize = 5000;
+
+/// What an adjustment asks for: threads, and something to be told.
+pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
+
+/// Who does work.
+pub enum Workers {
+    /// The calling thread; signals and progress are looked after between the phases of the work.
+    Caller,
+    /// So many threads, 0 for all processors; the calling thread watches.
+    Threads(usize),
+}
+
+impl Workers {
+    /// As many threads as asked for; where none are, the calling one when there are few observed points.
+    pub fn of(threads: usize, points: usize) -> Self {
+        if threads == 0 && points <= SMALL { Self::Caller } else { Self::Threads(threads) }
+    }
+}
+
+/// Works without the GIL. Signals and the caller's `progress` are looked after now and then, on this thread.
+///
+/// # Errors
+/// What a signal or `progress` raised; memory or threads that are not to be had.
+pub fn watched<T: Send, E: Send>(
+    py: Python<'_>,
+    workers: Workers,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&ThreadPool, Watch<'_>) -> Result<T, E> + Send,
+) -> PyResult<Result<T, E>> {
+    memory::arm()?;
+    let (own, started);
+    let pool: &ThreadPool = match workers {
+        Workers::Caller => {
+            own = calling_thread()?;
+            own
+        }
+        Workers::Threads(threads) => {
+            started = start(threads)?;
+            &started
+        }
+    };
+    let mut raised = None;
+    let mut last = Instant::now();
+    let mut watch = |event: Event| {
+        if memory::failed() {
+            return ControlFlow::Break(());
+        }
+        let due = matches!(event, Event::Iteration(_)) || last.elapsed() > PATIENCE;
+        if !due {
+            return ControlFlow::Continue(());
+        }
+        last = Instant::now();
+        match Python::attach(|py| tell(py, progress.as_ref(), event)) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                raised = Some(error);
+                ControlFlow::Break(())
+            }
+        }
+    };
+    let done = py.detach(|| work(pool, &mut watch));
+    match raised {
+        Some(error) => Err(error),
+        None if done.is_err() && memory::failed() => Err(memory::failure()),
+        None => {
+            // What is made of the result needs a reserve again.
+            memory::arm()?;
+            Ok(done)
+        }
+    }
+}
+
+/// The calling thread as a pool of one. A thread can be in one pool only and stays in it: it is made once for each.
+fn calling_thread() -> PyResult<&'static ThreadPool> {
+    thread_local! {
+        static POOL: Cell<Option<&'static ThreadPool>> = const { Cell::new(None) };
+    }
+    if let Some(pool) = POOL.get() {
+        return Ok(pool);
+    }
+    let pool = Box::leak(Box::new(built(ThreadPoolBuilder::new().num_threads(1).use_current_thread())?));
+    POOL.set(Some(pool));
+    Ok(pool)
+}
+
+/// So many new threads, and no more than are of use; 0 for all processors.
+fn start(threads: usize) -> PyResult<ThreadPool> {
+    static PROCESSORS: OnceLock<usize> = OnceLock::new();
+    let processors = *PROCESSORS.get_or_init(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let threads = if threads == 0 { processors } else { threads.min(THREADS_EACH * processors) };
+    built(ThreadPoolBuilder::new().num_threads(threads))
+}
+
+fn built(builder: ThreadPoolBuilder) -> PyResult<ThreadPool> {
+    builder.build().map_err(|error| memory::exhausted(&format!("threads cannot be started: {error}")))
+}
+
+fn tell(py: Python<'_>, progress: Option<&Py<PyAny>>, event: Event) -> PyResult<()> {
+    py.check_signals()?;
+    let Some(progress) = progress else { return Ok(()) };
+    match event {
+        Event::Progress { phase, done, total } => {
+            progress.call1(py, (phase_name(phase), done, total, None::<()>))
+        }
+        Event::Iteration(iteration) => {
+            progress.call1(py, ("iteration", iteration.number, 0, Some(iteration_row(&iteration))))
+        }
+    }
+    .map(drop)
+}
+
+fn phase_name(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Form => "form",
+        Phase::Solve => "solve",
+        Phase::Invert => "invert",
+    }
+}

@@ -1,0 +1,349 @@
+"""Adjustment of a block by least squares."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.adjustment.ends import behind, rounded, too_coarse, undetermined
+from photogram.adjustment.robust import Loss, loss_row, remark
+from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
+from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
+from photogram.memory import available_memory, threads_that_fit, turned
+from photogram.messages import Message, listed
+from photogram.network.block import Block, checked
+from photogram.network.refracted import check_cameras, remarks
+from photogram.results.adjusted import Iteration
+from photogram.results.result import Result
+
+__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "teller"]
+
+UnitVariance = Literal["free", "constrained", "unity"]
+Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
+
+
+NOTABLE_RISE = 1e-3
+"""Percent; less is rounding."""
+
+
+@dataclass(frozen=True)
+class AsPublished:
+    """The iteration of the 1987 program (GIANT guide, section 6).
+
+    Attributes
+    ----------
+    percent
+        Converged when the weighted sum of squares changes by less than this from one iteration to the next.
+    max_iterations
+        Limit of iterations.
+    """
+
+    percent: float = 5.0
+    max_iterations: int = 4
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far an adjustment has come.
+
+    Attributes
+    ----------
+    phase
+        `form` (with the factorisation), `solve`, `invert` (with cofactors), or `iteration` when one is over.
+    done, total
+        Points done of all, within the phase.
+    iteration
+        The iteration that is over.
+    """
+
+    phase: str
+    done: int
+    total: int
+    iteration: Iteration | None = None
+
+
+def adjust(
+    block: Block,
+    *,
+    unit_variance: UnitVariance = "constrained",
+    max_iterations: int | None = None,
+    tolerance: float = 1e-5,
+    as_published: AsPublished | None = None,
+    covariance: bool = True,
+    loss: Loss | None = None,
+    scale: float | None = None,
+    fix_photos: bool = False,
+    ordering: Ordering = "auto",
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Result:
+    """Adjust a block by least squares.
+
+    Every unknown is a weighted parameter, from free to fixed. Points that their image points cannot determine
+    are left out (the result's `messages` and `dropped` say which); the others start from the intersection of
+    their rays. Refraction, where the block has it, is applied in every iteration.
+
+    Parameters
+    ----------
+    block
+        The block.
+    unit_variance
+        What the variance of unit weight is based on (GIANT guide, Appendix E): every weighted quantity
+        (`constrained`), image coordinates and ground control only (`free`), or 1 (`unity`). Covariances are
+        scaled by it.
+    max_iterations
+        Iterations at the most. When None, 50 without a loss, and 200 with one: reweighting takes more of
+        them.
+    tolerance
+        Iterate until no unknown changes by more than this fraction of its standard deviation (a priori unit
+        weight), or until the rate of convergence shows that none would by more than a tenth of it. A step
+        that raises the sum of squares is damped (Levenberg-Marquardt).
+    as_published
+        Iterate as the 1987 program did instead.
+    covariance
+        Whether to compute covariances, redundancy numbers and standardized residuals.
+    loss
+        Robust loss in place of the squares of image coordinates: `huber` or `cauchy`, of both coordinates
+        of an image point together; None for least squares. Variance, covariances and redundancy numbers
+        hold for the weights as the loss has modified them (`image_weights`).
+    scale
+        Where the loss sets in, in standard deviations a priori; 1.50 for `huber` and 2.55 for `cauchy` when
+        None.
+    fix_photos
+        Keep positions and attitudes as they are: every point by itself.
+    ordering
+        How photos are ordered for elimination: in input order, in a narrow band (reverse Cuthill-McKee), by
+        approximate minimum degree, by nested dissection across their positions, or across their ties alone.
+        `auto` takes the one with the least predicted work.
+    threads
+        Number of threads, no more than four for each processor. When None, a block of a few thousand image
+        points stays on the calling thread, to which others would only be a burden; a larger one has all
+        processors. The result does not depend on it, to the last bit.
+    progress
+        Called now and then with what is going on; an exception it raises stops the adjustment.
+
+    Returns
+    -------
+    The result; its `status` says whether the adjustment converged.
+
+    Raises
+    ------
+    RankError
+        The observations do not determine all unknowns; names the photos and points concerned.
+    AdjustmentError
+        There is nothing to adjust, the initial values give no finite image coordinates, or double precision
+        is too coarse for coordinates so large; names the photos and points concerned.
+    OutOfMemoryError
+        The adjustment would take more memory than there is.
+    InputError
+        An option that cannot be, or a photo that is not above the water of the block.
+    KeyboardInterrupt
+        Ctrl-C.
+    """
+    if max_iterations is None:
+        max_iterations = 50 if loss is None else 200
+    checked(block)
+    truth_value("covariance", covariance)
+    truth_value("fix_photos", fix_photos)
+    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, progress)
+    processors = core_threads(threads)
+    row = loss_row(loss, scale)
+    if row and as_published:
+        raise InputError("the 1987 program has no robust loss: as_published or loss")
+    check_cameras(block)
+    if fix_photos:
+        block = block.replace(
+            photo_position_sd=0.0,
+            photo_attitude_sd=0.0,
+            photo_positions_observed=None,
+            photo_attitudes_observed=None,
+        )
+    positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
+
+    try:
+        solution = _photocore.adjust_block(
+            block.photo_positions,
+            block.photo_attitudes,
+            block.photo_positions if positions is None else positions,
+            block.photo_attitudes if attitudes is None else attitudes,
+            block.photo_position_sd,
+            block.photo_attitude_sd,
+            block.principal_distances,
+            block.point_positions,
+            block.point_sd,
+            block.image_photos,
+            block.image_points,
+            block.image_xy,
+            block.image_sd,
+            spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
+            photo_to_ground=block.photo_to_ground,
+            refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
+            criterion="percent" if as_published else "fraction",
+            limit=as_published.percent if as_published else tolerance,
+            max_iterations=as_published.max_iterations if as_published else max_iterations,
+            covariance=covariance,
+            loss=row,
+            ordering=ordering,
+            unit_variance=unit_variance,
+            threads=processors,
+            memory=None if _fits_anywhere(block) else available_memory(),
+            progress=None if progress is None else teller(progress),
+        )
+    except _photocore.BlockError as error:
+        raise _named(block, *error.args) from None
+    with turned("the adjusted block"):
+        return _result(block, solution, unit_variance, row, as_published)
+
+
+def _fits_anywhere(block: Block) -> bool:
+    """Whether a block is so small that asking how much memory there is would take longer than it needs.
+
+    A full factor of 100 photos takes 3 MB, and 10,000 image points with all their results 10 MB.
+    """
+    return len(block.photo_ids) <= 100 and len(block.image_xy) <= 10_000
+
+
+def _result(
+    block: Block,
+    solution: _photocore.BlockSolution,
+    unit_variance: UnitVariance,
+    row: tuple[str, float] | None,
+    as_published: AsPublished | None,
+) -> Result:
+    messages = _messages(block, solution) + remark(row, solution.image_weights)
+    if as_published:
+        messages += _rises([Iteration(*row) for row in solution.iterations])
+    return Result.from_solution(block, solution, unit_variance, row, messages)
+
+
+def teller(
+    progress: Callable[[Progress], None],
+) -> Callable[[str, int, int, _photocore.IterationRow | None], None]:
+    """Return what the core calls: it tells `progress`."""
+
+    def tell(phase: str, done: int, total: int, iteration: _photocore.IterationRow | None) -> None:
+        progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
+
+    return tell
+
+
+def _check_options(
+    unit_variance: str,
+    ordering: str,
+    max_iterations: int,
+    tolerance: float,
+    as_published: AsPublished | None,
+    progress: object,
+) -> None:
+    one_of("unit_variance", unit_variance, get_args(UnitVariance))
+    one_of("ordering", ordering, get_args(Ordering))
+    if as_published is not None and not isinstance(as_published, AsPublished):
+        raise InputError(f"as_published is an AsPublished or None, not {shown(as_published)}")
+    if whole_number("max_iterations", as_published.max_iterations if as_published else max_iterations) < 1:
+        raise InputError("there must be one iteration at least")
+    if not number("the criterion", as_published.percent if as_published else tolerance) > 0:
+        raise InputError("the criterion of convergence must be positive")
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress is no function: {shown(progress)}")
+
+
+def core_threads(threads: int | None) -> int:
+    """Return the number of threads for the core, a few for each processor at most; 0 leaves it to the core.
+
+    Raises
+    ------
+    InputError
+        It is no number, or not positive.
+    """
+    if threads is None:
+        processors = os.cpu_count() or 1
+        fit = threads_that_fit(processors)
+        return 0 if fit == processors else fit
+    if whole_number("threads", threads) < 1:
+        raise InputError(f"threads must be positive, not {threads}")
+    return threads_that_fit(min(threads, 4 * (os.cpu_count() or 1)))
+
+
+def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+    """Collect remarks on the block that did not stop the adjustment, the gravest first."""
+    by_reason: dict[str, list[str]] = {}
+    for point, reason in solution.dropped:
+        by_reason.setdefault(reason, []).append(block.point_ids[point])
+    error = None if solution.undetermined is None else _named(block, *solution.undetermined)
+    messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
+    messages += behind(block, solution)
+    messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
+    held = np.isfinite(block.point_sd) & (solution.point_rays > 0)[:, np.newaxis]
+    if not held.any() and not (block.photo_position_sd == 0).all():
+        messages.insert(
+            0, Message("there is no control: the datum of the block rests on the weights of its photos")
+        )
+    return messages + remarks(block, solution.photo_positions)
+
+
+def _rises(iterations: list[Iteration]) -> list[Message]:
+    """Remark on iterations after which the sum of squares was larger than before, rounding apart."""
+    messages = []
+    for before, after in pairwise(iterations):
+        percent = 100 * (after.weighted_sum_of_squares / before.weighted_sum_of_squares - 1)
+        if percent > NOTABLE_RISE:
+            messages.append(
+                Message(
+                    f"the weighted sum of squares rose by {percent:.2g} percent in iteration {after.number}"
+                )
+            )
+    return messages
+
+
+def _named(
+    block: Block, kind: str, message: str, photos: list[list[int]], points: list[int]
+) -> AdjustmentError:
+    """Put names to the indices of a failure of the core."""
+    point_names = [block.point_ids[i] for i in points]
+    if kind == "undetermined points":
+        seen = sorted({int(p) for p in block.image_photos[np.isin(block.image_points, points)]})
+        photo_names = [block.photo_ids[p] for p in seen]
+        text = f"the rays on photos {listed(photo_names)} do not determine the points {listed(point_names)}"
+        return RankError(text, photo_names, point_names)
+    if kind == "undetermined photos":
+        return _undetermined_photos(block, photos)
+    if kind == "no intersection":
+        return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
+    if kind == "coarse":
+        return too_coarse([block.photo_ids[i] for i in photos[0]], point_names)
+    if kind == "memory":
+        return OutOfMemoryError(message)
+    return AdjustmentError(message)
+
+
+def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankError:
+    concerned = sorted({photo for combination in combinations for photo in combination})
+    names = [block.photo_ids[photo] for photo in concerned]
+    points = np.unique(block.image_points[np.isin(block.image_photos, concerned)])
+    point_names = [block.point_ids[point] for point in points]
+    lines = [f"the observations leave {len(combinations)} combinations of unknowns undetermined:"]
+    for each in sorted(set(map(tuple, combinations))):
+        count = sum(tuple(combination) == each for combination in combinations)
+        on = np.unique(block.image_points[np.isin(block.image_photos, each)])
+        moved = (
+            f"all {len(each)} photos together"
+            if len(each) == len(block.photo_ids) > 1
+            else f"photos {listed([block.photo_ids[photo] for photo in each])}"
+        )
+        held = f"hold the points {listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
+        lines.append(f"  {count} moving {moved}, which {held}")
+    if not np.isfinite(block.point_sd).any():
+        weighted = np.isfinite(block.photo_position_sd).any()
+        remedy = (
+            "the standard deviations of the photos are too large to give a datum in double precision"
+            if weighted
+            else "standard deviations for the positions and attitudes of photos would give a datum"
+        )
+        lines.append(f"  there is no control; {remedy}")
+    return RankError("\n".join(lines), names, point_names)

@@ -1,0 +1,96 @@
+"""How an adjustment ended, where a reader must be careful: remarks and errors with the names concerned."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.errors import AdjustmentError
+from photogram.messages import Message, listed
+from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
+
+if TYPE_CHECKING:
+    from photogram import _photocore
+
+__all__ = ["behind", "hidden", "rounded", "too_coarse", "undetermined"]
+
+NOTABLE_EXCESS = 1e-5
+"""Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
+
+
+def undetermined(
+    block: Block, solution: _photocore.BlockSolution, error: AdjustmentError | None
+) -> list[Message]:
+    """Remark on what the adjusted values leave undetermined, `error`, or determine only weakly."""
+    messages = []
+    if error is not None:
+        messages.append(Message(f"there are no covariances: {error}"))
+    if solution.weak:
+        names = [*position_columns(block), *ATTITUDE_COLUMNS]
+        moved = [
+            f"{names[unknown].removesuffix('_deg')} of"
+            f" {listed([block.photo_ids[photo] for photo, other in solution.weak if other == unknown])}"
+            for unknown in sorted({unknown for _, unknown in solution.weak})
+        ]
+        messages.append(
+            Message(
+                "the sum of squares stands still, but the observations hardly determine a combination of"
+                f" unknowns that moves {'; '.join(moved)}: other values along it fit as well"
+            )
+        )
+    return messages
+
+
+def rounded(excess: float | None) -> list[Message]:
+    """Remark on cofactors and redundancy numbers that rounding has reached.
+
+    Parameters
+    ----------
+    excess
+        Sum of all redundancy numbers minus the degrees of freedom; None where it is not known.
+    """
+    if excess is None or abs(excess) <= NOTABLE_EXCESS:
+        return []
+    return [
+        Message(
+            f"the redundancy numbers sum to the degrees of freedom only within {abs(excess):.1g}: the network"
+            " holds together so weakly that standard deviations and test values lose digits to rounding, and"
+            " are about as wrong"
+        )
+    ]
+
+
+def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+    """Remark on image points whose point stands behind the camera."""
+    images = solution.images_behind
+    points = [block.point_ids[point] for point in np.unique(block.image_points[images])]
+    photos = [block.photo_ids[photo] for photo in np.unique(block.image_photos[images])]
+    return hidden(len(images), points, photos)
+
+
+def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:
+    """Remark on image points whose point stands behind the camera: no ray can have made them.
+
+    Parameters
+    ----------
+    images
+        How many there are; zero for no remark.
+    points, photos
+        Names of what is concerned; no photos where there is one only.
+    """
+    if not images:
+        return []
+    count = "1 image point has its" if images == 1 else f"{images} image points have their"
+    on = f" on photos {listed(photos)}" if photos else ""
+    return [Message(f"{count} point behind the camera: points {listed(points)}{on}")]
+
+
+def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:
+    """Name photos and points whose values double precision rounds too coarsely."""
+    parts = [f"{kind} {listed(names)}" for kind, names in (("photos", photos), ("points", points)) if names]
+    return AdjustmentError(
+        f"coordinates or angles of the {' and the '.join(parts)} are so large that double precision rounds"
+        " them by more than their standard deviations, or than image coordinates show: count from an origin"
+        " nearby (a standard deviation of 0 fixes a value)"
+    )

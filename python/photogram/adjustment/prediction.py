@@ -1,0 +1,147 @@
+"""Prediction: the covariances a block would have, from its geometry and weights alone.
+
+Covariances and redundancy numbers depend on where photos and points are and on the weights, not on what is
+measured. So a network can be judged before it is flown (GIANT guide, introduction: with a fictitious data
+generator "a user may predict results before using a set of photographs").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from photogram.adjustment.adjustment import Ordering, Progress, adjust
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import AdjustmentError, InputError
+from photogram.messages import Message, listed
+from photogram.network import geometry
+from photogram.network.block import Block, checked
+from photogram.results.result import Result
+
+__all__ = ["at_adjusted", "image_depths", "predict"]
+
+
+def predict(
+    block: Block,
+    *,
+    ordering: Ordering = "auto",
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Result:
+    """Predict the covariances and redundancy numbers of a block at its given positions and attitudes.
+
+    The image coordinates of the block are not read: they are computed from the given values, so that one
+    linearization is the adjustment. Which photo shows which point, and all standard deviations, are those of
+    the block; the variance of unit weight is 1.
+
+    Parameters
+    ----------
+    block
+        The planned block. Every point that has images needs its three coordinates; the standard deviations
+        say what of them is control.
+    ordering, threads, progress
+        As for :func:`photogram.adjust`.
+
+    Returns
+    -------
+    Positions are the given ones but for rounding, cofactors and covariances the same; residuals and
+    standardized residuals mean nothing.
+
+    Raises
+    ------
+    InputError
+        Points with images but without coordinates, or behind a photo that shows them, named.
+    RankError
+        The network does not determine all unknowns; names the photos and points concerned.
+    AdjustmentError
+        There is nothing to adjust, or rays are so nearly parallel that their points cannot be found.
+    """
+    _check_positions(checked(block))
+    images = block.image_photos, block.image_points
+    computed = geometry.project(
+        block.point_positions[images[1]],
+        block.photo_positions[images[0]],
+        block.photo_attitudes[images[0]],
+        block.principal_distances[images[0]],
+        spheroid=block.spheroid,
+        photo_to_ground=block.photo_to_ground,
+        refraction=block.refraction,
+        linear_unit=block.linear_unit,
+    )
+    result = adjust(
+        block.replace(image_xy=computed, photo_positions_observed=None, photo_attitudes_observed=None),
+        unit_variance="unity",
+        ordering=ordering,
+        threads=threads,
+        progress=progress,
+    )
+    if not result.converged:
+        raise AdjustmentError(f"the adjustment of computed image coordinates has {result.status}")
+    remark = Message("predicted: image coordinates are computed, not observed; residuals mean nothing")
+    return replace(result, messages=[remark, *result.messages])
+
+
+def at_adjusted(result: Result) -> Block:
+    """Return the block of an adjustment with adjusted for given values, ready for :func:`predict`.
+
+    Images of points that were left out are left out too.
+
+    Raises
+    ------
+    AdjustmentError
+        The adjustment has not converged.
+    """
+    if not result.converged:
+        raise AdjustmentError(f"the adjustment has {result.status}: its positions are no plan")
+    block, used = result.block, result.used_images
+    return block.replace(
+        photo_positions=result.photo_positions,
+        photo_attitudes=result.photo_attitudes,
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
+        point_positions=np.where(
+            result.used_points[:, np.newaxis], result.point_positions, block.point_positions
+        ),
+        image_photos=block.image_photos[used],
+        image_points=block.image_points[used],
+        image_xy=block.image_xy[used],
+        image_sd=block.image_sd[used],
+    )
+
+
+def image_depths(block: Block) -> Floats:
+    """Return how far the points of image observations are in front of the planes of their photos, (m,).
+
+    In the linear unit, along the axes of the photos: divided by the principal distance, the scale.
+    """
+    points, photos = block.point_positions, block.photo_positions
+    directions = geometry.viewing_directions(
+        photos, block.photo_attitudes, spheroid=block.spheroid, photo_to_ground=block.photo_to_ground
+    )
+    if block.spheroid is not None:
+        points = geometry.geographic_to_geocentric(points, block.spheroid)
+        photos = geometry.geographic_to_geocentric(photos, block.spheroid)
+    rays = points[block.image_points] - photos[block.image_photos]
+    depths: Floats = np.einsum("mi,mi->m", rays, directions[block.image_photos])
+    return depths
+
+
+def _check_positions(block: Block) -> None:
+    """Refuse points that cannot be projected: unknown, or behind a photo (collinearity knows no behind)."""
+    unknown = np.isnan(block.point_positions[block.image_points]).any(axis=1)
+    if unknown.any():
+        points = _names(block.point_ids, block.image_points[unknown])
+        raise InputError(
+            f"a prediction needs positions for all points with images; there are none for {points}"
+        )
+    behind = ~(image_depths(block) > 0)
+    if behind.any():
+        points = _names(block.point_ids, block.image_points[behind])
+        photos = _names(block.photo_ids, block.image_photos[behind])
+        raise InputError(f"not in front of the photos that show them ({photos}): {points}")
+
+
+def _names(ids: list[str], rows: Indices) -> str:
+    return listed([ids[row] for row in np.unique(rows)])

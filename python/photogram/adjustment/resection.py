@@ -1,0 +1,439 @@
+"""Resection: position and attitude of one photo from control points, without initial values.
+
+The model is that of the block (`docs/adjustment.md`); `docs/resection.md` says how the start is found, what
+the covariance holds for, and which configurations determine no pose.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram import _photocore
+from photogram.arguments.arrays import (
+    length,
+    names,
+    number,
+    numbers,
+    shaped,
+    shown,
+    truth_value,
+    whole_number,
+)
+from photogram.arguments.types import Floats
+from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.messages import Message
+from photogram.network.geometry import Spheroid
+from photogram.results.adjusted import Iteration
+
+__all__ = ["Pose", "Resection", "resect"]
+
+
+REASONS = {
+    "too few points": "fewer than three points do not determine a pose",
+    "collinear": "the points are on one line, about which the photo can turn",
+    "danger cylinder": (
+        "the projection centre is on the danger cylinder, the right cylinder over the circle through three"
+        " points, where these do not determine the pose"
+    ),
+    "undetermined": "the observations do not determine the pose",
+}
+"""What :class:`RankError` says, by the kind of failure."""
+DOUBTFUL = 3.0
+"""A station is near the danger cylinder when it is within this multiple of its standard deviation."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A position and an attitude.
+
+    Attributes
+    ----------
+    position
+        (3,) X, Y, Z, or longitude (rad), latitude (rad), height.
+    attitude
+        (3,) omega, phi, kappa in radians.
+    weighted_sum_of_squares
+        Of the adjustment that ended there; NaN where there was none.
+    """
+
+    position: Floats
+    attitude: Floats
+    weighted_sum_of_squares: float = math.nan
+
+    @classmethod
+    def of(cls, values: ArrayLike, weighted_sum_of_squares: float = math.nan) -> Self:
+        """Return the pose of six values, position first."""
+        six = np.asarray(values, dtype=np.float64)
+        return cls(six[:3], six[3:], weighted_sum_of_squares)
+
+
+@dataclass(frozen=True, eq=False)
+class Resection:
+    """A resected photo with n control points, in the order of the input.
+
+    Positions are X, Y, Z or longitude (rad), latitude (rad), height; angles are radians, image coordinates
+    millimetres. Cofactors hold for a priori unit weight; covariances are cofactors times the variance of unit
+    weight.
+
+    Attributes
+    ----------
+    status
+        `converged`, `not converged` or `diverged`.
+    messages
+        Remarks: other poses that fit, a station near the danger cylinder, no redundancy.
+    position, attitude
+        (3,) each: the projection centre, and omega, phi, kappa.
+    cofactors
+        (6, 6): position, then attitude.
+    pose_redundancy
+        (6,) redundancy numbers of position and attitude as observations; 0 unless they were weighted.
+    point_positions, point_cofactors, point_redundancy
+        (n, 3), (n, 3, 3) and (n, 3): adjusted control, its cofactors, and the redundancy numbers of its
+        coordinates as observations; 0 unless weighted.
+    residuals, redundancy, standardized
+        (n, 2) each: observed minus computed in millimetres, redundancy numbers, and residual / (standard
+        deviation x root of redundancy number) for a priori unit weight (Baarda's w; NaN without redundancy).
+    weighted_sum_of_squares, degrees_of_freedom
+        Of everything observed: image coordinates, weighted control, weighted position and attitude.
+    start
+        The pose from which the adjustment started.
+    iterations
+        The history.
+    alternatives
+        Other poses that fit about as well: minima whose weighted sum of squares is larger by at most nine
+        variances of unit weight. With three points there are often one to three of them.
+    outside_danger_cylinder
+        Distance of the projection centre from the danger cylinder, negative inside; None unless there are
+        exactly three points.
+    """
+
+    status: str
+    messages: list[Message]
+    position: Floats
+    attitude: Floats
+    cofactors: Floats
+    pose_redundancy: Floats
+    point_positions: Floats
+    point_cofactors: Floats
+    point_redundancy: Floats
+    residuals: Floats
+    redundancy: Floats
+    standardized: Floats
+    weighted_sum_of_squares: float
+    degrees_of_freedom: int
+    start: Pose
+    iterations: list[Iteration]
+    alternatives: list[Pose]
+    outside_danger_cylinder: float | None
+
+    @property
+    def converged(self) -> bool:
+        """Whether the criterion of convergence was met."""
+        return self.status == "converged"
+
+    @property
+    def variance_of_unit_weight(self) -> float | None:
+        """Weighted sum of squares / degrees of freedom; None without degrees of freedom."""
+        return self.weighted_sum_of_squares / self.degrees_of_freedom if self.degrees_of_freedom > 0 else None
+
+    @property
+    def covariance(self) -> Floats:
+        """(6, 6) covariance of position and attitude: cofactors x variance of unit weight, if any."""
+        variance = self.variance_of_unit_weight
+        return self.cofactors if variance is None else self.cofactors * variance
+
+    @property
+    def sd(self) -> Floats:
+        """(6,) standard deviations of position and attitude, from `covariance`."""
+        deviations: Floats = np.sqrt(np.diagonal(self.covariance))
+        return deviations
+
+
+def resect(
+    object_points: ArrayLike,
+    image_xy: ArrayLike,
+    principal_distance: float,
+    *,
+    image_sd: ArrayLike = 0.010,
+    object_sd: ArrayLike = 0.0,
+    position: ArrayLike | None = None,
+    position_sd: ArrayLike = math.inf,
+    attitude: ArrayLike | None = None,
+    attitude_sd: ArrayLike = math.inf,
+    spheroid: Spheroid | None = None,
+    photo_to_ground: bool = False,
+    point_ids: Sequence[str] | None = None,
+    max_iterations: int = 200,
+    tolerance: float = 1e-5,
+) -> Resection:
+    """Resect a photo: its position and attitude from control points, without initial values.
+
+    Well-spread triples of points give poses directly (Grunert's problem in the form of Persson and Nordberg,
+    2018); each is checked against all points, those that fit are adjusted, and the one with the least sum of
+    squares is the result. Others that fit about as well are its `alternatives`.
+
+    Parameters
+    ----------
+    object_points
+        (n, 3) control: X, Y, Z, or longitude (rad), latitude (rad), height when a spheroid is given.
+    image_xy
+        (n, 2) image coordinates in millimetres, reduced to the principal point and free of distortion.
+    principal_distance
+        Millimetres: negative for the positive (diapositive) plane, positive for the negative plane.
+    image_sd
+        Their standard deviations in millimetres: a number or (n, 2).
+    object_sd
+        Standard deviations of control in the units of its coordinates: a number, (3,) or (n, 3); 0 fixes it.
+    position, position_sd
+        (3,) known position and its standard deviations (a number or (3,)): infinite free, 0 fixed, weighted
+        between.
+    attitude, attitude_sd
+        (3,) known omega, phi, kappa in radians, likewise.
+    spheroid, photo_to_ground
+        As in :class:`photogram.Block`.
+    point_ids
+        Names for messages; 1 to n by default.
+    max_iterations, tolerance
+        Iterate until no unknown changes by more than this fraction of its standard deviation (a priori unit
+        weight).
+
+    Returns
+    -------
+    The pose with its covariance, and every observation with its residual, redundancy number and test value.
+
+    Raises
+    ------
+    RankError
+        Fewer than three points, points on one line, a station on the danger cylinder, or observations that
+        otherwise leave the pose undetermined; the message says which.
+    AdjustmentError
+        No position sees the points in front of the camera as the image shows them.
+    InputError
+        Arrays of the wrong shape, values that are not finite, standard deviations that are none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from photogram import resect
+    >>> from photogram.geometry import project
+    >>> ground = np.array([[0.0, 0, 10], [800, 50, 20], [750, 900, 0], [30, 820, 40], [400, 420, 5]])
+    >>> station, angles = np.array([390.0, 430.0, 1500.0]), np.array([0.02, -0.03, 1.5])
+    >>> xy = project(ground, np.tile(station, (5, 1)), np.tile(angles, (5, 1)), np.full(5, -152.0))
+    >>> photo = resect(ground, xy, -152.0, image_sd=0.005)
+    >>> photo.position.round(3).tolist(), photo.attitude.round(6).tolist()
+    ([390.0, 430.0, 1500.0], [0.02, -0.03, 1.5])
+    """
+    if spheroid is not None and not isinstance(spheroid, Spheroid):
+        raise InputError(f"spheroid is a Spheroid or None, not {shown(spheroid)}")
+    truth_value("photo_to_ground", photo_to_ground)
+    given = Observed.checked(object_points, object_sd, image_xy, image_sd, principal_distance, point_ids)
+    known = np.concatenate(
+        [_known("position", position, position_sd), _known("attitude", attitude, attitude_sd)]
+    )
+    limit = number("tolerance", tolerance)
+    if whole_number("max_iterations", max_iterations) < 1 or not 0 < limit < math.inf:
+        raise InputError("there must be one iteration at least, and a positive criterion of convergence")
+    solution = solve(
+        given,
+        known=known,
+        known_sd=np.concatenate(
+            [_deviations("position_sd", position_sd, (3,)), _deviations("attitude_sd", attitude_sd, (3,))]
+        ),
+        spheroid=spheroid,
+        photo_to_ground=photo_to_ground,
+        limit=limit,
+        max_iterations=max_iterations,
+    )
+    return Resection(
+        status=solution.status,
+        messages=_messages(solution, spheroid),
+        position=solution.pose[:3],
+        attitude=solution.pose[3:],
+        cofactors=solution.cofactors,
+        pose_redundancy=solution.pose_redundancy,
+        point_positions=solution.point_positions,
+        point_cofactors=solution.point_cofactors,
+        point_redundancy=solution.point_redundancy,
+        residuals=solution.residuals,
+        redundancy=solution.redundancy,
+        standardized=solution.standardized,
+        weighted_sum_of_squares=solution.sum_of_squares,
+        degrees_of_freedom=solution.degrees_of_freedom,
+        start=Pose.of(solution.start),
+        iterations=[Iteration(*row) for row in solution.iterations],
+        alternatives=[Pose.of(*other) for other in solution.alternatives],
+        outside_danger_cylinder=solution.outside_danger_cylinder,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """What a photo shows: control (n, 3), images (n, 2), their standard deviations, n names."""
+
+    points: Floats
+    point_sd: Floats
+    xy: Floats
+    xy_sd: Floats
+    principal_distance: float
+    names: list[str]
+
+    @classmethod
+    def checked(
+        cls,
+        points: ArrayLike,
+        point_sd: ArrayLike,
+        xy: ArrayLike,
+        xy_sd: ArrayLike,
+        principal_distance: float,
+        point_ids: Sequence[str] | None,
+    ) -> Self:
+        """Check what a caller gave.
+
+        Raises
+        ------
+        InputError
+            Another shape, a value that is not finite, or a standard deviation that is none.
+        """
+        count = length("image_xy", xy)
+        ids = [str(i + 1) for i in range(count)] if point_ids is None else names("point_ids", point_ids)
+        if len(ids) != count:
+            raise InputError(f"point_ids has {len(ids)} names, but image_xy has {count} rows")
+        made = cls(
+            points=shaped("object_points", points, (count, 3)),
+            point_sd=_deviations("object_sd", point_sd, (count, 3)),
+            xy=shaped("image_xy", xy, (count, 2)),
+            xy_sd=_deviations("image_sd", xy_sd, (count, 2)),
+            principal_distance=number("principal_distance", principal_distance),
+            names=ids,
+        )
+        checks = [
+            ("object_points", made.points, np.isfinite(made.points), "is not finite"),
+            ("object_sd", made.point_sd, np.isfinite(made.point_sd), "is not a finite standard deviation"),
+            ("image_xy", made.xy, np.isfinite(made.xy), "is not finite"),
+            (
+                "image_sd",
+                made.xy_sd,
+                (made.xy_sd > 0) & np.isfinite(made.xy_sd),
+                "is not positive and finite",
+            ),
+        ]
+        for name, values, good, why in checks:
+            rows = np.flatnonzero(~good.all(axis=1))
+            if rows.size:
+                raise InputError(f"{name} of point {ids[rows[0]]} {why}: {values[rows[0]].tolist()}")
+        if not math.isfinite(made.principal_distance) or made.principal_distance == 0:
+            raise InputError(f"the principal distance cannot be {made.principal_distance}")
+        return made
+
+
+def solve(
+    observed: Observed,
+    *,
+    limit: float,
+    max_iterations: int,
+    criterion: Literal["fraction", "position"] = "fraction",
+    at_measured: bool = False,
+    known: Floats | None = None,
+    known_sd: Floats | None = None,
+    start: Floats | None = None,
+    spheroid: Spheroid | None = None,
+    photo_to_ground: bool = False,
+) -> _photocore.ResectionSolution:
+    """Resect with everything the core offers: :func:`resect` and the programs on top of it call this.
+
+    Raises
+    ------
+    RankError
+        The pose is not determined; the message says why.
+    AdjustmentError
+        Any other failure.
+    """
+    try:
+        return _photocore.resect(
+            observed.points,
+            observed.point_sd,
+            observed.xy,
+            observed.xy_sd,
+            observed.principal_distance,
+            known=np.full(6, np.nan) if known is None else known,
+            known_sd=np.full(6, np.inf) if known_sd is None else known_sd,
+            start=start,
+            spheroid=None if spheroid is None else (spheroid.a, spheroid.b),
+            photo_to_ground=photo_to_ground,
+            at_measured=at_measured,
+            criterion=criterion,
+            limit=limit,
+            max_iterations=max_iterations,
+            covariance=True,
+        )
+    except _photocore.ResectionError as error:
+        kind, message = error.args
+        if kind in REASONS:
+            raise RankError(REASONS[kind], [], observed.names) from None
+        raise AdjustmentError(message) from None
+
+
+def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    """Return standard deviations; a row of three stands for every point."""
+    array = numbers(name, value)
+    if len(shape) == 2 and array.shape == shape[1:]:
+        array = np.broadcast_to(array, shape)
+    deviations = shaped(name, array, shape)
+    if not (deviations >= 0).all():
+        raise InputError(f"{name} holds what is no standard deviation: {deviations[~(deviations >= 0)][0]}")
+    return deviations
+
+
+def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
+    """Return known values, NaN where nothing is known."""
+    if value is None:
+        if np.isfinite(numbers(f"{name}_sd", sd)).any():
+            raise InputError(f"{name}_sd is finite, but {name} is not given")
+        return np.full(3, np.nan)
+    values = shaped(name, value, (3,))
+    if not np.isfinite(values).all():
+        raise InputError(f"{name} is not finite: {values.tolist()}")
+    return values
+
+
+def _messages(solution: _photocore.ResectionSolution, spheroid: Spheroid | None) -> list[Message]:
+    """Collect what a user should know before trusting the pose."""
+    messages = []
+    count = len(solution.alternatives)
+    if count:
+        messages.append(
+            Message(
+                f"{count} other pose{'s fit' if count > 1 else ' fits'} about as well;"
+                " more points, or a known position or attitude, would tell which is right"
+            )
+        )
+    if solution.undetermined is not None:
+        messages.append(
+            Message(f"another pose that fits is not determined: {REASONS[solution.undetermined]}")
+        )
+    outside = solution.outside_danger_cylinder
+    if outside is not None and abs(outside) < DOUBTFUL * _largest_position_sd(solution, spheroid):
+        messages.append(
+            Message(
+                f"the projection centre is {abs(outside):.4g} from the danger cylinder of the points, less"
+                f" than {DOUBTFUL:g} standard deviations: its covariance is too optimistic there"
+            )
+        )
+    if solution.degrees_of_freedom == 0:
+        messages.append(Message("there is no redundancy: nothing checks the observations"))
+    return messages
+
+
+def _largest_position_sd(solution: _photocore.ResectionSolution, spheroid: Spheroid | None) -> float:
+    """Return the largest standard deviation of the position, in the linear unit (a priori unit weight)."""
+    metric = (
+        np.ones(3) if spheroid is None else np.array([spheroid.a * np.cos(solution.pose[1]), spheroid.a, 1.0])
+    )
+    cofactors = solution.cofactors[:3, :3] * np.outer(metric, metric)
+    return math.sqrt(float(np.linalg.eigvalsh(cofactors)[-1])) if np.isfinite(cofactors).all() else math.inf

@@ -1,0 +1,464 @@
+"""Blunders found by the adjustment: data snooping, one after the other (Appendix H, 3-sigma rule).
+
+A gross error spoils the test values of its neighbours. So only the largest of a neighbourhood is taken out
+before the block is adjusted anew, and the others are judged again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.adjustment.adjustment import adjust
+from photogram.checks.findings import Finding, Section
+from photogram.checks.gross import Suspects
+from photogram.checks.predictions import (
+    exchange,
+    exchanged_pair,
+    exchanged_where_rays_meet,
+    freed,
+    tests_of_predictions,
+)
+from photogram.checks.rays import Rays
+from photogram.checks.robust import critical, mad_sd
+from photogram.errors import AdjustmentError
+from photogram.network.block import Block
+from photogram.results.result import Result
+
+__all__ = ["Edited", "edit"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Adjust = Callable[[Block], Result]
+
+ROUNDS = 20
+"""Adjustments at the most."""
+TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
+"""Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
+
+Precise control at the edge of a block has a redundancy of a thousandth; its test value still means something.
+"""
+COMPARABLE = 0.4
+"""Of the largest test value of a round: what is smaller may be its consequence and is judged again."""
+HOPELESS = 5.0
+"""Spread of the test values above which photos that did not fit before the adjustment are left out.
+
+Nor is what such an adjustment says held against what was found before."""
+EXCHANGES = 5
+"""Pairs of control points that are exchanged back, at the most."""
+LOOSE = 0.01
+"""Standard deviation of control that strains no block, as a part of the flying height."""
+BLUNDER = 3.0
+SHOWN = 20
+
+
+@dataclass
+class Edited:
+    """The adjustment and what was taken out of it.
+
+    Attributes
+    ----------
+    first, last
+        The first and the last adjustment; None where it cannot be done.
+    reason
+        Why it cannot.
+    spread
+        Robust standard deviation of the last test values: 1 when the weights are right.
+    section
+        The blunder list.
+    control
+        Findings on control, by point: which components were taken out.
+    exchanged
+        Pairs of control points that had each other's coordinates.
+    cleared
+        Control points that were left out as suspects and agree with their predictions.
+    asked
+        Whether an adjustment was wanted.
+    """
+
+    first: Result | None
+    last: Result | None
+    reason: str
+    spread: float
+    section: Section
+    control: dict[str, list[Finding]] = field(default_factory=dict)
+    exchanged: list[tuple[str, str]] = field(default_factory=list)
+    cleared: list[str] = field(default_factory=list)
+    asked: bool = True
+
+
+@dataclass(frozen=True)
+class _Suspect:
+    """One observation: its kind, its place in the arrays of the block, and its test value."""
+
+    kind: str
+    row: int
+    axis: int
+    test: float
+
+
+def edit(block: Block, suspects: Suspects, **options: Any) -> Edited:
+    """Adjust a block and take out what does not fit, the largest of a neighbourhood at a time.
+
+    Control points that agree with each other's predictions are exchanged back, and all is done anew.
+
+    Parameters
+    ----------
+    block
+        The block, with its orientations right way up.
+    suspects
+        Gross errors known already. Images are left out from the beginning, photos when the block does not fit
+        with them; control is left out until its prediction has judged it.
+    options
+        Of :func:`photogram.adjust`.
+    """
+    section = blunder_section()
+
+    def adjusted(changed: Block) -> Result:
+        return adjust(changed, **options)
+
+    current = kept_images(block, ~suspects.images)
+    left = np.flatnonzero(suspects.control)
+    exchanged: list[tuple[str, str]] = []
+    try:
+        first = _as_it_is(current, adjusted) if left.size else None
+        while True:
+            section = blunder_section()
+            start, fewer = _first(freed(current, left), suspects.photos, adjusted, section)
+            first = first or start
+            if not start.converged and not exchanged:
+                pair = exchanged_where_rays_meet(current)
+                if pair is not None and adjusted(exchange(current, *pair)).converged:
+                    exchanged.append(_names(block, pair))
+                    current, left = exchange(current, *pair), np.setdiff1d(left, pair)
+                    continue
+                left = np.union1d(left, _gross_control(fewer, adjusted))
+                start = adjusted(freed(fewer, left))
+                fewer = start.block
+            last, spread, control = _snoop(start, fewer, adjusted, section)
+            doubtful = np.union1d(left, [block.point_ids.index(name) for name in control]).astype(np.int64)
+            pair = _exchanged(last, current, doubtful, spread, adjusted) if last.converged else None
+            if pair is None or len(exchanged) == EXCHANGES:
+                break
+            exchanged.append(_names(block, pair))
+            current, left = exchange(current, *pair), np.setdiff1d(left, pair)
+        cleared: list[str] = []
+        if left.size and last.converged:
+            last, spread = _judged(last, current, left, spread, adjusted, section, control)
+            cleared = [block.point_ids[point] for point in left if block.point_ids[point] not in control]
+    except AdjustmentError as error:
+        return Edited(None, None, str(error), float("nan"), section)
+    _list(last, spread, section)
+    return Edited(first, last, "", spread, section, control, exchanged, cleared)
+
+
+def _names(block: Block, pair: tuple[int, int]) -> tuple[str, str]:
+    return block.point_ids[pair[0]], block.point_ids[pair[1]]
+
+
+def _as_it_is(block: Block, adjusted: Adjust) -> Result | None:
+    """Adjust with all control, for the record."""
+    try:
+        return adjusted(block)
+    except AdjustmentError:
+        return None
+
+
+def _gross_control(block: Block, adjusted: Adjust) -> Indices:
+    """Return the control points without which a block that does not converge does so with loose control.
+
+    With standard deviations of a hundredth of the flying height, control strains no block, and what is wrong
+    by many times that shows.
+    """
+    rays = Rays.of(block)
+    away = np.linalg.norm(
+        rays.intersect().positions[block.image_points] - rays.centres[block.image_photos], axis=1
+    )
+    if not np.isfinite(away).any():
+        return np.empty(0, dtype=np.int64)
+    loose = LOOSE * float(np.nanmedian(away))
+    per_unit = np.array([block.spheroid.a, block.spheroid.a, 1.0] if block.spheroid else [1.0] * 3)
+    held = np.isfinite(block.point_sd)
+    relaxed = block.replace(point_sd=np.where(held, np.maximum(block.point_sd, loose / per_unit), np.inf))
+    try:
+        _, _, control = _snoop(adjusted(relaxed), relaxed, adjusted, blunder_section())
+    except AdjustmentError:
+        return np.empty(0, dtype=np.int64)
+    return np.array([block.point_ids.index(name) for name in control], dtype=np.int64)
+
+
+def _exchanged(
+    result: Result, given: Block, points: Indices, spread: float, adjusted: Adjust
+) -> tuple[int, int] | None:
+    """Find two of some doubtful control points that are exchanged."""
+    points = points[np.isfinite(given.point_sd[points]).any(axis=1) & result.used_points[points]]
+    if len(points) < 2:
+        return None
+    if np.isfinite(result.block.point_sd[points]).any():
+        try:
+            result = adjusted(freed(result.block, points))
+        except AdjustmentError:
+            return None
+    return exchanged_pair(result, given, points, spread) if result.converged else None
+
+
+def _judged(
+    result: Result,
+    given: Block,
+    points: Indices,
+    spread: float,
+    adjusted: Adjust,
+    section: Section,
+    control: dict[str, list[Finding]],
+) -> tuple[Result, float]:
+    """Hold what agrees with its prediction of the control that was left out, and report the rest."""
+    errors, tests = tests_of_predictions(result, given, points, spread)
+    limit = critical(int(np.isfinite(given.point_sd).sum()))
+    point_sd = result.block.point_sd.copy()
+    for row, error, test in zip(points.tolist(), errors, np.abs(tests), strict=True):
+        for axis in np.flatnonzero(test > limit).tolist():
+            finding = _control_finding(given, row, axis, float(error[axis]), float(test[axis]) * spread)
+            control.setdefault(given.point_ids[row], []).append(finding)
+        fits = test <= limit
+        point_sd[row, fits] = given.point_sd[row, fits]
+    if (point_sd == result.block.point_sd).all():
+        return result, spread
+    held = result.block.replace(point_sd=point_sd)
+    last, spread, more = _snoop(adjusted(held), held, adjusted, section)
+    for name, findings in more.items():
+        control.setdefault(name, []).extend(findings)
+    return last, spread
+
+
+def blunder_section() -> Section:
+    """Return the blunder list without entries."""
+    return Section(
+        "Blunders (adjustment, 3-sigma rule)",
+        "A residual beyond three of its standard deviations is suspect; what is taken out is named below.",
+    )
+
+
+def kept_images(block: Block, kept: Mask) -> Block:
+    """Return a block with some of its images."""
+    names = ("image_photos", "image_points", "image_xy", "image_sd")
+    return block.replace(**{name: getattr(block, name)[kept] for name in names})
+
+
+def without_photos(block: Block, photos: Mask) -> Block:
+    """Return a block without some of its photos and their images."""
+    fewer = kept_images(block, ~photos[block.image_photos])
+    number = np.cumsum(~photos) - 1
+    names = (
+        "photo_positions",
+        "photo_attitudes",
+        "principal_distances",
+        "photo_position_sd",
+        "photo_attitude_sd",
+    )
+    return fewer.replace(
+        photo_ids=[name for name, gone in zip(block.photo_ids, photos.tolist(), strict=True) if not gone],
+        image_photos=number[fewer.image_photos],
+        **{name: getattr(block, name)[~photos] for name in names},
+    )
+
+
+def _first(block: Block, bad: Mask, adjusted: Adjust, section: Section) -> tuple[Result, Block]:
+    """Adjust with all photos, or without those bad ones with which the block does not fit."""
+    error = None
+    if not bad.any():
+        return adjusted(block), block
+    try:
+        result = adjusted(block)
+        if result.converged and mad_sd(result.standardized) < HOPELESS:
+            photos = np.flatnonzero(bad)
+            own = [mad_sd(result.standardized[block.image_photos == photo]) for photo in photos]
+            bad = np.zeros_like(bad)
+            bad[photos[[not size < HOPELESS for size in own]]] = True
+            if not bad.any():
+                return result, block
+    except AdjustmentError as caught:
+        error = caught
+    fewer = without_photos(block, bad)
+    names = [name for name, of in zip(block.photo_ids, bad.tolist(), strict=True) if of]
+    section.lines.append(f"adjusted without the photos that do not fit: {', '.join(names)}")
+    if error is not None:
+        section.lines.append(f"with them: {error}")
+    return adjusted(fewer), fewer
+
+
+def _snoop(
+    first: Result, block: Block, adjusted: Adjust, section: Section
+) -> tuple[Result, float, dict[str, list[Finding]]]:
+    result = first
+    control: dict[str, list[Finding]] = {}
+    for step in range(ROUNDS):
+        spread = max(mad_sd(result.standardized), np.finfo(np.float64).tiny)
+        suspects = _largest(result, spread)
+        if not suspects or not result.converged or step == ROUNDS - 1:
+            break
+        for suspect in suspects:
+            finding = _finding(result, suspect)
+            if suspect.kind == "control":
+                control.setdefault(finding.points[0], []).append(finding)
+            else:
+                section.findings.append(finding)
+        block = _without(result.block, suspects)
+        try:
+            result = adjusted(block)
+        except AdjustmentError as error:
+            section.lines.append(f"without these it cannot be adjusted: {error}")
+            break
+    return result, spread, control
+
+
+def tests(result: Result) -> dict[str, Floats]:
+    """Test values by kind, in standard deviations of the residuals; 0 where nothing checks."""
+    block = result.block
+    images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
+    stations = np.hstack(
+        [result.photo_positions - block.photo_positions, result.photo_attitudes - block.photo_attitudes]
+    )
+    stations[:, 3:] -= 2 * np.pi * np.round(stations[:, 3:] / (2 * np.pi))
+    station_sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
+    return {
+        "image": np.nan_to_num(images),
+        "control": _prior_tests(result.point_differences, block.point_sd, result.point_redundancy),
+        "station": _prior_tests(stations, station_sd, result.photo_redundancy),
+    }
+
+
+def _prior_tests(differences: Floats, sd: Floats, redundancy: Floats) -> Floats:
+    """Test values of observed unknowns."""
+    testable = np.isfinite(sd) & (sd > 0) & (np.nan_to_num(redundancy) > TESTABLE_PRIOR)
+    values = np.zeros(differences.shape)
+    values[testable] = np.abs(differences[testable]) / (sd[testable] * np.sqrt(redundancy[testable]))
+    return np.nan_to_num(values)
+
+
+def _largest(result: Result, spread: float) -> list[_Suspect]:
+    """Return the observations beyond the critical value that are the largest of their neighbourhood."""
+    values = tests(result)
+    limit = critical(sum(int((each > 0).sum()) for each in values.values())) * spread
+    beyond = [
+        _Suspect(kind, int(row), int(axis), float(each[row, axis]))
+        for kind, each in values.items()
+        for row, axis in np.argwhere(each > limit)
+    ]
+    beyond.sort(key=lambda each: -each.test)
+    if not beyond or beyond[0].kind != "image":
+        # An error of control or of a station spoils test values far away: nothing is taken out with it.
+        return beyond[:1]
+    taken: list[_Suspect] = []
+    photos: set[int] = set()
+    points: set[int] = set()
+    for suspect in beyond:
+        if suspect.kind != "image" or suspect.test < COMPARABLE * beyond[0].test:
+            break
+        photo = int(result.block.image_photos[suspect.row])
+        point = int(result.block.image_points[suspect.row])
+        if photo not in photos and point not in points:
+            taken.append(suspect)
+            photos.add(photo)
+            points.add(point)
+    return taken
+
+
+def _without(block: Block, suspects: list[_Suspect]) -> Block:
+    """Leave out images; give up the weights of components of control and of stations."""
+    point_sd = block.point_sd.copy()
+    station_sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
+    kept = np.ones(len(block.image_xy), dtype=bool)
+    for suspect in suspects:
+        if suspect.kind == "image":
+            kept[suspect.row] = False
+        elif suspect.kind == "control":
+            point_sd[suspect.row, suspect.axis] = np.inf
+        else:
+            station_sd[suspect.row, suspect.axis] = np.inf
+    changed = block.replace(
+        point_sd=point_sd, photo_position_sd=station_sd[:, :3], photo_attitude_sd=station_sd[:, 3:]
+    )
+    return kept_images(changed, kept)
+
+
+def _finding(result: Result, suspect: _Suspect) -> Finding:
+    if suspect.kind == "image":
+        return _image_finding(result, suspect)
+    if suspect.kind == "control":
+        row, axis = suspect.row, suspect.axis
+        error = -float(result.point_differences[row, axis] / result.point_redundancy[row, axis])
+        return _control_finding(result.block, row, axis, error, suspect.test)
+    name = result.block.photo_ids[suspect.row]
+    what = ("first", "second", "third")[suspect.axis % 3] + (" coordinate" if suspect.axis < 3 else " angle")
+    text = f"the {what} of station {name} contradicts its standard deviation (test value {suspect.test:.1f})"
+    return Finding("station-misfit", "grave", text, [name], [], {"test_value": suspect.test})
+
+
+def _control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
+    """Say that a component of control does not fit; `error` is that of the given value."""
+    angle = block.geographic and axis < 2
+    unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
+    component = (("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z"))[axis]
+    name = block.point_ids[row]
+    text = (
+        f"{component} of control point {name} does not fit (test value {test:.1f}):"
+        f" its error is about {error:.3f} {unit}"
+    )
+    values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
+    return Finding("control-misfit", "grave", text, [], [name], values)
+
+
+def _image_finding(result: Result, suspect: _Suspect) -> Finding:
+    block, row, axis = result.block, suspect.row, suspect.axis
+    photo, point = int(block.image_photos[row]), int(block.image_points[row])
+    redundancy = float(result.redundancy[row, axis])
+    error = float(result.residuals[row, axis]) / redundancy
+    others = block.image_photos[(block.image_points == point) & (block.image_photos != photo)].tolist()
+    doubt = ""
+    if len(others) == 1:
+        doubt = f"; with two rays it may as well be the image on photo {block.photo_ids[others[0]]}"
+    text = (
+        f"point {block.point_ids[point]} on photo {block.photo_ids[photo]}: error of {'xy'[axis]} about"
+        f" {error * 1000:.0f} um (test value {suspect.test:.1f}, redundancy {redundancy:.2f}){doubt}"
+    )
+    return Finding(
+        "blunder",
+        "grave",
+        text,
+        [block.photo_ids[photo], *([block.photo_ids[others[0]]] if doubt else [])],
+        [block.point_ids[point]],
+        {"error_um": error * 1000, "test_value": suspect.test, "redundancy": redundancy, "axis": float(axis)},
+    )
+
+
+def _list(result: Result, spread: float, section: Section) -> None:
+    """Say how many test values are beyond 3 when all is done, and list the largest."""
+    values = tests(result)["image"] / spread
+    tested = int((values > 0).sum())
+    images, axes = np.nonzero(values > BLUNDER)
+    section.lines.append(
+        f"{'robust spread of the test values':<50}{spread:.3f} (1 when the weights are right)"
+    )
+    section.lines.append(
+        f"{f'image coordinates beyond {BLUNDER:g} times the spread':<50}{len(images)} of {tested} tested"
+        f" ({0.0027 * tested:.0f} to be expected)"
+    )
+    if not len(images):
+        return
+    block = result.block
+    heads = "".join(f"{head:>12}" for head in ("residual um", "redundancy", "test value", "error um"))
+    section.lines.append("the largest that are left, each with the error that would explain it:")
+    section.lines.append(f"{'photo':<10}{'point':<10}   {heads}")
+    for row in np.argsort(-values[images, axes], kind="stable")[:SHOWN].tolist():
+        i, axis = int(images[row]), int(axes[row])
+        residual, redundancy = 1000 * result.residuals[i, axis], result.redundancy[i, axis]
+        section.lines.append(
+            f"{block.photo_ids[block.image_photos[i]]:<10}{block.point_ids[block.image_points[i]]:<10}"
+            f" {'xy'[axis]} {residual:>12.1f}{redundancy:>12.3f}{values[i, axis]:>12.2f}"
+            f"{residual / redundancy:>12.1f}"
+        )

@@ -1,0 +1,123 @@
+"""What a check finds: findings in sections, as text and as a JSON document."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import orjson
+
+from photogram import _photocore
+from photogram.show.sections import composed, headline
+
+if TYPE_CHECKING:
+    from photogram.results.result import Result
+
+__all__ = ["Check", "Finding", "Level", "Section"]
+
+Level = Literal["grave", "look"]
+SHOWN = 40
+"""Findings of one level that a section of the text shows at most; the JSON document has all."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found.
+
+    Attributes
+    ----------
+    kind
+        What it is, in a word or two with hyphens: `gross-error`, `control-misfit`.
+    level
+        `grave` makes results wrong or impossible; `look` deserves a look.
+    text
+        The finding in a sentence, with what to do.
+    photos, points
+        Identifiers of the photos and points concerned.
+    values
+        Its figures, the unit in the name.
+    """
+
+    kind: str
+    level: Level
+    text: str
+    photos: list[str] = field(default_factory=list)
+    points: list[str] = field(default_factory=list)
+    values: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class Section:
+    """One part of the check.
+
+    Attributes
+    ----------
+    title
+        Its heading.
+    why
+        A sentence on why one looks.
+    lines
+        Figures and tables.
+    findings
+        What was found.
+    """
+
+    title: str
+    why: str
+    lines: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+
+    def text(self) -> list[str]:
+        """Return the section as lines, the grave findings first."""
+        shown: list[str] = []
+        for level, mark in (("grave", "GRAVE "), ("look", "look  ")):
+            of_level = [finding.text for finding in self.findings if finding.level == level]
+            shown += [mark + text for text in of_level[:SHOWN]]
+            if len(of_level) > SHOWN:
+                shown.append(f"{mark}and {len(of_level) - SHOWN} more")
+        return [self.why, *self.lines, *(shown or ["nothing found"])]
+
+
+@dataclass
+class Check:
+    """The outcome of a check.
+
+    Attributes
+    ----------
+    title
+        Of the project.
+    sections
+        In the order of Appendix H of the guide.
+    result
+        The adjustment, where there was one; without what the check left out of it.
+    """
+
+    title: str
+    sections: list[Section]
+    result: Result | None
+
+    @property
+    def findings(self) -> list[Finding]:
+        """All findings, section by section."""
+        return [finding for section in self.sections for finding in section.findings]
+
+    @property
+    def grave(self) -> list[Finding]:
+        """The grave findings."""
+        return [finding for finding in self.findings if finding.level == "grave"]
+
+    def report(self) -> str:
+        """Return the check as text."""
+        grave, look = len(self.grave), len(self.findings) - len(self.grave)
+        head = f"{headline('check', self.title)}\n{grave} grave, {look} to look at"
+        return composed(head, ((section.title, section.text()) for section in self.sections))
+
+    def to_json(self) -> bytes:
+        """Return the findings as a JSON document (UTF-8); `docs/giant-check.md` lists its members."""
+        document: dict[str, Any] = {
+            "program": f"photogram {_photocore.__version__}",
+            "title": self.title,
+            "grave": len(self.grave),
+            "sections": [asdict(section) for section in self.sections],
+        }
+        return orjson.dumps(document, option=orjson.OPT_INDENT_2)

@@ -1,0 +1,408 @@
+"""Gross errors seen from the initial stations: frames, images, exchanged names, control (Appendix H).
+
+Coarse stations leave large residuals with a pattern; what counts is a break in the pattern.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.checks.findings import Finding, Level, Section
+from photogram.checks.rays import Rays, meet
+from photogram.checks.robust import fit, mad_sd
+from photogram.network.block import Block
+from photogram.results.result import Result
+
+__all__ = ["Suspects", "disproved", "gross", "without"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+BAD_PHOTO = 4.0
+"""A photo is bad when its median residual is so many times that of the median photo, ..."""
+BAD_PHOTO_SD = 4.3
+"""... and stands out among all photos by so many robust standard deviations (of the logarithm)."""
+BREAK = 10.0
+"""A break in the pattern: so many robust standard deviations from what its photo suggests."""
+FLAGRANT = 24.0
+"""A break so large that it is grave though no single image explains it."""
+CHANCE = 2.0
+"""A break so many times the least one is grave with three rays too."""
+EXPLAINED = 0.35
+"""Leaving out one ray, or exchanging two names, explains a point when so much is left of its residuals."""
+CONTROL_GRAVE, CONTROL_LOOK = 12.0, 6.0
+"""Control differences that stand out by so many robust standard deviations."""
+FEWEST_CONTROL = 4
+"""Control points that a comparison needs."""
+FEWEST_ERRORS, ERRORS_OF_PHOTO = 5, 0.3
+"""So many gross errors, and such a part of its images, condemn a photo as a whole."""
+CANDIDATES = 5
+"""Photos with the largest residuals that are left out on trial."""
+IMAGE_KINDS = ("gross-error", "exchanged-points")
+"""Findings on images, which the adjusted stations may disprove."""
+MOST_PHOTOS = 20
+MOST_ON_PHOTO = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Suspects:
+    """What the adjustment may have to do without.
+
+    Attributes
+    ----------
+    images
+        (m,) gross errors.
+    photos
+        (P,) bad photos.
+    control
+        (n,) control points far from where their rays meet.
+    """
+
+    images: Mask
+    photos: Mask
+    control: Mask
+
+
+def gross(block: Block) -> tuple[Section, Suspects]:
+    """Look for bad photos, gross errors of images and exchanged names, and control that is far off."""
+    section = Section(
+        "Gross errors (intersection from the initial stations)",
+        "Large patterned residuals are normal before the adjustment; a break in the pattern is an error.",
+    )
+    rays, photos = _bad_photos(Rays.of(block), section)
+    findings, images = _broken(rays)
+    while (photo := _overrun(rays, findings)) is not None:
+        # One mistake, not one for each of its points.
+        photos[photo] = True
+        name, count = block.photo_ids[photo], int((rays.used & (block.image_photos == photo)).sum())
+        text = (
+            f"photo {name} does not fit the others: of its {count} points most that other photos check miss"
+            " their rays; look at its station (position, angles), the preprocessing of its plate, and whether"
+            " the points under its name are its own"
+        )
+        section.findings.append(Finding("bad-photo", "grave", text, [name], [], {"points": float(count)}))
+        rays = rays.without(block.image_photos == photo)
+        findings, images = _broken(rays)
+    section.findings += findings
+    control = _control(rays.without(images), section)
+    return section, Suspects(images, photos, control)
+
+
+def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Mask:
+    """Tell which suspected images do not break the pattern any more when seen from the adjusted stations.
+
+    A station far off spoils the intersections of its neighbours, so that good images look wrong beside it.
+
+    Parameters
+    ----------
+    block
+        The block as :func:`gross` had it.
+    suspects
+        What it found.
+    adjusted
+        The adjustment without the suspected images; a converged one.
+
+    Returns
+    -------
+    (m,) images of `block`; none of photos that are not in the adjustment.
+    """
+    number = {name: index for index, name in enumerate(adjusted.block.photo_ids)}
+    index = np.array([number.get(name, -1) for name in block.photo_ids])
+    there = (index >= 0)[:, np.newaxis]
+    refined = block.replace(
+        photo_positions=np.where(there, adjusted.photo_positions[index], block.photo_positions),
+        photo_attitudes=np.where(there, adjusted.photo_attitudes[index], block.photo_attitudes),
+    )
+    gone = (index < 0)[block.image_photos]
+    _, wrong = _broken(Rays.of(refined).without(gone))
+    return suspects.images & ~wrong & ~gone
+
+
+def without(block: Block, findings: list[Finding], images: Mask) -> list[Finding]:
+    """Return the findings of :func:`gross` without those that rest on nothing but the given images."""
+
+    def stands(finding: Finding) -> bool:
+        photos = np.isin(np.array(block.photo_ids)[block.image_photos], finding.photos)
+        own = photos & np.isin(np.array(block.point_ids)[block.image_points], finding.points)
+        return finding.kind not in IMAGE_KINDS or not own.any() or not images[own].all()
+
+    return [finding for finding in findings if stands(finding)]
+
+
+def _overrun(rays: Rays, findings: list[Finding]) -> int | None:
+    """Return the photo with so many gross errors that it is wrong as a whole, if there is one."""
+    block = rays.block
+    number = {name: index for index, name in enumerate(block.photo_ids)}
+    shares = np.zeros(len(number))
+    for finding in findings:
+        for name in finding.photos:
+            shares[number[name]] += len(finding.points) / len(finding.photos)
+    images = np.bincount(block.image_photos[rays.used], minlength=len(number))
+    overrun = (shares >= FEWEST_ERRORS) & (shares > ERRORS_OF_PHOTO * images)
+    return int(np.argmax(np.where(overrun, shares / np.maximum(images, 1), 0))) if overrun.any() else None
+
+
+def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Mask]:
+    """Leave out the photo without which the others fit best, as long as it stands out from them."""
+    block = rays.block
+    bad = np.zeros(len(block.photo_ids), dtype=bool)
+    for step in range(MOST_PHOTOS + 1):
+        medians = _medians(block, rays.intersect().sizes, rays.used)
+        known = np.flatnonzero(medians > 0)
+        if step == 0 and known.size:
+            usual = float(np.median(medians[known]))
+            section.lines.append(f"{'median residual of a photo':<50}{usual:.4f} mm")
+        if len(known) < 4 or step == MOST_PHOTOS:
+            break
+        worst = _worst(rays, medians, known)
+        if worst is None:
+            break
+        photo, usual, rays = worst
+        bad[photo] = True
+        name, size = block.photo_ids[photo], float(medians[photo])
+        text = (
+            f"photo {name} does not fit the others: median residual {size:.3f} mm against {usual:.3f} mm"
+            " without it; look at its station (position, angles), the preprocessing of its plate, and whether"
+            " the points under its name are its own"
+        )
+        section.findings.append(Finding("bad-photo", "grave", text, [name], [], {"median_residual_mm": size}))
+    return rays, bad
+
+
+def _worst(rays: Rays, medians: Floats, known: Indices) -> tuple[int, float, Rays] | None:
+    """Return the photo that stands out, the median of the others without it in mm, and the rays without it.
+
+    A bad photo spoils the medians of its neighbours, in a small block those of all. So it is compared with
+    what the others are without it.
+    """
+    block = rays.block
+    doubtful = known[medians[known] > BAD_PHOTO * np.quantile(medians[known], 0.25)]
+    tried = []
+    for photo in doubtful[np.argsort(-medians[doubtful], kind="stable")][:CANDIDATES].tolist():
+        without = rays.without(block.image_photos == photo)
+        others = _medians(block, without.intersect().sizes, without.used)
+        logs = np.log(others[others > 0])
+        if len(logs) >= 3:
+            tried.append((float(logs.mean()), photo, logs, without))
+    if not tried:
+        return None
+    _, photo, logs, without = min(tried, key=lambda each: each[:2])
+    middle = float(np.median(logs))
+    if np.log(medians[photo]) - middle < max(np.log(BAD_PHOTO), BAD_PHOTO_SD * mad_sd(logs - middle)):
+        return None
+    return photo, float(np.exp(middle)), without
+
+
+def _medians(block: Block, sizes: Floats, used: Mask) -> Floats:
+    """(P,) median size of each photo's residuals; NaN with fewer than three."""
+    rows = np.flatnonzero(used & np.isfinite(sizes))
+    order = rows[np.lexsort((sizes[rows], block.image_photos[rows]))]
+    photos, starts, counts = np.unique(block.image_photos[order], return_index=True, return_counts=True)
+    medians = np.full(len(block.photo_ids), np.nan)
+    enough = counts >= 3
+    medians[photos[enough]] = sizes[order][(starts + counts // 2)[enough]]
+    return medians
+
+
+def _broken(rays: Rays) -> tuple[list[Finding], Mask]:
+    """Find images that break the pattern of their photo, and say what explains each."""
+    block = rays.block
+    departure = _departures(rays, rays.intersect().residuals)
+    points = np.unique(block.image_points[departure > BREAK])
+    rows_of = _rows_of(rays, points)
+    gross = np.zeros(len(block.image_xy), dtype=bool)
+    solver = _Solver(rays)
+    findings, exchanged = _exchanged(solver, rows_of)
+    for point, rows in rows_of.items():
+        if point in exchanged:
+            gross[rows[np.isin(block.image_photos[rows], exchanged[point])]] = True
+            continue
+        finding, wrong = _explained(solver, point, rows, float(departure[rows].max()))
+        findings.append(finding)
+        if finding.level == "grave":
+            gross[wrong] = True
+    return findings, gross
+
+
+def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> tuple[Finding, Indices]:
+    """Say which image of a point is wrong, if leaving out one explains it; with the doubtful images."""
+    block = solver.rays.block
+    before = solver.largest(rows, solver.changed(point, [], []))
+    left = [solver.without(point, rows, row) for row in rows.tolist()] if len(rows) > 2 else []
+    name, values = block.point_ids[point], {"residual_mm": before, "departure_sd": departure}
+    if left and min(left) < EXPLAINED * before:
+        row = rows[[int(np.argmin(left))]]
+        photo = block.photo_ids[int(block.image_photos[row[0]])]
+        text = (
+            f"point {name} on photo {photo} is wrong: without this image its other rays meet to"
+            f" {min(left):.3f} mm, with it to {before:.3f} mm; misidentified, misnamed or misrecorded?"
+        )
+        # Any two of three rays may meet by chance: a small break is no proof against the third.
+        proof: Level = "grave" if len(rows) > 3 or departure > CHANCE * BREAK else "look"
+        return Finding("gross-error", proof, text, [photo], [name], values), row
+    photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
+    text = (
+        f"point {name} does not fit (its rays miss by {before:.3f} mm), on one of the photos"
+        f" {', '.join(photos)}: misidentified, or one name for two points?"
+    )
+    level: Level = "grave" if departure > FLAGRANT else "look"
+    return Finding("gross-error", level, text, photos, [name], values), rows
+
+
+def _departures(rays: Rays, residuals: Floats) -> Floats:
+    """(m,) distance of each residual from the linear pattern of its photo, in robust standard deviations."""
+    block = rays.block
+    rows = np.flatnonzero(rays.used & np.isfinite(residuals).all(axis=1))
+    rows = rows[np.argsort(block.image_photos[rows], kind="stable")]
+    photos = np.unique(block.image_photos[rows])
+    bounds = np.searchsorted(block.image_photos[rows], [*photos.tolist(), len(block.photo_ids)]).tolist()
+    departures = np.zeros(len(block.image_xy))
+    spreads = np.zeros(len(photos))
+    for index, (first, last) in enumerate(pairwise(bounds)):
+        own = rows[first:last]
+        xy = block.image_xy[own]
+        design = np.column_stack([np.ones(len(own)), xy / 100]) if len(own) >= 8 else np.ones((len(own), 1))
+        left = residuals[own] - design @ fit(design, residuals[own])
+        departures[own] = np.linalg.norm(left, axis=1)
+        spreads[index] = mad_sd(left)
+    usual = float(np.median(spreads)) if spreads.size else 0.0
+    smallest = block.image_sd.max(axis=1)
+    spread = np.zeros(len(block.photo_ids))
+    spread[photos] = np.maximum(spreads, usual)
+    scaled: Floats = departures / np.maximum(spread[block.image_photos], smallest)
+    return scaled
+
+
+def _rows_of(rays: Rays, points: Indices) -> dict[int, Indices]:
+    """Return the used images of some points."""
+    block = rays.block
+    rows = np.flatnonzero(rays.used & np.isin(block.image_points, points))
+    rows = rows[np.argsort(block.image_points[rows], kind="stable")]
+    bounds = np.searchsorted(block.image_points[rows], [*points.tolist(), len(block.point_ids)])
+    return {
+        point: rows[first:last]
+        for point, first, last in zip(points.tolist(), bounds, bounds[1:], strict=False)
+    }
+
+
+class _Solver:
+    """Intersections with a ray left out, or exchanged for another."""
+
+    def __init__(self, rays: Rays) -> None:
+        self.rays = rays
+        self.across, self.right = rays.equations()
+        self.normal, self.constant, self.count = rays.totals()
+
+    def largest(self, rows: Indices, position: Floats) -> float:
+        """Return the largest residual of some images for one position, millimetres."""
+        residuals, _ = self.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
+        return float(np.nan_to_num(np.linalg.norm(residuals, axis=1), nan=np.inf).max())
+
+    def changed(self, point: int, less: list[int], more: list[int]) -> Floats:
+        """Return the position of a point without some rays and with others."""
+        normal = self.normal[point] - self.across[less].sum(axis=0) + self.across[more].sum(axis=0)
+        constant = self.constant[point] - self.right[less].sum(axis=0) + self.right[more].sum(axis=0)
+        rays = self.count[point] - len(less) + len(more)
+        position: Floats = meet(normal[np.newaxis], constant[np.newaxis], np.array([rays]))[0]
+        return position
+
+    def without(self, point: int, rows: Indices, row: int) -> float:
+        """Return the largest residual of a point's other images when one is left out."""
+        return self.largest(rows[rows != row], self.changed(point, [row], []))
+
+    def exchanged(self, point: int, rows: Indices, own: int, other: int) -> float:
+        """Return the largest residual of a point that takes another image in the place of its own."""
+        taken = np.where(rows == own, other, rows)
+        return self.largest(taken, self.changed(point, [own], [other]))
+
+
+def _exchanged(solver: _Solver, rows_of: dict[int, Indices]) -> tuple[list[Finding], dict[int, list[int]]]:
+    """Find pairs of points whose names are exchanged on a photo; with the findings the photos of each point.
+
+    A name stands in one pair of a photo only, that which explains it best.
+    """
+    block = solver.rays.block
+    on_photo: dict[int, list[int]] = {}
+    for rows in rows_of.values():
+        for row in rows.tolist():
+            on_photo.setdefault(int(block.image_photos[row]), []).append(row)
+    before = {point: solver.largest(rows, solver.changed(point, [], [])) for point, rows in rows_of.items()}
+    findings: list[Finding] = []
+    found: dict[int, list[int]] = {}
+    for photo, images in on_photo.items():
+        pairs = []
+        for one, other in combinations(images, 2) if len(images) <= MOST_ON_PHOTO else ():
+            a, b = int(block.image_points[one]), int(block.image_points[other])
+            after_a = solver.exchanged(a, rows_of[a], one, other)
+            after_b = solver.exchanged(b, rows_of[b], other, one)
+            if after_a < EXPLAINED * before[a] and after_b < EXPLAINED * before[b]:
+                pairs.append((max(after_a, after_b), a, b))
+        paired: set[int] = set()
+        for after, a, b in sorted(pairs):
+            if paired & {a, b}:
+                continue
+            paired |= {a, b}
+            names, name = [block.point_ids[a], block.point_ids[b]], block.photo_ids[photo]
+            text = (
+                f"the points {names[0]} and {names[1]} are exchanged on photo {name}:"
+                " exchanged back, they fit"
+            )
+            values = {"before_mm": max(before[a], before[b]), "after_mm": after}
+            findings.append(Finding("exchanged-points", "grave", text, [name], names, values))
+            found.setdefault(a, []).append(photo)
+            found.setdefault(b, []).append(photo)
+    return findings, found
+
+
+def _control(rays: Rays, section: Section) -> Mask:
+    """Compare held control with the intersected positions; what stands out from the others is named.
+
+    Returns (n,) the points that are gravely off.
+    """
+    block = rays.block
+    held = np.isfinite(block.point_sd)
+    met = rays.intersect().positions
+    control = np.flatnonzero(held.any(axis=1) & np.isfinite(met).all(axis=1))
+    if not control.size:
+        section.lines.append("no control point is intersected")
+        return np.zeros(len(block.point_ids), dtype=bool)
+    given = np.where(held[control], block.point_positions[control], rays.axes.from_local(met[control]))
+    differences = np.where(held[control], met[control] - rays.axes.positions(given), np.nan)
+    for axis, name in enumerate(("east", "north", "up") if block.geographic else ("X", "Y", "Z")):
+        _control_component(block, control, differences[:, axis], name, section)
+    grave = [each for each in section.findings if each.kind == "control-difference" and each.level == "grave"]
+    return np.isin(block.point_ids, [name for finding in grave for name in finding.points])
+
+
+def _control_component(
+    block: Block, control: Indices, differences: Floats, name: str, section: Section
+) -> None:
+    """Name the control points whose difference in one component stands out from the others."""
+    known = np.flatnonzero(np.isfinite(differences))
+    if not known.size:
+        return
+    unit, middle = block.linear_unit, float(np.median(differences[known]))
+    spread = mad_sd(differences - middle)
+    section.lines.append(
+        f"{f'control, intersected minus given, {name}':<50}median {middle:.3f} {unit},"
+        f" spread {spread:.3f} {unit} ({len(known)} points)"
+    )
+    if len(known) < FEWEST_CONTROL or spread == 0:
+        return
+    # The spread of few points is itself uncertain.
+    sizes = np.abs(differences[known] - middle) / spread / (1 + FEWEST_CONTROL / len(known))
+    for row, size in zip(known.tolist(), sizes.tolist(), strict=True):
+        if size > CONTROL_LOOK:
+            point, difference = block.point_ids[control[row]], float(differences[row])
+            text = (
+                f"control point {point}: intersected minus given {name} is {difference:.3f} {unit}, far from"
+                " those of the others: wrong coordinate, wrong point, or a bad image"
+            )
+            level: Level = "grave" if size > CONTROL_GRAVE else "look"
+            values = {f"difference_{name}": difference}
+            section.findings.append(Finding("control-difference", level, text, [], [point], values))

@@ -1,0 +1,318 @@
+"""Photos the wrong way round: the sign of the principal distance, kappa (Appendix H), or mirrored plates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.checks.findings import Finding, Section
+from photogram.checks.rays import Intersection, Rays, frame_radius, meet
+from photogram.network.block import Block
+
+__all__ = ["orientation", "spare_explained"]
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SUSPICIOUS = 0.25
+"""Cost above which an orientation is doubted: 0 for rays that meet in front, 1 for rays that miss."""
+BETTER = 0.5
+"""An explanation must lower the cost to this part of what it was."""
+UPRIGHT = 0.8
+"""Vertical component of the z axis of a near-vertical photo, at least; it looks along its negative z axis."""
+AS_GOOD = 1.5
+"""Another explanation is as good when its cost is below so many times the least."""
+MOST = 20
+"""Photos that are turned one by one, at most."""
+TURNS = {"by 180 degrees": math.pi, "by 90 degrees": math.pi / 2, "by -90 degrees": -math.pi / 2}
+MIRRORS = {
+    "x has the wrong sign": np.array([[-1.0, 0.0], [0.0, 1.0]]),
+    "y has the wrong sign": np.array([[1.0, 0.0], [0.0, -1.0]]),
+    "x and y are exchanged": np.array([[0.0, 1.0], [1.0, 0.0]]),
+    "x and y are exchanged, with wrong signs": np.array([[0.0, -1.0], [-1.0, 0.0]]),
+}
+"""The four reflections that keep a frame in place, by what brings them about."""
+
+
+def orientation(block: Block) -> tuple[Section, Block]:
+    """Test whether photos fit when the sign of their principal distance is changed, turned, or mirrored.
+
+    Returns the section, and the block with the explanations that hold, so that other errors show.
+    """
+    section = Section(
+        "Sides of the cameras (intersection from the initial stations)",
+        "A point computed above its camera means a wrong sign of the principal distance, or a wrong kappa.",
+    )
+    rays = Rays.of(block)
+    met = rays.intersect()
+    above = _above(rays, met)
+    explanations: list[Finding] = []
+    doubt = _doubt(rays, met)
+    if max(doubt) > SUSPICIOUS:
+        block = _whole_block(block, sum(doubt), explanations)
+    whole = block
+    for _ in range(MOST):
+        turned = _one_photo(block, explanations)
+        if turned is None:
+            break
+        block = turned
+    after = rays if block is rays.block else Rays.of(block)
+    met_after = met if block is rays.block else after.intersect()
+    cost = _mean(_costs(after, met_after))
+    if cost > SUSPICIOUS:
+        text = (
+            "the rays miss each other, and neither the sign of the principal distance, nor kappa, nor the"
+            " sense of the angles (COMMON column 2), nor mirrored plates explain it: look at positions,"
+            " angles, names of frames and points"
+        )
+        explanations.append(Finding("rays-do-not-meet", "grave", text, values={"cost": cost}))
+    section.findings += _unexplained(above, explanations, whole, block) + explanations
+    known = np.isfinite(met.sizes)
+    behind = int((known & ~met.in_front).sum())
+    section.lines.append(f"{'rays that meet behind their camera':<50}{behind} of {int(known.sum())}")
+    section.lines.append(f"{'median residual of intersection':<50}{_median(met.sizes):.3f} mm")
+    if block is not rays.block:
+        section.lines.append(
+            f"{'median residual with these explanations':<50}{_median(met_after.sizes):.3f} mm;"
+            " the sections below hold with them"
+        )
+    return section, block
+
+
+def _median(values: Floats) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if finite.size else math.nan
+
+
+def _mean(values: Floats) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else 0.0
+
+
+def _above(rays: Rays, met: Intersection) -> list[Finding]:
+    """Name control points computed above a camera that looks down."""
+    block = rays.block
+    given = np.isfinite(block.point_sd).any(axis=1).take(block.image_points)
+    looks_down = (rays.cameras[:, 2, 2] > UPRIGHT).take(block.image_photos)
+    heights, stations = met.positions[block.image_points, 2], rays.centres[block.image_photos, 2]
+    rows = np.flatnonzero(given & looks_down & (heights > stations))
+    points, first = np.unique(block.image_points[rows], return_index=True)
+    findings = []
+    for point, row in zip(points.tolist(), rows[first].tolist(), strict=True):
+        name, photo = block.point_ids[point], block.photo_ids[block.image_photos[row]]
+        above = float(heights[row] - stations[row])
+        text = (
+            f"control point {name} is computed {above:.0f} {block.linear_unit} above the camera of photo"
+            f" {photo}: sign of the principal distance? (positive plane: negative; negative plane: positive)"
+            " else kappa?"
+        )
+        findings.append(Finding("control-above-camera", "grave", text, [photo], [name], {"above": above}))
+    return findings
+
+
+def _unexplained(
+    above: list[Finding], explanations: list[Finding], whole: Block, last: Block
+) -> list[Finding]:
+    """Leave out the points above a camera that mirrored plates, or the kappa of a single photo, explain.
+
+    A wrong sign or kappa of many photos explains nearly all; there the guide asks for the points too.
+    """
+    if last is whole and not any(finding.kind == "mirrored" for finding in explanations):
+        return above
+    before, after = (
+        {name for finding in _above(rays, rays.intersect()) for name in finding.points}
+        for rays in (Rays.of(whole), Rays.of(last))
+    )
+    if any(finding.kind == "mirrored" and len(finding.photos) > 1 for finding in explanations):
+        return [finding for finding in above if after.issuperset(finding.points)]
+    return [finding for finding in above if not (before - after).issuperset(finding.points)]
+
+
+def spare_explained(section: Section, block: Block, photos: Mask) -> None:
+    """Take out of a section what some bad photos explain: points above a camera, rays that do not meet."""
+    rays = Rays.of(block).without(photos[block.image_photos])
+    met = rays.intersect()
+    above = {name for finding in _above(rays, met) for name in finding.points}
+    gone = (
+        {"rays-do-not-meet"} if _mean(np.where(rays.used, _costs(rays, met), np.nan)) <= SUSPICIOUS else set()
+    )
+    section.findings = [
+        finding
+        for finding in section.findings
+        if finding.kind not in gone
+        and (finding.kind != "control-above-camera" or above.issuperset(finding.points))
+    ]
+
+
+def _doubt(rays: Rays, met: Intersection) -> tuple[float, float]:
+    """Return how badly the rays of a block meet, and how far its images are from given control: 0 to 1.
+
+    Within a strip the rays meet even if all photos are mirrored across the flight; only control shows it.
+    """
+    block = rays.block
+    given = np.isfinite(block.point_sd[:, 0] + block.point_sd[:, 1])
+    positions = np.where(
+        np.isfinite(block.point_sd), block.point_positions, rays.axes.from_local(met.positions)
+    )
+    rows = np.flatnonzero(given[block.image_points])
+    residuals, in_front = rays.residuals(rays.axes.positions(positions)[block.image_points[rows]], rows)
+    sizes = np.hypot(residuals[:, 0], residuals[:, 1])
+    control = np.where(in_front, np.minimum(sizes / (frame_radius(block) / 2), 1), 1.0)
+    return _mean(_costs(rays, met)), _mean(np.where(np.isfinite(sizes), control, np.nan))
+
+
+def _costs(rays: Rays, met: Intersection) -> Floats:
+    """(m,) how badly each image fits: its residual as a part of half the frame, 1 behind the camera."""
+    radius = frame_radius(rays.block) / 2
+    costs = np.minimum(met.sizes / radius, 1)
+    return np.where(np.isfinite(met.sizes) & ~met.in_front, 1.0, costs)
+
+
+def _photo_costs(block: Block, costs: Floats) -> Floats:
+    """(P,) mean cost of the images of each photo; NaN without any."""
+    known = np.isfinite(costs)
+    photos, count = block.image_photos[known], len(block.photo_ids)
+    sums = np.bincount(photos, weights=costs[known], minlength=count)
+    images = np.bincount(photos, minlength=count)
+    return np.where(images > 0, sums / np.maximum(images, 1), np.nan)
+
+
+def _turned(block: Block, photos: Mask, angle: float) -> Block:
+    attitudes = block.photo_attitudes.copy()
+    attitudes[photos, 2] += angle
+    return block.replace(photo_attitudes=attitudes)
+
+
+def _sign_changed(block: Block, photos: Mask) -> Block:
+    distances = np.where(photos, -block.principal_distances, block.principal_distances)
+    return block.replace(principal_distances=distances)
+
+
+def _mirrored(block: Block, photos: Mask, mirror: Floats) -> Block:
+    images = photos[block.image_photos][:, np.newaxis]
+    return block.replace(image_xy=np.where(images, block.image_xy @ mirror.T, block.image_xy))
+
+
+def _whole_block(block: Block, before: float, explanations: list[Finding]) -> Block:
+    """Look for one explanation for all photos, or for all of one principal distance."""
+    trials = _trials(block)
+    tried = [Rays.of(trial.block) for trial in trials]
+    costs = [sum(_doubt(rays, rays.intersect())) for rays in tried]
+    best = trials[int(np.argmin(costs))]
+    if min(costs) > BETTER * before:
+        return block
+    values = {"cost_before": before, "cost_after": min(costs)}
+    others = [
+        other.kind.replace("-", " ")
+        for other, cost in zip(trials, costs, strict=True)
+        if other is not best and cost < AS_GOOD * min(costs)
+    ]
+    others = [other for other in dict.fromkeys(others) if other != best.kind.replace("-", " ")]
+    text = best.text + (f" Nearly as good: {', '.join(others)}" if others else "")
+    explanations.append(Finding(best.kind, "grave", text, best.photos, [], values))
+    return best.block
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """One explanation for many photos."""
+
+    kind: str
+    text: str
+    photos: list[str]
+    block: Block
+
+
+def _trials(block: Block) -> list[_Trial]:
+    """Explanations to try; of equally good ones the first counts, and the sign is the most probable."""
+    groups = {"all photos": np.ones(len(block.photo_ids), dtype=bool)}
+    distances = np.unique(block.principal_distances).tolist()
+    for value in distances if len(distances) > 1 else []:
+        groups[f"the photos of principal distance {value:g} mm"] = block.principal_distances == value
+    trials = []
+    for name, photos in groups.items():
+        names = [photo for photo, of in zip(block.photo_ids, photos.tolist(), strict=True) if of]
+        text = (
+            f"the sign of the principal distance of {name} is wrong: with the other sign the rays meet in"
+            " front of the cameras. (Kappa turned by 180 degrees on every one of them would do the same.)"
+        )
+        trials.append(_Trial("sign-of-principal-distance", text, names, _sign_changed(block, photos)))
+        for turn in ("by 90 degrees", "by -90 degrees"):
+            text = f"the kappa of {name} is wrong: turned {turn}, the rays meet."
+            trials.append(_Trial("kappa", text, names, _turned(block, photos, TURNS[turn])))
+        for what, mirror in MIRRORS.items():
+            text = f"the plates of {name} are mirrored: {what}; put right, the rays meet."
+            trials.append(_Trial("mirrored", text, names, _mirrored(block, photos, mirror)))
+    text = "the angles are of the other sense (COMMON column 2): taken so, the rays meet."
+    other = block.replace(photo_to_ground=not block.photo_to_ground)
+    return [*trials, _Trial("sense-of-rotation", text, list(block.photo_ids), other)]
+
+
+def _one_photo(block: Block, explanations: list[Finding]) -> Block | None:
+    """Turn or mirror the one photo that most clearly wants it, if there is one."""
+    rays = Rays.of(block)
+    met = rays.intersect()
+    before = _photo_costs(block, _costs(rays, met))
+    suspicious = np.nan_to_num(before) > SUSPICIOUS
+    if not suspicious.any():
+        return None
+    images = suspicious[block.image_photos]
+    trials = _photo_trials(block)
+    every = np.ones(len(block.photo_ids), dtype=bool)
+    after = np.array([_alone(rays, images, Rays.of(trial.change(every))) for trial in trials])
+    gain = np.where(suspicious & np.isfinite(after), after / np.where(suspicious, before, 1), np.inf)
+    which, photo = (int(index) for index in np.unravel_index(int(np.argmin(gain)), gain.shape))
+    if gain[which, photo] > BETTER:
+        return None
+    trial, name = trials[which], block.photo_ids[photo]
+    values = {"cost_before": float(before[photo]), "cost_after": float(after[which, photo])}
+    explanations.append(Finding(trial.kind, "grave", trial.text.format(name), [name], [], values))
+    only = np.zeros(len(block.photo_ids), dtype=bool)
+    only[photo] = True
+    return trial.change(only)
+
+
+@dataclass(frozen=True)
+class _PhotoTrial:
+    """One explanation for a single photo: its text, with a place for the name, and what it does to photos."""
+
+    kind: str
+    text: str
+    change: Callable[[Mask], Block]
+
+
+def _photo_trials(block: Block) -> list[_PhotoTrial]:
+    trials = []
+    for turn, angle in TURNS.items():
+        sign = "; another sign of its principal distance would do the same" if angle == math.pi else ""
+        text = (
+            f"the kappa of photo {{}} is wrong: turned {turn}, its rays meet those of the other photos{sign}"
+        )
+        trials.append(_PhotoTrial("kappa", text, partial(_turned, block, angle=angle)))
+    for what, mirror in MIRRORS.items():
+        text = (
+            f"the plate of photo {{}} is mirrored: {what}; put right, its rays meet those of the other photos"
+        )
+        trials.append(_PhotoTrial("mirrored", text, partial(_mirrored, block, mirror=mirror)))
+    return trials
+
+
+def _alone(rays: Rays, images: Mask, changed: Rays) -> Floats:
+    """(P,) cost of each photo when it alone is changed, over the given images."""
+    own, own_right = rays.equations()
+    new, new_right = changed.equations()
+    normal, constant, count = rays.totals()
+    at = rays.block.image_points[images]
+    positions = np.full((len(images), 3), np.nan)
+    positions[images] = meet(
+        normal[at] - own[images] + new[images],
+        constant[at] - own_right[images] + new_right[images],
+        count[at],
+    )
+    residuals, in_front = changed.residuals(positions)
+    return _photo_costs(rays.block, _costs(changed, Intersection(positions, residuals, in_front)))

@@ -1,0 +1,142 @@
+"""Control against what the rest of the block says of it: leave-out predictions.
+
+A prediction is the adjusted position of a point none of whose components is held, so that neither its own
+error nor those of others left out with it are in it.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.checks.rays import Rays
+from photogram.checks.robust import normal_of_chi_square
+from photogram.network.block import Block
+from photogram.results.result import Result
+
+__all__ = ["exchange", "exchanged_pair", "exchanged_where_rays_meet", "freed", "tests_of_predictions"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FEWEST = 3
+"""Control points that tell which two of them are exchanged."""
+BETTER, RUNNER_UP = 25.0, 10.0
+"""How many times the sum of squares must go down, and the log likelihood ratio to the next best."""
+FITS = 3.0902
+"""Normal value of the chance of 0.001 by which coordinates that are right may disagree with a prediction."""
+CHANCE = 1e-4
+"""Chance that one of the pairs that are tried agrees better when exchanged, though it is not exchanged."""
+
+
+def freed(block: Block, points: Indices) -> Block:
+    """Return a block in which nothing of some points is held."""
+    point_sd = block.point_sd.copy()
+    point_sd[points] = np.inf
+    return block.replace(point_sd=point_sd)
+
+
+def exchange(block: Block, one: int, other: int) -> Block:
+    """Return a block in which two points have each other's coordinates and standard deviations."""
+    order = np.arange(len(block.point_ids))
+    order[[one, other]] = other, one
+    return block.replace(point_positions=block.point_positions[order], point_sd=block.point_sd[order])
+
+
+def tests_of_predictions(
+    result: Result, given: Block, points: Indices, spread: float
+) -> tuple[Floats, Floats]:
+    """Compare what is given of some points with their predictions.
+
+    Parameters
+    ----------
+    result
+        An adjustment in which nothing of the points is held.
+    given
+        The block with their coordinates and standard deviations.
+    points
+        (k,) the points.
+    spread
+        Robust standard deviation of the test values of the adjustment.
+
+    Returns
+    -------
+    errors, tests
+        (k, 3) given minus predicted, and this by its standard deviation; NaN where nothing is held or
+        predicted.
+    """
+    held = np.isfinite(given.point_sd[points])
+    errors = np.where(held, given.point_positions[points] - result.point_positions[points], np.nan)
+    variances = given.point_sd[points] ** 2 + np.diagonal(result.point_cofactors[points], axis1=1, axis2=2)
+    return errors, errors / (spread * np.sqrt(np.where(held, variances, np.nan)))
+
+
+def exchanged_pair(result: Result, given: Block, points: Indices, spread: float) -> tuple[int, int] | None:
+    """Return the two points that agree with each other's predictions, not with their own, if there are two.
+
+    Accepted when the exchanged coordinates pass their test, and chi-square goes down by more than
+    2 ln(pairs / :data:`CHANCE`). Correlations between the predictions of two points are left out. Parameters
+    are those of :func:`tests_of_predictions`.
+    """
+    pairs = list(combinations(points.tolist(), 2))
+    best: tuple[float, int, int] | None = None
+    for one, other in pairs:
+        own, freedom = _disagreement(result, given, [one, other], [one, other], spread)
+        swapped, _ = _disagreement(result, given, [one, other], [other, one], spread)
+        better = own - swapped > 2 * math.log(len(pairs) / CHANCE)
+        if freedom and better and normal_of_chi_square(swapped, freedom) < FITS:
+            gain = own - swapped
+            if best is None or gain > best[0]:
+                best = gain, one, other
+    return None if best is None else (best[1], best[2])
+
+
+def exchanged_where_rays_meet(block: Block) -> tuple[int, int] | None:
+    """Return the two control points that are exchanged by what the initial stations say, if there are two.
+
+    For blocks that do not converge and have too few control points for predictions. Exchanging the names
+    must bring control and intersections together 25 times better, and far better than exchanging any other
+    two; a common shift is allowed for.
+    """
+    rays = Rays.of(block)
+    met = rays.intersect().positions
+    plan = np.isfinite(block.point_sd[:, :2]).all(axis=1) & np.isfinite(met).all(axis=1)
+    points = np.flatnonzero(plan)
+    if len(points) < FEWEST:
+        return None
+    heights = rays.axes.from_local(met[points])[:, 2]
+    given = block.point_positions[points].copy()
+    given[:, 2] = np.where(np.isfinite(block.point_sd[points, 2]), given[:, 2], heights)
+    # What is left of each intersection (row) when it is given the coordinates of each point (column).
+    left = met[points, np.newaxis, :2] - rays.axes.positions(given)[np.newaxis, :, :2]
+    squares = ((left - left.mean(axis=(0, 1))) ** 2).sum(axis=2)
+    own = np.diag(squares)
+    after = own.sum() - own[:, np.newaxis] - own + squares + squares.T
+    after = after[np.triu_indices(len(points), 1)]
+    freedom, order = 2 * len(points) - 2, np.argsort(after, kind="stable")
+    best, next_best = np.maximum(after[order[:2]], np.finfo(np.float64).tiny)
+    if own.sum() < BETTER * best or freedom * math.log(next_best / best) < RUNNER_UP:
+        return None
+    one, other = (index[order[0]] for index in np.triu_indices(len(points), 1))
+    return int(points[one]), int(points[other])
+
+
+def _disagreement(
+    result: Result, given: Block, coordinates: list[int], places: list[int], spread: float
+) -> tuple[float, int]:
+    """Chi-square of given coordinates against predictions at some places, and how many components it sums."""
+    total, freedom = 0.0, 0
+    for point, place in zip(coordinates, places, strict=True):
+        held = np.flatnonzero(np.isfinite(given.point_sd[point]))
+        errors = (given.point_positions[point] - result.point_positions[place])[held]
+        cofactors = result.point_cofactors[place][np.ix_(held, held)] + np.diag(
+            given.point_sd[point, held] ** 2
+        )
+        if not np.isfinite(errors).all():
+            return 0.0, 0
+        total += float(errors @ np.linalg.solve(cofactors, errors)) / spread**2
+        freedom += len(held)
+    return total, freedom

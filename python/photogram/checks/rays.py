@@ -1,0 +1,199 @@
+"""A block seen as straight rays in metric axes, and the intersection of the rays of every point by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.network import geometry
+from photogram.network.block import Block
+
+__all__ = ["Intersection", "LocalAxes", "Rays", "frame_radius", "local_axes", "meet"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+PARALLEL = 1e-8
+"""Determinant of the normal matrix of a mean ray below which the rays of a point count as parallel."""
+
+
+SMALL_FRAME = 0.01
+"""The radius of a frame, as a part of the principal distance, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocalAxes:
+    """Metric axes of a block: its own when rectangular, else east, north, up amid its stations."""
+
+    block: Block
+    origin: Floats
+    frame: Floats
+
+    def positions(self, positions: Floats) -> Floats:
+        """(n, 3) positions of the block in these axes; what is unknown stays NaN."""
+        return (self._cartesian(positions) - self.origin) @ self.frame.T
+
+    def from_local(self, local: Floats) -> Floats:
+        """(n, 3) positions of the block's own kind for positions in these axes."""
+        cartesian = local @ self.frame + self.origin
+        if self.block.spheroid is None:
+            return cartesian
+        return geometry.geocentric_to_geographic(cartesian, self.block.spheroid)
+
+    def cameras(self) -> Floats:
+        """(P, 3, 3) rotations from the axes of the photos to these axes."""
+        matrices = geometry.rotation_matrix(self.block.photo_attitudes)
+        to_ground = matrices if self.block.photo_to_ground else matrices.transpose(0, 2, 1)
+        if self.block.spheroid is None:
+            return to_ground
+        vertical = geometry.local_frames(self.block.photo_positions)
+        rotations: Floats = self.frame @ vertical.transpose(0, 2, 1) @ to_ground
+        return rotations
+
+    def _cartesian(self, positions: Floats) -> Floats:
+        if self.block.spheroid is None:
+            return positions
+        return geometry.geographic_to_geocentric(positions, self.block.spheroid)
+
+
+def local_axes(block: Block) -> LocalAxes:
+    """Return the metric axes of a block."""
+    if block.spheroid is None:
+        return LocalAxes(block, np.median(block.photo_positions, axis=0) * [1.0, 1.0, 0.0], np.eye(3))
+    middle = np.median(block.photo_positions, axis=0)[np.newaxis] * [1.0, 1.0, 0.0]
+    origin = geometry.geographic_to_geocentric(middle, block.spheroid)[0]
+    return LocalAxes(block, origin, geometry.local_frames(middle)[0])
+
+
+def frame_radius(block: Block) -> float:
+    """Return how far from the centre images reach, millimetres."""
+    reach = float(np.quantile(np.hypot(block.image_xy[:, 0], block.image_xy[:, 1]), 0.95))
+    return max(reach, SMALL_FRAME * float(np.abs(block.principal_distances).min()))
+
+
+@dataclass(frozen=True, eq=False)
+class Intersection:
+    """Every point where its rays meet, whichever side of the cameras that is.
+
+    Attributes
+    ----------
+    positions
+        (n, 3) in the metric axes; NaN with fewer than two rays, or parallel ones.
+    residuals
+        (m, 2) observed minus computed, millimetres; NaN where the point is.
+    in_front
+        (m,) whether the point lies in front of the camera.
+    """
+
+    positions: Floats
+    residuals: Floats
+    in_front: Mask
+
+    @property
+    def sizes(self) -> Floats:
+        """(m,) lengths of the residuals."""
+        sizes: Floats = np.hypot(self.residuals[:, 0], self.residuals[:, 1])
+        return sizes
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """The rays of a block: from the projection centres through the image points.
+
+    Attributes
+    ----------
+    block
+        The block.
+    axes
+        Its metric axes.
+    centres
+        (P, 3) projection centres in the metric axes.
+    cameras
+        (P, 3, 3) rotations from the photos to the metric axes.
+    used
+        (m,) the images that count.
+    """
+
+    block: Block
+    axes: LocalAxes
+    centres: Floats
+    cameras: Floats
+    used: Mask
+
+    @classmethod
+    def of(cls, block: Block, used: Mask | None = None) -> Rays:
+        """Return the rays of a block from its initial stations."""
+        axes = local_axes(block)
+        used = np.ones(len(block.image_xy), dtype=bool) if used is None else used
+        return cls(block, axes, axes.positions(block.photo_positions), axes.cameras(), used)
+
+    def without(self, images: Mask) -> Rays:
+        """Return the rays with some images left out."""
+        return replace(self, used=self.used & ~images)
+
+    def directions(self) -> Floats:
+        """(m, 3) unit vectors towards the ground: the photo looks along its negative z axis."""
+        block = self.block
+        distances = block.principal_distances[block.image_photos]
+        inner = np.column_stack([block.image_xy, distances]) * -np.sign(distances)[:, np.newaxis]
+        outer = np.einsum("mij,mj->mi", self.cameras[block.image_photos], inner)
+        unit: Floats = outer / np.linalg.norm(outer, axis=1, keepdims=True)
+        return unit
+
+    def equations(self) -> tuple[Floats, Floats]:
+        """Return I - d d^T and (I - d d^T) O of each ray, (m, 3, 3) and (m, 3)."""
+        directions, centres = self.directions(), self.centres[self.block.image_photos]
+        across = np.eye(3) - directions[:, :, np.newaxis] * directions[:, np.newaxis]
+        return across, np.einsum("mij,mj->mi", across, centres)
+
+    def intersect(self) -> Intersection:
+        """Intersect the rays of every point: least squares of the distances from the lines."""
+        return self.at(meet(*self.totals()))
+
+    def totals(self) -> tuple[Floats, Floats, Floats]:
+        """Sum the equations of the rays of each point: (n, 3, 3), (n, 3), and their number (n,)."""
+        across, right = self.equations()
+        points, count = self.block.image_points, len(self.block.point_ids)
+        used = self.used.astype(np.float64)
+
+        def total(values: Floats) -> Floats:
+            return np.bincount(points, weights=values * used, minlength=count).astype(np.float64)
+
+        normal = np.array([[total(across[:, i, j]) for j in range(3)] for i in range(3)]).transpose(2, 0, 1)
+        constant = np.array([total(right[:, i]) for i in range(3)]).T
+        return normal, constant, total(np.ones(len(points)))
+
+    def at(self, positions: Floats) -> Intersection:
+        """Return the residuals of all images for points at given (n, 3) positions in the metric axes."""
+        residuals, in_front = self.residuals(positions[self.block.image_points])
+        return Intersection(positions, residuals, in_front)
+
+    def residuals(self, positions: Floats, rows: Indices | None = None) -> tuple[Floats, Mask]:
+        """Return residuals, observed minus computed in mm, and whether the positions are in front.
+
+        Parameters
+        ----------
+        positions
+            (k, 3) a position for each image in the metric axes.
+        rows
+            (k,) the images; all by default.
+        """
+        block = self.block
+        which: Indices | slice = slice(None) if rows is None else rows
+        photos = block.image_photos[which]
+        inner = np.einsum("mji,mj->mi", self.cameras[photos], positions - self.centres[photos])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = block.principal_distances[photos] / inner[:, 2]
+        return block.image_xy[which] - inner[:, :2] * scale[:, np.newaxis], inner[:, 2] < 0
+
+
+def meet(normal: Floats, constant: Floats, rays: Floats) -> Floats:
+    """Solve (k, 3, 3) normal equations of `rays` rays each; NaN where they do not determine a position."""
+    determined = rays >= 1.5
+    determined &= np.linalg.det(normal) > PARALLEL * np.maximum(rays, 1) ** 3
+    positions = np.full(constant.shape, np.nan)
+    positions[determined] = np.linalg.solve(normal[determined], constant[determined, :, np.newaxis])[..., 0]
+    return positions

@@ -1,0 +1,183 @@
+"""Patterns of the residuals: by rays, of points, of photos, across the frame (Appendix H)."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.checks.findings import Finding, Section
+from photogram.checks.rays import frame_radius
+from photogram.checks.robust import critical, normal_of_chi_square
+from photogram.results.result import Result
+
+__all__ = ["residuals"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FEWEST = 20
+"""Images of a photo that a test of its pattern needs."""
+WORTH = 0.3
+"""A pattern of all photos matters from this part of the standard deviation of an image coordinate on."""
+ROUNDING = 0.01
+"""Of the standard deviation of an image coordinate: smaller standard deviations of residuals are not used."""
+SHOWN = 5
+
+
+def residuals(result: Result, spread: float) -> Section:
+    """Describe the residuals of an adjustment and test them for systematic patterns.
+
+    Parameters
+    ----------
+    result
+        An adjustment with covariances.
+    spread
+        Robust standard deviation of its test values.
+    """
+    section = Section(
+        "Patterns of the residuals",
+        "Residuals should have no pattern. They grow with the number of rays: two rays leave all parallax"
+        " along the flight line to the height.",
+    )
+    _by_rays(result, section)
+    _sums(result, section)
+    _frame_pattern(result, spread, section)
+    _photo_patterns(result, spread, section)
+    return section
+
+
+def _by_rays(result: Result, section: Section) -> None:
+    used = result.used_images
+    rays = result.point_rays[result.block.image_points]
+    section.lines.append(f"{'rays':>6}{'images':>9}{'rms x um':>11}{'rms y um':>11}{'mean redundancy':>17}")
+    for number in np.unique(rays[used]).tolist():
+        rows = used & (rays == number)
+        x, y = 1000 * np.sqrt((result.residuals[rows] ** 2).mean(axis=0))
+        redundancy = result.redundancy[rows].mean()
+        section.lines.append(f"{number:>6}{int(rows.sum()):>9}{x:>11.2f}{y:>11.2f}{redundancy:>17.3f}")
+
+
+def _sums(result: Result, section: Section) -> None:
+    """Look for points whose residuals do not balance."""
+    block, used = result.block, result.used_images
+    count = len(block.point_ids)
+    points = block.image_points[used]
+    sums = np.column_stack(
+        [np.bincount(points, weights=result.residuals[used][:, k], minlength=count) for k in range(2)]
+    )
+    variances = np.column_stack(
+        [
+            np.bincount(
+                points, weights=(block.image_sd**2 * result.redundancy)[used][:, k].clip(0), minlength=count
+            )
+            for k in range(2)
+        ]
+    )
+    several = result.point_rays >= 3
+    if not several.any():
+        return
+    rms = 1000 * np.sqrt((sums[several] ** 2).mean())
+    section.lines.append(f"{'rms of the sums of the residuals of a point':<50}{rms:.2f} um (3 and more rays)")
+    # A point whose residuals nothing checks has sums of rounding errors.
+    floor = (ROUNDING * float(block.image_sd.min())) ** 2
+    sizes = np.abs(sums) / np.sqrt(np.maximum(variances, floor)) * several[:, np.newaxis]
+    limit = critical(2 * int(several.sum()))
+    for point in np.argsort(-sizes.max(axis=1), kind="stable")[:SHOWN].tolist():
+        if sizes[point].max() > limit:
+            x, y = 1000 * sums[point]
+            text = (
+                f"the residuals of point {block.point_ids[point]} do not balance: they sum to {x:.1f} um in x"
+                f" and {y:.1f} um in y; is its control, or one of its images, wrong?"
+            )
+            section.findings.append(Finding("unbalanced-point", "look", text, [], [block.point_ids[point]]))
+
+
+def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
+    """Patterns over the frame that no position or attitude of the photo takes up, (k, terms, 2)."""
+    x, y = (xy / size).T
+    r2, zero = x**2 + y**2, np.zeros_like(x)
+    patterns = {
+        "scale of x against y": (x, -y),
+        "shear": (y, x),
+        "radial distortion": (x * r2, y * r2),
+        "tangential distortion, x": (r2 + 2 * x**2, 2 * x * y),
+        "tangential distortion, y": (2 * x * y, r2 + 2 * y**2),
+        "bend of y over x": (zero, x**2),
+        "bend of x over y": (y**2, zero),
+    }
+    return list(patterns), np.stack([np.column_stack(each) for each in patterns.values()], axis=1)
+
+
+def _frame_pattern(result: Result, spread: float, section: Section) -> None:
+    """Look for a pattern that all photos share: lens, film, or the reduction of the plates."""
+    block, used = result.block, result.used_images
+    size = frame_radius(block)
+    names, terms = _terms(block.image_xy[used], size)
+    sd = block.image_sd[used]
+    usual = float(np.median(sd))
+    limit = critical(len(names))
+    for index, name in enumerate(names):
+        design = terms[:, index] / sd
+        norm = float((design**2).sum())
+        if norm == 0:
+            continue
+        amplitude = float((design * (result.residuals[used] / sd)).sum()) / norm
+        significance = abs(amplitude) * math.sqrt(norm) / spread
+        section.lines.append(
+            f"{f'pattern of all photos, {name}':<50}{1000 * amplitude:.2f} um at {size:.0f} mm from the"
+            f" centre ({significance:.1f} standard deviations)"
+        )
+        if significance > limit and abs(amplitude) > WORTH * usual:
+            text = (
+                f"all photos share a pattern: {name}, {1000 * amplitude:.1f} um at {size:.0f} mm from the"
+                " centre; is the lens, the film or the refraction corrected?"
+            )
+            values = {"amplitude_um": 1000 * amplitude, "significance_sd": significance}
+            section.findings.append(Finding("systematic-pattern", "look", text, values=values))
+
+
+def _photo_patterns(result: Result, spread: float, section: Section) -> None:
+    """Test the residuals of each photo for the mean and the same patterns."""
+    block = result.block
+    rows = np.flatnonzero(result.used_images)
+    rows = rows[np.argsort(block.image_photos[rows], kind="stable")]
+    bounds = np.searchsorted(block.image_photos[rows], np.arange(len(block.photo_ids) + 1)).tolist()
+    size = frame_radius(block)
+    limit, tested = critical(len(block.photo_ids)), 0
+    for photo, (first, last) in enumerate(pairwise(bounds)):
+        own = rows[first:last]
+        if len(own) < FEWEST:
+            continue
+        tested += 1
+        significance = _own_pattern(result, own, size, spread)
+        if significance > limit:
+            name, mean = block.photo_ids[photo], 1000 * result.residuals[own].mean(axis=0)
+            text = (
+                f"the residuals of photo {name} have a pattern (mean {mean[0]:.1f} um in x, {mean[1]:.1f} um"
+                f" in y; {significance:.1f} standard deviations): look at its preprocessing"
+            )
+            values = {
+                "mean_x_um": float(mean[0]),
+                "mean_y_um": float(mean[1]),
+                "significance_sd": significance,
+            }
+            section.findings.append(Finding("photo-pattern", "look", text, [name], [], values))
+    section.lines.append(
+        f"{'photos tested for a pattern of their own':<50}{tested} of {len(block.photo_ids)}"
+    )
+
+
+def _own_pattern(result: Result, rows: Indices, size: float, spread: float) -> float:
+    """Return how significant mean and patterns of some images of a photo are, in standard deviations."""
+    block = result.block
+    _, terms = _terms(block.image_xy[rows], size)
+    means = np.broadcast_to(np.eye(2), (len(rows), 2, 2))
+    design = np.concatenate([means, terms], axis=1) / block.image_sd[rows][:, np.newaxis]
+    design = design.transpose(0, 2, 1).reshape(2 * len(rows), -1)
+    observed = (result.residuals[rows] / block.image_sd[rows]).ravel() / spread
+    solved = np.linalg.lstsq(design, observed, rcond=None)[0]
+    explained = float(((design @ solved) ** 2).sum())
+    return normal_of_chi_square(explained, design.shape[1])

@@ -1,0 +1,227 @@
+"""Stations off the path of their strip (Appendix H: straight and level as far as possible, never exactly)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.checks.findings import Finding, Level, Section
+from photogram.checks.rays import local_axes
+from photogram.checks.robust import MAD_TO_SD, fit
+from photogram.network import geometry
+from photogram.network.block import Block
+from photogram.results.result import Result
+
+__all__ = ["stations", "strips_of"]
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+LOOK, GRAVE = 8.0, 20.0
+"""Departures from the path, in robust standard deviations of all departures of their kind."""
+FEW = 4
+"""So many free departures double what is allowed."""
+MOVED = 10.0
+"""The same for the change from the initial to the adjusted station."""
+TINY = 1e-9
+"""A spread below this is rounding: radians, or the linear unit."""
+FEWEST = 5
+"""Photos of a strip whose path can be judged."""
+CURVED = 15
+"""Photos of a strip whose path may be curved."""
+SMOOTH_POSITION, SMOOTH_ANGLE = 1e-3, 1e-3
+"""Departures that are never remarked on: of the base, and radians."""
+QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
+"""The angles are those between the photo and its strip, ground-to-photo."""
+
+
+def stations(block: Block, result: Result | None, misleading: Collection[str] = ()) -> Section:
+    """Compare every station with the smooth path of its strip, and with its initial values.
+
+    Parameters
+    ----------
+    block
+        The block with its initial stations.
+    result
+        Its adjustment, if there is one.
+    misleading
+        Photos on whose points good images looked wrong from the initial stations: if one of them has moved,
+        its initial values are wrong beyond doubt.
+    """
+    section = Section(
+        "Stations",
+        "An aircraft flies straight and level as far as it can: a departure from its path wants a reason.",
+    )
+    which = "initial"
+    if result is not None:
+        _moved(result, misleading, section)
+        block = result.block.replace(
+            photo_positions=result.photo_positions, photo_attitudes=result.photo_attitudes
+        )
+        which = "adjusted"
+    axes = local_axes(block)
+    positions, cameras = axes.positions(block.photo_positions), axes.cameras()
+    strips = strips_of(positions)
+    heights = block.photo_positions[:, 2]
+    paths = [
+        _path(positions[strip], heights[strip], cameras[strip]) for strip in strips if len(strip) >= FEWEST
+    ]
+    section.lines.append(
+        f"{len(strips)} strips; {len(paths)} of them long enough ({FEWEST} photos) to judge the {which} path"
+    )
+    if paths:
+        _compare(block, [strip for strip in strips if len(strip) >= FEWEST], paths, which, section)
+    return section
+
+
+def strips_of(positions: Floats) -> list[Indices]:
+    """Cut the photos, in their order, into strips: where the flight turns or jumps.
+
+    Parameters
+    ----------
+    positions
+        (P, 3) in metric axes.
+    """
+    plan = positions[:, :2]
+    steps = np.linalg.norm(np.diff(plan, axis=0), axis=1)
+    usual = float(np.median(steps)) if steps.size else 0.0
+
+    def follows(before: int, start: int, next_: int, gaps: int) -> bool:
+        step = plan[next_] - plan[before]
+        if np.linalg.norm(step) > 2.5 * gaps * usual:
+            return False
+        course = plan[before] - plan[start]
+        # Within 45 degrees of the course so far.
+        return before == start or bool(
+            step @ course > np.sqrt(0.5) * np.linalg.norm(step) * np.linalg.norm(course)
+        )
+
+    strips: list[list[int]] = []
+    last = 0
+    for photo in range(len(plan)):
+        if strips and follows(last, strips[-1][0], photo, photo - last):
+            strips[-1].append(photo)
+            last = photo
+        # One photo out of line breaks no strip when the next one is back on course.
+        elif (
+            strips
+            and len(strips[-1]) > 1
+            and last == photo - 1
+            and photo + 1 < len(plan)
+            and follows(last, strips[-1][0], photo + 1, 2)
+        ):
+            strips[-1].append(photo)
+        else:
+            strips.append([photo])
+            last = photo
+    return [np.array(strip, dtype=np.int64) for strip in strips]
+
+
+@dataclass(frozen=True)
+class _Path:
+    """Departures (k, 5) of the photos of a strip from its path, and what its fit leaves free of their sizes.
+
+    A robust fit passes through as many photos as it has coefficients; `free` are the other sizes (k - 2, 5),
+    or (k - 3, 5) of a curved path.
+    """
+
+    departures: Floats
+    free: Floats
+
+
+def _path(positions: Floats, heights: Floats, cameras: Floats) -> _Path:
+    half = len(positions) // 2
+    along = np.median(positions[-half:], axis=0) - np.median(positions[:half], axis=0)
+    along[2] = 0.0
+    along /= np.linalg.norm(along)
+    frame = np.array([along, np.cross([0.0, 0.0, 1.0], along), [0.0, 0.0, 1.0]])
+    angles = geometry.rotation_angles(np.ascontiguousarray(cameras.transpose(0, 2, 1) @ frame.T))
+    middle = np.angle(np.median(np.cos(angles), axis=0) + 1j * np.median(np.sin(angles), axis=0))
+    angles = np.angle(np.exp(1j * (angles - middle)))
+    place = positions @ frame.T
+    values = np.column_stack([place[:, 1], heights, angles])
+    t = (place[:, 0] - place[:, 0].mean()) / max(float(np.ptp(place[:, 0])), 1e-300)
+    degree = 2 if len(t) >= CURVED else 1
+    design = np.vander(t, degree + 1)
+    # Each quantity by itself: a wrong height says nothing about kappa.
+    columns = [values[:, [k]] - design @ fit(design, values[:, [k]]) for k in range(values.shape[1])]
+    departures = np.hstack(columns)
+    departures[:, 2:] = np.angle(np.exp(1j * departures[:, 2:]))
+    return _Path(departures, np.sort(np.abs(departures), axis=0)[degree + 1 :])
+
+
+def _spread(sizes: Floats) -> Floats:
+    spread: Floats = MAD_TO_SD * np.median(sizes, axis=0)
+    return spread
+
+
+def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str, section: Section) -> None:
+    """Name the photos that depart from the path far more than photos do on the whole."""
+    free = np.vstack([path.free for path in paths])
+    # The spread of few departures is itself uncertain.
+    usual, doubt = _spread(free), 1 + FEW / len(free)
+    base = _base(block)
+    floor = np.array([SMOOTH_POSITION * base] * 2 + [SMOOTH_ANGLE] * 3)
+    units = [block.linear_unit] * 2 + ["deg"] * 3
+    factors = np.array([1.0, 1.0, *[np.degrees(1.0)] * 3])
+    for name, spread, unit in zip(QUANTITIES, usual * factors, units, strict=True):
+        section.lines.append(f"{f'spread about the path, {name}':<50}{spread:.4f} {unit}")
+    for strip, path in zip(strips, paths, strict=True):
+        scale = np.maximum(np.maximum(usual, _spread(path.free)), floor)
+        for row, k in np.argwhere(np.abs(path.departures) > LOOK * doubt * scale).tolist():
+            size = abs(path.departures[row, k]) / scale[k] / doubt
+            departure, photo = float(path.departures[row, k] * factors[k]), block.photo_ids[strip[row]]
+            text = (
+                f"station {photo} is off the {which} path of its strip: {QUANTITIES[k]} by {departure:.3f}"
+                f" {units[k]}, {size:.0f} times the usual"
+            )
+            level: Level = "grave" if size > GRAVE else "look"
+            values = {"departure": departure, "times_usual": float(size)}
+            section.findings.append(Finding("outlying-station", level, text, [photo], [], values))
+
+
+def _moved(result: Result, misleading: Collection[str], section: Section) -> None:
+    """Name the stations that the adjustment moved far more than the others."""
+    block = result.block
+    if len(block.photo_ids) < FEWEST:
+        return
+    axes, base = local_axes(block), _base(block)
+    shifts = axes.positions(result.photo_positions) - axes.positions(block.photo_positions)
+    turns = result.photo_attitudes - block.photo_attitudes
+    turns = np.angle(np.exp(1j * turns))
+    unit = block.linear_unit
+    for what, changes, shown, factor in (
+        ("position", shifts, unit, 1.0),
+        ("attitude", turns, "deg", float(np.degrees(1.0))),
+    ):
+        spread = MAD_TO_SD * np.median(np.abs(changes), axis=0)
+        sizes = np.abs(changes) / np.maximum(spread, TINY)
+        listed = ", ".join(f"{each * factor:.4f}" for each in spread)
+        section.lines.append(f"{f'usual change of {what} by the adjustment':<50}{listed} {shown}")
+        small = np.abs(changes).max(axis=1) < (SMOOTH_ANGLE if what == "attitude" else SMOOTH_POSITION * base)
+        for photo in np.flatnonzero((sizes.max(axis=1) > MOVED) & ~small).tolist():
+            k = int(sizes[photo].argmax())
+            name = block.photo_ids[photo]
+            wrong = name in misleading
+            text = (
+                f"station {name}: the adjustment changed its {what} by"
+                f" {changes[photo, k] * factor:.3f} {shown}, {sizes[photo, k]:.0f} times the usual: "
+            ) + (
+                "its initial values are wrong, and made good images look wrong"
+                if wrong
+                else "are its initial values right?"
+            )
+            values = {"change": float(changes[photo, k] * factor), "times_usual": float(sizes[photo, k])}
+            section.findings.append(
+                Finding("moved-station", "grave" if wrong else "look", text, [name], [], values)
+            )
+
+
+def _base(block: Block) -> float:
+    """Return the usual distance of a photo from the next; 0 for a single photo."""
+    positions = local_axes(block).positions(block.photo_positions)
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    return float(np.median(steps)) if steps.size else 0.0

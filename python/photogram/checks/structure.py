@@ -1,0 +1,98 @@
+"""Structure of a block: rays, ties and bandwidth (GIANT guide, Appendices A and H)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.checks.findings import Finding, Section
+from photogram.messages import listed
+from photogram.network.block import Block
+from photogram.network.structuring import structure
+from photogram.network.ties import FEWEST_TIES, ties
+from photogram.results.report import bandwidths
+from photogram.results.result import Result
+
+__all__ = ["parts_of", "structure_section"]
+
+Indices = NDArray[np.int64]
+
+
+def structure_section(block: Block, result: Result | None) -> Section:
+    """Describe rays, ties and bandwidth; name photos with few ties, and parts that share no point.
+
+    Parameters
+    ----------
+    block
+        The block as it was read.
+    result
+        Its adjustment, for the order that the program chose.
+    """
+    section = Section(
+        "Structure",
+        "Points tie photos together; the order of FRAMES makes the bandwidth of the 1987 program.",
+    )
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    counts = np.bincount(block.image_photos, minlength=len(block.photo_ids))
+    for number, points in zip(*np.unique(rays, return_counts=True), strict=True):
+        section.lines.append(f"{f'points on {number} photos':<50}{points}")
+    section.lines.append(
+        f"{'points on a photo, least, median, most':<50}"
+        f"{counts.min()}, {np.median(counts):.0f}, {counts.max()}"
+    )
+    _bandwidths(block, result, section)
+    tied = ties(block)
+    for photo in np.flatnonzero(tied < FEWEST_TIES).tolist():
+        name = block.photo_ids[photo]
+        text = f"photo {name} has only {tied[photo]} points that other photos or control tie"
+        section.findings.append(Finding("few-ties", "grave", text, [name], [], {"ties": float(tied[photo])}))
+    _parts(block, section)
+    return section
+
+
+def _bandwidths(block: Block, result: Result | None, section: Section) -> None:
+    if result is not None:
+        section.lines += bandwidths(result)
+        bandwidth = structure(result.block.image_photos, result.block.image_points).effective_bandwidth
+    else:
+        structured = structure(block.image_photos, block.image_points)
+        bandwidth = structured.effective_bandwidth
+        section.lines.append(
+            f"{'bandwidth in the order of the input':<50}{bandwidth} sets of three effective,"
+            f" {structured.naive_bandwidth} without sharing"
+        )
+    photos = (bandwidth - 1) // 2
+    section.lines.append(
+        f"{bandwidth} sets hold {photos} photos at a time: a photo may share points with {max(photos - 1, 0)}"
+        " photos before it or after it in FRAMES"
+    )
+
+
+def _parts(block: Block, section: Section) -> None:
+    """Name the parts of a block that share no point."""
+    parts = parts_of(block)
+    numbers, sizes = np.unique(parts, return_counts=True)
+    section.lines.append(f"{'parts without a common point':<50}{len(numbers)}")
+    if len(numbers) < 2:
+        return
+    largest = numbers[sizes.argmax()]
+    for number in numbers[numbers != largest].tolist():
+        names = [block.photo_ids[photo] for photo in np.flatnonzero(parts == number).tolist()]
+        text = f"no point ties the photos {listed(names)} to the others: are names of points spelt alike?"
+        section.findings.append(Finding("separate-part", "grave", text, names))
+
+
+def parts_of(block: Block) -> Indices:
+    """(P,) the first photo of the part of the block to which each photo belongs."""
+    photos, points = block.image_photos, block.image_points
+    labels = np.arange(len(block.photo_ids))
+    while True:
+        by_point = np.full(len(block.point_ids), len(labels))
+        np.minimum.at(by_point, points, labels[photos])
+        fewer = labels.copy()
+        np.minimum.at(fewer, photos, by_point[points])
+        # Follow the labels to where they lead: the number of passes grows with the logarithm of the length.
+        fewer = fewer[fewer]
+        if (fewer == labels).all():
+            return labels
+        labels = fewer

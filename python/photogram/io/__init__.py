@@ -1,0 +1,1 @@
+"""Files: text, tables of commas, records of fixed columns, and the one writer of all results."""

@@ -1,0 +1,109 @@
+"""A file as numbered records of fixed columns: the cards of all the programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Self
+
+from photogram.errors import InputError
+from photogram.io.files import read_lines
+from photogram.io.places import Place
+from photogram.messages import Message
+
+__all__ = ["Record", "Source"]
+
+WIDTH = 80
+WIDE = 0.25
+"""Zero bytes that no text of one byte a character has, as a part of all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The records of one file.
+
+    Attributes
+    ----------
+    path
+        Where the file is.
+    lines
+        Its records without their line ends, cut after column 80.
+    messages
+        Remarks made while the records are read.
+    """
+
+    path: Path
+    lines: list[str]
+    messages: list[Message] = field(default_factory=list)
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a text file (UTF-8, else Latin-1; any line ends).
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is UTF-16 or UTF-32, or a record holds a tab or another control
+            character, which would move its columns.
+        """
+        lines = read_lines(path)
+        if sum(line.count("\0") for line in lines) > WIDE * sum(map(len, lines)):
+            error = "text of two or four bytes a character (UTF-16, UTF-32): save it as UTF-8"
+            raise InputError(error, file=path)
+        source = cls(path, [line[:WIDTH] for line in lines])
+        for number, line in enumerate(source.lines, 1):
+            if not line.isprintable():
+                what = next(character for character in line if not character.isprintable())
+                error = f"the character {what!r} has no place in a record of fixed columns"
+                raise source.record(number).error(error)
+        return source
+
+    def record(self, number: int) -> Record:
+        """Return the record of a number, from 1."""
+        return Record(self, number)
+
+    def filled(self) -> list[int]:
+        """Return the numbers of the records that are not blank."""
+        return [number for number, line in enumerate(self.lines, 1) if line.strip(" ")]
+
+    def error(self, text: str) -> InputError:
+        """Return an error about the file as a whole."""
+        return InputError(text, file=self.path)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One record; columns are counted from 1, first and last included."""
+
+    source: Source
+    number: int
+
+    @property
+    def text(self) -> str:
+        """The characters of the record."""
+        return self.source.lines[self.number - 1]
+
+    @property
+    def place(self) -> Place:
+        """Where the record stands."""
+        return Place(self.source.path, self.number, self.text)
+
+    def error(self, text: str) -> InputError:
+        """Return an error that names file, record number and record."""
+        return self.place.error(text)
+
+    def message(self, text: str) -> Message:
+        """Return a remark that names file, record number and record."""
+        return self.place.message(text)
+
+    def remark(self, text: str) -> None:
+        """Add a remark on this record to the messages of the file."""
+        self.source.messages.append(self.message(text))
+
+    def columns(self, first: int, last: int) -> str:
+        """Return the characters of a field."""
+        return self.text[first - 1 : last]
+
+    def blank(self, first: int, last: int) -> bool:
+        """Whether a field is blank."""
+        return not self.columns(first, last).strip(" ")

@@ -1,0 +1,212 @@
+"""Comma-separated tables of all programs, whose errors name file, record and text.
+
+Nothing in a file can make reading dear or end it with anything but an :class:`InputError`: a record has a
+greatest length, which keeps every cell below the limit of the module `csv`; columns are looked up by name;
+numbers have one strict spelling (:mod:`photogram.numbers`).
+"""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from photogram.io.files import read_lines
+from photogram.io.numbers import LARGEST_INTEGER, finite_number, whole_number
+from photogram.io.places import Place
+from photogram.messages import listed, quoted
+
+__all__ = ["LONGEST_RECORD", "Row", "Table", "cells", "read_rows"]
+
+LONGEST_RECORD = 100_000
+"""Characters of a record at most. The module `csv` stops at cells of 131,072."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One record: its cells by column, and where it stands."""
+
+    cells: Mapping[str, str]
+    place: Place
+
+    def integer(self, column: str, default: int | None = None, *, highest: int = LARGEST_INTEGER) -> int:
+        """Return a whole number that is not negative; `default` where the cell or the column is missing.
+
+        Raises
+        ------
+        InputError
+            The cell is blank without a default, or no such number up to `highest`.
+        """
+        text = self.cells.get(column, "")
+        if not text and default is not None:
+            return default
+        try:
+            return whole_number(text, highest=highest)
+        except ValueError as error:
+            raise self.place.error(f"{column} {error}") from None
+
+    def number(self, column: str) -> float | None:
+        """Return a finite number; None where the cell is blank or the column is missing.
+
+        Raises
+        ------
+        InputError
+            The cell is no such number.
+        """
+        text = self.cells.get(column, "")
+        if not text:
+            return None
+        try:
+            return finite_number(text)
+        except ValueError as error:
+            raise self.place.error(f"{column} {error}") from None
+
+    def required(self, column: str) -> float:
+        """Return a finite number.
+
+        Raises
+        ------
+        InputError
+            The cell is blank, or no such number.
+        """
+        value = self.number(column)
+        if value is None:
+            raise self.place.error(f"{column} is blank")
+        return value
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: the names of its columns, and its records, which are split one at a time.
+
+    Attributes
+    ----------
+    path
+        The file.
+    head
+        The record that names the columns.
+    columns
+        Their names.
+    records
+        The records below, blank ones and comments left out.
+    comments
+        Records that begin with the mark of a comment.
+    ragged
+        Whether cells may be missing at the end of a record; they are blank then.
+    """
+
+    path: Path
+    head: Place
+    columns: tuple[str, ...]
+    records: tuple[Place, ...]
+    comments: tuple[Place, ...] = ()
+    ragged: bool = False
+
+    @classmethod
+    def read(
+        cls,
+        path: Path,
+        *,
+        comment: str | None = None,
+        ragged: bool = False,
+        spelling: Callable[[str], str] = str,
+    ) -> Table:
+        """Read a table whose first record names the columns.
+
+        Parameters
+        ----------
+        path
+            The file.
+        comment
+            With what comments begin; None: there are none.
+        ragged
+            Whether cells may be missing at the end of a record.
+        spelling
+            Gives the name of a column from what the file calls it.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read, holds no table, or two of its columns have one name.
+        """
+        comments: list[Place] = []
+        records: list[Place] = []
+        for number, line in enumerate(read_lines(path), 1):
+            if comment is not None and line.lstrip().startswith(comment):
+                comments.append(Place(path, number, line))
+            elif line.strip(" \t,"):
+                records.append(Place(path, number, line))
+        if not records:
+            raise Place(path).error("holds no table")
+        head, *body = records
+        columns = tuple(spelling(name) for name in cells(head))
+        if twice := [name for name, count in Counter(columns).items() if name and count > 1]:
+            raise head.error(f"the column {quoted(twice[0])} is there twice")
+        return cls(path, head, columns, tuple(body), tuple(comments), ragged)
+
+    def require(self, *columns: str) -> None:
+        """Refuse a table without these columns.
+
+        Raises
+        ------
+        InputError
+            Those that are missing.
+        """
+        there = set(self.columns)
+        if missing := [column for column in columns if column not in there]:
+            what = "the column {} is missing" if len(missing) == 1 else "the columns {} are missing"
+            raise self.head.error(what.format(listed(missing)))
+
+    def rows(self) -> Iterator[Row]:
+        """Split the records, one after the other.
+
+        Raises
+        ------
+        InputError
+            A record has more cells than there are columns, or fewer and the table is not ragged.
+        """
+        count = len(self.columns)
+        for place in self.records:
+            found = cells(place)
+            if len(found) > count or (len(found) < count and not self.ragged):
+                raise place.error(f"there are {len(found)} cells under {count} columns")
+            yield Row(dict(zip(self.columns, found, strict=False)), place)
+
+
+def cells(place: Place) -> list[str]:
+    """Split a record at its commas; quotation marks hold a cell together.
+
+    Raises
+    ------
+    InputError
+        The record is too long to be one, or cannot be split.
+    """
+    text = place.text or ""
+    if len(text) > LONGEST_RECORD:
+        raise place.error(f"a record of {len(text)} characters; {LONGEST_RECORD} are the most")
+    try:
+        return [cell.strip() for cell in next(csv.reader([text]))]
+    except csv.Error as error:
+        raise place.error(f"cannot be split into cells: {error}") from None
+
+
+def read_rows(path: Path, needed: Collection[str]) -> list[Row]:
+    """Read a ragged table without comments.
+
+    Parameters
+    ----------
+    path
+        The file.
+    needed
+        Columns that must be there.
+
+    Raises
+    ------
+    InputError
+        As :meth:`Table.read`, :meth:`Table.require` and :meth:`Table.rows`.
+    """
+    table = Table.read(path, ragged=True)
+    table.require(*needed)
+    return list(table.rows())

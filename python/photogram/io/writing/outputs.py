@@ -1,0 +1,322 @@
+"""A set of files that are completed first, and then put in place together."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import stat
+import sys
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from photogram.io.writing.guard import Guard
+from photogram.io.writing.interruption import deferred
+from photogram.io.writing.markers import clear_marks, mark, unmark
+from photogram.io.writing.staging import NEW, Staging, remove_leftovers, sync_directory
+from photogram.io.writing.targets import Target, naming
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+__all__ = ["OutputSet", "abandon_all", "write_whole"]
+
+PERMISSIONS = 0o777
+
+
+class _Raw(io.RawIOBase):
+    """A descriptor whose errors name the file as the user did."""
+
+    def __init__(self, descriptor: int, given: Path) -> None:
+        self._descriptor = descriptor
+        self._given = given
+
+    def writable(self) -> bool:
+        return True
+
+    def fileno(self) -> int:
+        return self._descriptor
+
+    def write(self, data: ReadableBuffer) -> int:
+        with naming(self._given):
+            return os.write(self._descriptor, data)
+
+    def close(self) -> None:
+        if not self.closed:
+            super().close()
+            with naming(self._given):
+                os.close(self._descriptor)
+
+
+@dataclass
+class _Staged:
+    """A file that is completed in a staging directory."""
+
+    target: Target
+    path: str
+    file: io.BufferedWriter
+    old: str | None = None
+    placed: bool = False
+
+    def complete(self) -> None:
+        """Put the content on the disk."""
+        if not self.file.closed:
+            with naming(self.target.given):
+                self.file.flush()
+                os.fsync(self.file.fileno())
+            self.file.close()
+
+    def keep(self) -> None:
+        """Give what stands at the place another name, where the file system can, for :meth:`restore`."""
+        if self.target.status:
+            with suppress(OSError):
+                os.link(self.target.place, f"{self.path}.old", follow_symlinks=False)
+                self.old = f"{self.path}.old"
+
+    def place(self) -> None:
+        """Move the file to its place."""
+        with naming(self.target.given):
+            os.replace(self.path, self.target.place)
+        self.placed = True
+
+    def restore(self) -> bool:
+        """Put back what stood at the place; False if it cannot be."""
+        if not self.placed:
+            return True
+        try:
+            if self.old:
+                os.replace(self.old, self.target.place)
+            elif not self.target.status:
+                os.unlink(self.target.place)
+            else:
+                return False
+        except OSError:
+            return False
+        return True
+
+
+class OutputSet:
+    """Files that are all there in the end, or none: a context manager.
+
+    Every file is completed in a hidden directory beside its place and put on the disk; when all are, they are
+    moved to their places in one pass, during which signals wait. If one cannot be moved, those that were are
+    put back. While more than one file is moved a mark stands in each directory, so that a run that is killed
+    then leaves a word. What the exception of the block, a signal or a failure leaves is the state before.
+
+    Symbolic links are followed and stay; what is no regular file is written through: at once by :meth:`open`,
+    before the files are put in place by :meth:`write`.
+
+    Parameters
+    ----------
+    inputs
+        Files that are read: none is written over.
+
+    Raises
+    ------
+    InputError
+        An output is an input, a directory, or another output.
+    OSError
+        A file cannot be written; the error names it as the caller did.
+    """
+
+    def __init__(self, inputs: Iterable[Path] = ()) -> None:
+        self._guard = Guard(inputs)
+        self._staged: list[_Staged] = []
+        self._streams: list[io.BufferedWriter] = []
+        self._late: list[tuple[Target, bytes]] = []
+        self._stagings: dict[str, Staging] = {}
+        self._made: list[str] = []
+
+    def __enter__(self) -> Self:
+        _live.append(self)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._finish()
+        finally:
+            self.abandon()
+
+    def open(self, path: Path) -> io.BufferedWriter:
+        """Open a file to be written piece by piece; the set closes it."""
+        target = self._target(path)
+        if target.regular:
+            return self._stage(target)
+        file = _stream(target)
+        self._streams.append(file)
+        return file
+
+    def write(self, path: Path, content: bytes) -> None:
+        """Write a file."""
+        target = self._target(path)
+        if target.regular:
+            self._stage(target).write(content)
+            self._staged[-1].complete()
+        else:
+            self._late.append((target, content))
+
+    def _target(self, path: Path) -> Target:
+        target = self._guard.add(path)
+        if target.regular and target.status and not os.access(target.place, os.W_OK):
+            raise PermissionError(errno.EACCES, "is write-protected", str(path))
+        return target
+
+    def _stage(self, target: Target) -> io.BufferedWriter:
+        with naming(target.given):
+            staging = self._staging(target.directory)
+            path = os.path.join(staging.path, str(len(self._staged)))
+            mode = stat.S_IMODE(target.status.st_mode) & PERMISSIONS if target.status else 0o666
+            descriptor = os.open(path, os.O_WRONLY | NEW, mode)
+            file = _opened(descriptor, target)
+            self._staged.append(_Staged(target, path, file))
+            if target.status:
+                _keep_owner(descriptor, target.status, mode)
+        return file
+
+    def _staging(self, directory: str) -> Staging:
+        if directory not in self._stagings:
+            self._make(directory)
+            remove_leftovers(directory)
+            # Known before it is made, so that it is removed whenever the process is told to end.
+            self._stagings[directory] = Staging(directory)
+            self._stagings[directory].begin()
+        return self._stagings[directory]
+
+    def _make(self, directory: str) -> None:
+        """Make a directory with those above it."""
+        if os.path.isdir(directory):
+            return
+        self._make(os.path.dirname(directory))
+        # Before it is made, so that it is removed whenever the process is told to end.
+        self._made.append(directory)
+        try:
+            os.mkdir(directory)
+        except FileExistsError:
+            self._made.remove(directory)
+            if not os.path.isdir(directory):
+                raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR)) from None
+
+    def _finish(self) -> None:
+        for staged in self._staged:
+            staged.complete()
+        for file in self._streams:
+            file.close()
+        for target, content in self._late:
+            with _stream(target) as file:
+                file.write(content)
+        with deferred():
+            self._place()
+
+    def _place(self) -> None:
+        """Move all files to their places, or none."""
+        places = [staged.target.place for staged in self._staged]
+        several = len(places) > 1
+        try:
+            for staged in self._staged:
+                staged.keep()
+            if several:
+                for staging in self._stagings.values():
+                    mark(staging, places)
+            for staged in self._staged:
+                staged.place()
+            self._sync()
+        except BaseException:
+            restored = [staged.restore() for staged in self._staged]
+            if all(restored):
+                self._unmark()
+            raise
+        self._made.clear()
+        self._unmark()
+        clear_marks(places)
+
+    def _sync(self) -> None:
+        for directory in {*self._stagings, *(os.path.dirname(made) for made in self._made)}:
+            with naming(Path(directory)):
+                sync_directory(directory)
+
+    def _unmark(self) -> None:
+        for staging in self._stagings.values():
+            unmark(staging)
+
+    def abandon(self) -> None:
+        """Remove what the set has made apart from files in place."""
+        with deferred():
+            for file in [*(staged.file for staged in self._staged), *self._streams]:
+                # Without flushing: what is not complete goes nowhere.
+                with suppress(OSError):
+                    file.raw.close()
+            for staging in self._stagings.values():
+                staging.remove()
+            for directory in reversed(self._made):
+                with suppress(OSError):
+                    os.rmdir(directory)
+            if self in _live:
+                _live.remove(self)
+
+
+_live: list[OutputSet] = []
+"""Those at work, for a signal that ends the process."""
+
+
+def abandon_all() -> None:
+    """Remove what the sets of this process have made apart from files in place: it is about to end."""
+    while _live:
+        _live[-1].abandon()
+
+
+def write_whole(files: Mapping[Path, bytes], inputs: Iterable[Path] = ()) -> None:
+    """Write files so that all are there, or none; see :class:`OutputSet`.
+
+    Parameters
+    ----------
+    files
+        Contents by path.
+    inputs
+        Files that are read: none is written over.
+
+    Raises
+    ------
+    InputError
+        An output is an input, a directory, or another output.
+    OSError
+        A file cannot be written; what was there has not changed.
+    """
+    with OutputSet(inputs) as outputs:
+        for path, content in files.items():
+            outputs.write(path, content)
+
+
+def _stream(target: Target) -> io.BufferedWriter:
+    """Open what is no regular file, to write through it."""
+    with naming(target.given):
+        if target.descriptor is None:
+            descriptor = os.open(target.place, os.O_WRONLY | getattr(os, "O_NOCTTY", 0))
+        else:
+            # What was printed to the same place before comes before.
+            for stream in (sys.stdout, sys.stderr):
+                if stream is not None:
+                    stream.flush()
+            descriptor = os.dup(target.descriptor)
+    return _opened(descriptor, target)
+
+
+def _opened(descriptor: int, target: Target) -> io.BufferedWriter:
+    return io.BufferedWriter(_Raw(descriptor, target.given))
+
+
+def _keep_owner(descriptor: int, status: os.stat_result, mode: int) -> None:
+    """Give a new file the owner, as far as the system allows, and the permissions of the one it replaces."""
+    if sys.platform == "win32":
+        return
+    made = os.fstat(descriptor)
+    if (made.st_uid, made.st_gid) != (status.st_uid, status.st_gid):
+        with suppress(OSError):
+            os.fchown(descriptor, status.st_uid, status.st_gid)
+    os.fchmod(descriptor, mode)

@@ -1,0 +1,394 @@
+"""The block: photographs, points and image observations, as arrays or as tables."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence, Sized
+from dataclasses import dataclass, field, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram.arguments.arrays import indices, length, names, shaped, shown, text, truth_value
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.network.geometry import Spheroid
+from photogram.network.refraction import Refraction, metres_per_unit
+
+__all__ = ["Block"]
+
+
+RECTANGULAR_COLUMNS = ("X", "Y", "Z")
+GEOGRAPHIC_COLUMNS = ("longitude_deg", "latitude_deg", "height")
+ATTITUDE_COLUMNS = ("omega_deg", "phi_deg", "kappa_deg")
+
+_ANGLES = 1e6
+"""Radians: larger angles have lost the digits that an attitude needs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A block of photographs with its measurements and everything known beforehand.
+
+    P photos, n points, m image observations. Positions are X, Y, Z in the linear unit of the object space
+    when `spheroid` is None (rectangular space), else longitude (rad, east positive), latitude (rad) and
+    height (linear unit).
+
+    Arrays are copied and cannot be written: a block, and a result made from it, stay what they are.
+    :meth:`replace` makes another block. Where numbers may be missing they are NaN, or masked.
+
+    Parameters
+    ----------
+    photo_ids
+        P names, all different: strings that print, or whole numbers.
+    photo_positions, photo_attitudes
+        (P, 3) initial positions, and omega, phi, kappa in radians: M = M_kappa M_phi M_omega (GIANT guide,
+        section 5). Components whose standard deviation is 0 stay at these values.
+    principal_distances
+        (P,) in millimetres; negative for the positive (diapositive) plane, positive for the negative plane.
+    point_ids
+        n names, all different.
+    point_positions
+        (n, 3); NaN where unknown: intersected from the initial rays.
+    image_photos, image_points
+        (m,) indices into photos and points. A photo has one image of a point: repeated pointings are averaged
+        before.
+    image_xy, image_sd
+        (m, 2) image coordinates and their standard deviations in millimetres; `image_sd` may be a number.
+    photo_position_sd, photo_attitude_sd
+        (P, 3) standard deviations of the observed values, in their units: infinite (free, the default), 0
+        (fixed) or between (weighted).
+    point_sd
+        (n, 3): finite for held components of control, 0 to fix them, infinite (the default) for pass points
+        and unheld components. An unheld component with a finite position is a check on the adjustment.
+    spheroid
+        None for rectangular space, else the ellipsoid of geographic space.
+    photo_to_ground
+        The sense of the attitude angles: False (ground-to-photo) turns object vectors into photo vectors.
+    title
+        One line for the report.
+    linear_unit
+        The linear unit of the object space, for the report; "m" or "ft" where there is refraction.
+    refraction
+        What bends the rays, applied in every iteration; None for image coordinates that are free of it.
+    photo_positions_observed, photo_attitudes_observed
+        (P, 3) observed values of the weighted components, as of GNSS and inertial measurements: the
+        adjustment starts at the initial values and weights these. Whole turns of angles do not matter. NaN,
+        or any number, where a component is free; the fixed value where it is fixed. None: the initial values.
+
+    Raises
+    ------
+    InputError
+        Arrays of the wrong shape or type, values that are not finite or masked, indices out of range, names
+        that repeat, are empty or are no names, a point with two images on a photo; refraction in a linear
+        unit whose length is not known.
+    """
+
+    photo_ids: list[str]
+    photo_positions: Floats
+    photo_attitudes: Floats
+    principal_distances: Floats
+    point_ids: list[str]
+    point_positions: Floats
+    image_photos: Indices
+    image_points: Indices
+    image_xy: Floats
+    image_sd: Floats
+    photo_position_sd: Floats = field(default_factory=lambda: np.array(np.inf))
+    photo_attitude_sd: Floats = field(default_factory=lambda: np.array(np.inf))
+    point_sd: Floats = field(default_factory=lambda: np.array(np.inf))
+    spheroid: Spheroid | None = None
+    photo_to_ground: bool = False
+    title: str = ""
+    linear_unit: str = "m"
+    refraction: Refraction | None = None
+    photo_positions_observed: Floats | None = None
+    photo_attitudes_observed: Floats | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("photo_ids", "point_ids"):
+            self._set(name, _different(name, getattr(self, name)))
+        photos, points = len(self.photo_ids), len(self.point_ids)
+        images = length("image_photos", self.image_photos)
+        shapes = {
+            "photo_positions": (photos, 3),
+            "photo_attitudes": (photos, 3),
+            "principal_distances": (photos,),
+            "point_positions": (points, 3),
+            "image_xy": (images, 2),
+            "image_sd": (images, 2),
+            "photo_position_sd": (photos, 3),
+            "photo_attitude_sd": (photos, 3),
+            "point_sd": (points, 3),
+        }
+        for name, shape in shapes.items():
+            self._set(name, shaped(name, getattr(self, name), shape, missing=name == "point_positions"))
+        for name in ("photo_positions_observed", "photo_attitudes_observed"):
+            if getattr(self, name) is not None:
+                self._set(name, shaped(name, getattr(self, name), (photos, 3), missing=True))
+        for name, count in (("image_photos", photos), ("image_points", points)):
+            self._set(name, indices(name, getattr(self, name), images, count))
+        self._check_values()
+        self._check_observed()
+        self._check_twice()
+        self._check_conventions()
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def _check_values(self) -> None:
+        owners = {"photo": self.photo_ids, "princ": self.photo_ids, "point": self.point_ids}
+        for name in ("photo_positions", "photo_attitudes", "principal_distances", "image_xy"):
+            bad = ~np.isfinite(getattr(self, name))
+            self._refuse(name, bad, "is not a finite number", owners.get(name[:5]))
+        beyond = np.abs(self.photo_attitudes) > _ANGLES
+        self._refuse("photo_attitudes", beyond, f"is beyond {_ANGLES:g} radians", self.photo_ids)
+        self._refuse("principal_distances", self.principal_distances == 0, "is zero", self.photo_ids)
+        self._refuse("point_positions", np.isinf(self.point_positions), "is infinite", self.point_ids)
+        for name in ("photo_position_sd", "photo_attitude_sd", "point_sd"):
+            self._refuse(name, ~(getattr(self, name) >= 0), "is not a standard deviation", owners[name[:5]])
+        bad = ~((self.image_sd > 0) & np.isfinite(self.image_sd))
+        self._refuse("image_sd", bad, "is not a positive, finite standard deviation", None)
+        held_unknown = np.isfinite(self.point_sd) & np.isnan(self.point_positions)
+        self._refuse(
+            "point_positions", held_unknown, "is unknown but held (its point_sd is finite)", self.point_ids
+        )
+
+    def _check_observed(self) -> None:
+        for name, initial, sd in (
+            ("photo_positions_observed", self.photo_positions, self.photo_position_sd),
+            ("photo_attitudes_observed", self.photo_attitudes, self.photo_attitude_sd),
+        ):
+            observed = getattr(self, name)
+            if observed is None:
+                continue
+            self._refuse(name, np.isinf(observed), "is infinite", self.photo_ids)
+            if initial is self.photo_attitudes:
+                beyond = np.abs(observed) > _ANGLES
+                self._refuse(name, beyond, f"is beyond {_ANGLES:g} radians", self.photo_ids)
+            unknown = np.isnan(observed) & np.isfinite(sd)
+            self._refuse(name, unknown, "is unknown but weighted (its sd is finite)", self.photo_ids)
+            moved = (sd == 0) & (observed != initial)
+            self._refuse(name, moved, "is fixed (its sd is 0), but not at the initial value", self.photo_ids)
+
+    def _check_twice(self) -> None:
+        """Refuse a second image of a point on a photo: it would count as an independent observation."""
+        pairs = self.image_photos * len(self.point_ids) + self.image_points
+        if (np.diff(pairs) > 0).all():  # sorted by photo, then point, as most blocks are
+            return
+        order = np.argsort(pairs, kind="stable")
+        again = np.flatnonzero(np.diff(pairs[order]) == 0)
+        if again.size:
+            first, second = order[again[0]], order[again[0] + 1]
+            point, photo = self.point_ids[self.image_points[first]], self.photo_ids[self.image_photos[first]]
+            raise InputError(
+                f"the point {point} has two images on the photo {photo} (rows {first} and {second}):"
+                " average repeated pointings"
+            )
+
+    def _check_conventions(self) -> None:
+        text("title", self.title)
+        text("linear_unit", self.linear_unit)
+        self._set("photo_to_ground", truth_value("photo_to_ground", self.photo_to_ground))
+        if self.spheroid is not None and not isinstance(self.spheroid, Spheroid):
+            raise InputError(f"spheroid is a Spheroid or None, not {shown(self.spheroid)}")
+        if self.refraction is not None:
+            if not isinstance(self.refraction, Refraction):
+                raise InputError(f"refraction is a Refraction or None, not {shown(self.refraction)}")
+            metres_per_unit(self.linear_unit)
+
+    def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
+        if bad.any():
+            row = int(np.argwhere(bad)[0][0])
+            if owners is not None:
+                of = owners[row]
+            else:
+                point, photo = self.image_points[row], self.image_photos[row]
+                of = f"{self.point_ids[point]} on photo {self.photo_ids[photo]}"
+            raise InputError(f"{name} of {of} {why}: {getattr(self, name)[row].tolist()}")
+
+    @property
+    def geographic(self) -> bool:
+        """Whether positions are longitude, latitude and height."""
+        return self.spheroid is not None
+
+    @classmethod
+    def from_tables(
+        cls,
+        photos: Mapping[str, Any],
+        images: Mapping[str, Any],
+        points: Mapping[str, Any] | None = None,
+        *,
+        principal_distance: float | None = None,
+        image_sd: float = 0.010,
+        spheroid: Spheroid | None = None,
+        photo_to_ground: bool = False,
+        title: str = "",
+        linear_unit: str = "m",
+        refraction: Refraction | None = None,
+    ) -> Block:
+        """Build a block from tables: pandas or polars data frames, or any mapping of column names to columns.
+
+        Parameters
+        ----------
+        photos
+            `photo`; `X`, `Y`, `Z` (or `longitude_deg`, `latitude_deg`, `height` when a spheroid is given);
+            `omega_deg`, `phi_deg`, `kappa_deg`. Optional: `principal_distance_mm`, and before any of the six
+            names `sd_` (same units) and `observed_`, the observed value where it is not the initial one.
+        images
+            `photo`, `point`, `x_mm`, `y_mm`. Optional: `sd_x_mm`, `sd_y_mm`.
+        points
+            Control and check points: `point` and the three coordinates as for photos; NaN where unknown.
+            Optional: `sd_` columns; without them, or where they are infinite or NaN, components are not held.
+            Image points without a row here are pass points.
+        principal_distance
+            Millimetres, signed, for all photos, when the column is not there.
+        image_sd
+            Millimetres, for image coordinates without a column of their own.
+        spheroid, photo_to_ground, title, linear_unit, refraction
+            As in the class.
+
+        Raises
+        ------
+        InputError
+            A column that is missing, a photo that `photos` does not name, or whatever the class refuses.
+        """
+        axes = RECTANGULAR_COLUMNS if spheroid is None else GEOGRAPHIC_COLUMNS
+        photo_ids = _name_column(photos, "photos", "photo")
+        image_point_names = _name_column(images, "images", "point")
+        control_ids = _name_column(points, "points", "point") if points is not None else []
+        control_ids = _different("points", control_ids)
+        point_ids = list(dict.fromkeys([*control_ids, *image_point_names]))
+
+        positions = np.full((len(point_ids), 3), np.nan)
+        sd = np.full((len(point_ids), 3), np.inf)
+        if points is not None:
+            positions[: len(control_ids)] = _columns(points, "points", axes)
+            sd[: len(control_ids)] = _columns(points, "points", [f"sd_{axis}" for axis in axes], np.inf)
+            sd[np.isnan(sd) | np.isnan(positions)] = np.inf
+        if "principal_distance_mm" not in photos and principal_distance is None:
+            raise InputError("photos has no column principal_distance_mm and no principal_distance was given")
+        return cls(
+            photo_ids=photo_ids,
+            photo_positions=_columns(photos, "photos", axes),
+            photo_attitudes=_columns(photos, "photos", ATTITUDE_COLUMNS),
+            principal_distances=_columns(photos, "photos", ["principal_distance_mm"], principal_distance)[
+                :, 0
+            ],
+            point_ids=point_ids,
+            point_positions=positions,
+            image_photos=_lookup("photo", photo_ids, _name_column(images, "images", "photo")),
+            image_points=_lookup("point", point_ids, image_point_names),
+            image_xy=_columns(images, "images", ["x_mm", "y_mm"]),
+            image_sd=_columns(images, "images", ["sd_x_mm", "sd_y_mm"], image_sd),
+            photo_position_sd=_columns(photos, "photos", [f"sd_{axis}" for axis in axes], np.inf),
+            photo_attitude_sd=_columns(photos, "photos", [f"sd_{axis}" for axis in ATTITUDE_COLUMNS], np.inf),
+            point_sd=sd,
+            photo_positions_observed=_observed(photos, axes),
+            photo_attitudes_observed=_observed(photos, ATTITUDE_COLUMNS),
+            spheroid=spheroid,
+            photo_to_ground=photo_to_ground,
+            title=title,
+            linear_unit=linear_unit,
+            refraction=refraction,
+        )
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a block with some fields replaced, checked anew; the arrays of the others are shared.
+
+        Raises
+        ------
+        InputError
+            A name that is no field, or whatever the class refuses.
+        """
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        if unknown := changes.keys() - values.keys():
+            raise InputError(f"a block has no {', '.join(sorted(unknown))}")
+        return type(self)(**{**values, **changes})
+
+    def kept(self) -> Self:
+        """Return the block as a result keeps it: with lists of names of its own, the arrays shared."""
+        own = copy.copy(self)
+        own._set("photo_ids", list(self.photo_ids))
+        own._set("point_ids", list(self.point_ids))
+        return own
+
+
+def checked(block: Block) -> Block:
+    """Return a block; refuse what is none.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    if not isinstance(block, Block):
+        raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    return block
+
+
+def position_columns(block: Block) -> tuple[str, str, str]:
+    """Names of the three columns of positions in tables."""
+    return GEOGRAPHIC_COLUMNS if block.geographic else RECTANGULAR_COLUMNS
+
+
+def _different(name: str, values: Sequence[str]) -> list[str]:
+    """Return names that are all different."""
+    found = names(name, values)
+    if len(set(found)) != len(found):
+        seen: set[str] = set()
+        repeated = next(value for value in found if value in seen or seen.add(value))  # type: ignore[func-returns-value]
+        raise InputError(f"{name}: {repeated!r} stands there more than once")
+    return found
+
+
+def _column(table: Mapping[str, Any], table_name: str, name: str) -> Sequence[Any]:
+    try:
+        there = name in table
+        column: Sequence[Any] = table[name] if there else ()
+    except (TypeError, KeyError, IndexError):
+        raise InputError(f"{table_name} is no table, a mapping of column names to columns") from None
+    if not there:
+        raise InputError(f"{table_name} has no column {name}")
+    return column
+
+
+def _name_column(table: Mapping[str, Any], table_name: str, name: str) -> list[str]:
+    return names(f"{table_name}, column {name}", _column(table, table_name, name))
+
+
+def _columns(
+    table: Mapping[str, Any], table_name: str, columns: Sequence[str], default: ArrayLike | None = None
+) -> Floats:
+    """Stack columns as (rows, len(columns)), `_deg` ones in radians; absent ones get the default."""
+    key = "photo" if table_name == "photos" else "point"
+    named = _column(table, table_name, key)
+    if not isinstance(named, Sized):
+        raise InputError(f"{table_name}, column {key} is not a list of names: {shown(named)}")
+    rows = len(named)
+    stacked = []
+    for name in columns:
+        values = default if name not in table and default is not None else _column(table, table_name, name)
+        column = shaped(f"{table_name}, column {name}", values, (rows,), missing=True)
+        stacked.append(np.radians(column) if name.endswith("_deg") else column)
+    return np.stack(stacked, axis=1)
+
+
+def _observed(photos: Mapping[str, Any], columns: Sequence[str]) -> Floats | None:
+    """Return the columns of observed values, the initial ones where there are none; None without any."""
+    observed = [f"observed_{name}" for name in columns]
+    if not any(name in photos for name in observed):
+        return None
+    present = [own if own in photos else name for own, name in zip(observed, columns, strict=True)]
+    return _columns(photos, "photos", present)
+
+
+def _lookup(kind: str, ids: Sequence[str], images: Sequence[str]) -> Indices:
+    index = {name: i for i, name in enumerate(ids)}
+    try:
+        return np.array([index[name] for name in images], dtype=np.int64)
+    except KeyError as error:
+        raise InputError(
+            f"images names the {kind} {error.args[0]!r}, which the {kind}s do not list"
+        ) from None

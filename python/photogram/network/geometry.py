@@ -1,0 +1,275 @@
+"""Geometry: rotations, geographic and geocentric coordinates, projection into photos.
+
+Angles are radians, image coordinates millimetres, lengths the linear unit of the object space. Rotation,
+frames and collinearity follow the GIANT Program User's Guide (Elassal and Malhotra, NOAA 1987).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram import _photocore
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import length, shaped
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.network.refraction import Refraction
+
+__all__ = [
+    "Spheroid",
+    "geocentric_to_geographic",
+    "geographic_to_geocentric",
+    "lengths_of_units",
+    "local_frames",
+    "project",
+    "refraction_shift",
+    "rotation_angles",
+    "rotation_matrix",
+    "viewing_directions",
+]
+
+
+@dataclass(frozen=True)
+class Spheroid:
+    """An ellipsoid of revolution. Its linear unit is that of the heights.
+
+    Parameters
+    ----------
+    a, b
+        Semi-major and semi-minor axis.
+
+    Raises
+    ------
+    InputError
+        Unless both are finite and 0 < b <= a.
+    """
+
+    a: float
+    b: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.a) and 0 < self.b <= self.a):
+            raise InputError(
+                f"a spheroid needs finite semi-axes with 0 < b <= a, not a = {self.a}, b = {self.b}"
+            )
+
+    @classmethod
+    def clarke_1866(cls) -> Spheroid:
+        """Clarke 1866 in metres, the default of GIANT."""
+        return cls(6378206.4, 6356583.8)
+
+    @classmethod
+    def wgs84(cls) -> Spheroid:
+        """WGS 84 in metres."""
+        return cls(6378137.0, 6356752.314245179)
+
+
+def rotation_matrix(angles: ArrayLike) -> Floats:
+    """Rotation matrices M = M_kappa M_phi M_omega, (n, 3, 3), of (n, 3) omega, phi, kappa in radians.
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    """
+    return _photocore.rotation_matrix(_floats(angles))
+
+
+def rotation_angles(matrices: ArrayLike) -> Floats:
+    """Angles omega, phi, kappa in radians, (n, 3), of (n, 3, 3) rotation matrices; phi lies in [-pi/2, pi/2].
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    """
+    return _photocore.rotation_angles(_floats(matrices))
+
+
+def geographic_to_geocentric(positions: ArrayLike, spheroid: Spheroid) -> Floats:
+    """Geocentric X, Y, Z, (n, 3), of (n, 3) longitude (rad, east positive), latitude (rad), height.
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    """
+    return _photocore.geographic_to_geocentric(_floats(positions), spheroid.a, spheroid.b)
+
+
+def geocentric_to_geographic(xyz: ArrayLike, spheroid: Spheroid) -> Floats:
+    """Longitude (rad), latitude (rad) and height, (n, 3), of (n, 3) geocentric X, Y, Z.
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    """
+    return _photocore.geocentric_to_geographic(_floats(xyz), spheroid.a, spheroid.b)
+
+
+def lengths_of_units(positions: ArrayLike, spheroid: Spheroid | None) -> Floats:
+    """Lengths of the units of the coordinates at (n, 3) positions, (n, 3), in the linear unit.
+
+    Ones in rectangular space. In geographic space a radian of longitude is as long as the radius of the
+    parallel, one of latitude as that of the meridian's curvature, both at the height of the position.
+    """
+    values = _floats(positions)
+    if spheroid is None:
+        return np.ones_like(values)
+    latitude, height = values[:, 1], values[:, 2]
+    w = np.sqrt(1 - (1 - (spheroid.b / spheroid.a) ** 2) * np.sin(latitude) ** 2)
+    parallel = (spheroid.a / w + height) * np.cos(latitude)
+    meridian = spheroid.b**2 / spheroid.a / w**3 + height
+    return np.stack([parallel, meridian, np.ones_like(height)], axis=1)
+
+
+def local_frames(positions: ArrayLike) -> Floats:
+    """Rows east, north, up, (n, 3, 3), of the local frames at (n, 3) longitude, latitude (rad), height.
+
+    Raises
+    ------
+    InputError
+        Another shape.
+    """
+    values = shaped("positions", positions, (length("positions", positions), 3))
+    longitude, latitude = values[:, :2].T
+    sl, cl, sp, cp = np.sin(longitude), np.cos(longitude), np.sin(latitude), np.cos(latitude)
+    rows = [[-sl, cl, np.zeros_like(sl)], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]]
+    return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
+
+
+def viewing_directions(
+    positions: ArrayLike,
+    attitudes: ArrayLike,
+    *,
+    spheroid: Spheroid | None = None,
+    photo_to_ground: bool = False,
+) -> Floats:
+    """Directions in which photos look, the negative z axes of their frames, (n, 3) unit vectors.
+
+    Arguments are those of :func:`project`; with a spheroid the directions are geocentric.
+    """
+    rotations = rotation_matrix(attitudes)
+    directions = -(rotations[:, :, 2] if photo_to_ground else rotations[:, 2, :])
+    if spheroid is None:
+        return directions
+    turned: Floats = np.einsum("nij,ni->nj", local_frames(positions), directions)
+    return turned
+
+
+def project(
+    points: ArrayLike,
+    positions: ArrayLike,
+    attitudes: ArrayLike,
+    principal_distances: ArrayLike,
+    *,
+    spheroid: Spheroid | None = None,
+    photo_to_ground: bool = False,
+    refraction: Refraction | None = None,
+    linear_unit: str = "m",
+) -> Floats:
+    """Project points into photos, row by row: point i into the photo of row i.
+
+    Parameters
+    ----------
+    points, positions
+        (n, 3) object points and projection centres: X, Y, Z, or longitude (rad), latitude (rad), height when
+        a spheroid is given.
+    attitudes
+        (n, 3) omega, phi, kappa in radians; with a spheroid relative to the local vertical frame of each
+        station.
+    principal_distances
+        (n,) in millimetres: negative for the positive (diapositive) plane, positive for the negative plane.
+    spheroid
+        None for rectangular space.
+    photo_to_ground
+        The sense of the angles; False is ground-to-photo.
+    refraction
+        What bends the rays; None: they are straight.
+    linear_unit
+        Of the object space, "m" or "ft": refraction needs its length.
+
+    Returns
+    -------
+    (n, 2) x, y in millimetres; not finite for a point in the plane of the projection centre.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, or different numbers of rows; refraction in another linear unit (an InputError).
+    """
+    return _photocore.project(
+        _floats(points),
+        _floats(positions),
+        _floats(attitudes),
+        _floats(principal_distances),
+        spheroid=None if spheroid is None else (spheroid.a, spheroid.b),
+        photo_to_ground=photo_to_ground,
+        refraction=None if refraction is None else refraction.row(linear_unit),
+    )
+
+
+def refraction_shift(
+    points: ArrayLike,
+    positions: ArrayLike,
+    refraction: Refraction,
+    *,
+    spheroid: Spheroid | None = None,
+    linear_unit: str = "m",
+) -> Floats:
+    """From points to where cameras see them, row by row: point i from the position of row i.
+
+    Parameters
+    ----------
+    points, positions
+        (n, 3) object points and projection centres, as for :func:`project`.
+    refraction
+        What bends the rays.
+    spheroid
+        None for rectangular space.
+    linear_unit
+        Of the object space, "m" or "ft".
+
+    Returns
+    -------
+    (n, 3) vectors in the linear unit, along X, Y, Z or the geocentric axes: the lift dZ of the GIANT guide
+    (Appendices F and G), along the up at the camera, and the lift of the ray by Snell's law, along the up at
+    the point. Zero for points that the models leave alone.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, or different numbers of rows; another linear unit (an InputError).
+    """
+    return _photocore.refraction_shift(
+        _floats(points),
+        _floats(positions),
+        spheroid=None if spheroid is None else (spheroid.a, spheroid.b),
+        refraction=refraction.row(linear_unit),
+    )
+
+
+def _floats(values: ArrayLike) -> Floats:
+    return np.asarray(values, dtype=np.float64)
+
+
+check_arguments(
+    globals(),
+    [
+        "Spheroid",
+        "geocentric_to_geographic",
+        "geographic_to_geocentric",
+        "lengths_of_units",
+        "local_frames",
+        "project",
+        "refraction_shift",
+        "rotation_angles",
+        "rotation_matrix",
+        "viewing_directions",
+    ],
+)

@@ -1,0 +1,102 @@
+"""Refraction in air and water: which models bend the rays of a block."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+from photogram.arguments.annotations import check_arguments
+from photogram.errors import InputError
+
+if TYPE_CHECKING:
+    from photogram._photocore import RefractionRow
+
+__all__ = ["METRES_PER_UNIT", "Air", "Refraction", "Water", "metres_per_unit"]
+
+Air = Literal["giant", "standard"]
+Water = Literal["giant", "snell"]
+
+METRES_PER_UNIT = {"m": 1.0, "ft": 0.3048}
+"""Linear units whose length is known."""
+
+_AIR_NAMES = {"giant": "GIANT guide, Appendix F", "standard": "standard atmosphere"}
+_WATER_NAMES = {"giant": "GIANT guide, Appendix G", "snell": "Snell's law"}
+
+
+@dataclass(frozen=True)
+class Refraction:
+    """What bends the rays between points and cameras (`docs/refraction.md`).
+
+    Parameters
+    ----------
+    air
+        "giant": K = 13 (H - h) [1 - 0.02 (2 H + h)] microradians, H and h in km, for cameras up to 9,000 m
+        (GIANT guide, Appendix F). "standard": horizontal layers of the U.S. Standard Atmosphere 1976, at any
+        height (after Saastamoinen 1974). None: none.
+    water
+        For points below the water level. "giant": the guide's Appendix G. "snell": the ray itself, by Snell's
+        law at a level surface. None: none.
+    water_level
+        Height of the water in the linear unit of the block: above the ellipsoid, or Z.
+    refractive_index
+        Of the water relative to air.
+
+    Raises
+    ------
+    InputError
+        A model that is not there, a level that is not finite, an index that is not finite and at least 1.
+    """
+
+    air: Air | None = None
+    water: Water | None = None
+    water_level: float = 0.0
+    refractive_index: float = 1.340
+
+    def __post_init__(self) -> None:
+        for name, choices in (("air", get_args(Air)), ("water", get_args(Water))):
+            value = getattr(self, name)
+            if value is not None and value not in choices:
+                raise InputError(f"{name} is one of {', '.join(choices)} or None, not {value!r}")
+        if not math.isfinite(self.water_level):
+            raise InputError(f"water_level must be finite, not {self.water_level}")
+        if not 1 <= self.refractive_index < math.inf:
+            raise InputError(f"refractive_index must be finite and at least 1, not {self.refractive_index}")
+
+    def describe(self, linear_unit: str) -> str:
+        """Return what is in force, in a line."""
+        parts = [f"air: {_AIR_NAMES[self.air]}"] if self.air else []
+        if self.water:
+            parts.append(
+                f"water below {self.water_level:.3f} {linear_unit}: {_WATER_NAMES[self.water]},"
+                f" index {self.refractive_index:g}"
+            )
+        return "; ".join(parts) or "none"
+
+    def row(self, linear_unit: str) -> RefractionRow:
+        """Return what the core takes: models, level, index, metres in the linear unit.
+
+        Raises
+        ------
+        InputError
+            A unit whose length is not known.
+        """
+        metres = metres_per_unit(linear_unit)
+        return self.air, self.water, self.water_level, self.refractive_index, metres
+
+
+def metres_per_unit(linear_unit: str) -> float:
+    """Return the length of a linear unit in metres: the models of the air know metres only.
+
+    Raises
+    ------
+    InputError
+        Neither "m" nor "ft".
+    """
+    if linear_unit not in METRES_PER_UNIT:
+        units = " or ".join(METRES_PER_UNIT)
+        raise InputError(f"refraction needs a linear unit of known length, {units}, not {linear_unit!r}")
+    return METRES_PER_UNIT[linear_unit]
+
+
+check_arguments(globals(), ["Refraction", "metres_per_unit"])

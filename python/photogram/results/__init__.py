@@ -1,0 +1,1 @@
+"""What an adjustment gives, as arrays, tables, text and JSON."""

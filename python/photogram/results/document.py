@@ -1,0 +1,245 @@
+"""The JSON document of an adjusted block; `docs/json.md` describes it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.io import json
+from photogram.results.report import problems_of
+
+if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
+    from photogram.results.adjusted import AdjustedBlock
+
+__all__ = ["to_json"]
+
+
+def to_json(result: AdjustedBlock) -> bytes:
+    """Return the whole result as JSON (UTF-8). What is not a number is null."""
+    return json.to_json(_document(result))
+
+
+def _document(result: AdjustedBlock) -> dict[str, Any]:
+    sums = result.sums_of_squares
+    return {
+        "program": f"photogram {_photocore.__version__}",
+        "title": result.block.title,
+        "units": _units(result),
+        "conventions": {
+            "object_space": "geographic" if result.block.geographic else "rectangular",
+            "rotation": "photo-to-ground" if result.block.photo_to_ground else "ground-to-photo",
+            "attitude": "omega, phi, kappa; M = M_kappa M_phi M_omega",
+            "residual": "observed minus computed",
+            "standardized": "residual / (sd x root of redundancy number), a priori unit weight",
+            "covariance": "cofactors times covariance_scale",
+            "difference": "adjusted minus supplied",
+            "control, stations": "residual: observed minus adjusted; sd 0: fixed, null: free or not held",
+        },
+        "refraction": asdict(result.block.refraction) if result.block.refraction else None,
+        "status": result.status,
+        "problems": problems_of(result),
+        "messages": [str(message) for message in result.messages],
+        "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
+        "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
+        "iterations": [
+            {
+                "number": iteration.number,
+                "weighted_sum_of_squares": iteration.weighted_sum_of_squares,
+                "largest_change_sd": iteration.largest_change,
+                "damping": iteration.damping,
+            }
+            for iteration in result.iterations
+        ],
+        "weighted_sum_of_squares": {
+            "camera": sums.camera,
+            "ground": sums.ground,
+            "plates": sums.plates,
+            "total": sums.total,
+        },
+        "degrees_of_freedom": result.degrees_of_freedom,
+        "unit_variance": result.unit_variance,
+        "variance_of_unit_weight": result.variance_of_unit_weight,
+        "global_test": _global_test(result),
+        "covariance_scale": result.covariance_scale,
+        "photos": _photos(result),
+        "points": _points(result),
+        "observations": _observations(result),
+        "control": _control(result),
+        "stations": _stations(result),
+        "check_points": _check_points(result),
+        "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
+        "ordering": result.ordering,
+        "predictions": dict(result.predictions),
+        "operations": dict(result.operations),
+        "seconds": dict(result.seconds),
+    }
+
+
+def _units(result: AdjustedBlock) -> dict[str, str]:
+    linear = result.block.linear_unit
+    geographic = result.block.geographic
+    return {
+        "position": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "water_level": linear,
+        "position_covariance": f"longitude rad, latitude rad, height {linear}; products"
+        if geographic
+        else f"{linear}^2",
+        "attitude": "rad",
+        "attitude_covariance": "rad^2",
+        "covariance": "products of the units of position_covariance and rad",
+        "residual_mm": "mm",
+        "position_residual": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "position_sd": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "attitude_residual_rad": "rad",
+        "attitude_sd_rad": "rad",
+        "difference": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "operations": "multiply-adds, each time the phase is carried out",
+        "seconds": "s",
+    }
+
+
+def _outward(result: AdjustedBlock, positions: Floats) -> Floats:
+    """Longitude and latitude in degrees, as the document has them."""
+    if not result.block.geographic:
+        return positions
+    outward = positions.copy()
+    outward[:, :2] = np.degrees(outward[:, :2])
+    return outward
+
+
+def _photos(result: AdjustedBlock) -> list[dict[str, Any]]:
+    columns = zip(
+        result.block.photo_ids,
+        _outward(result, result.photo_positions).tolist(),
+        result.photo_attitudes.tolist(),
+        result.photo_covariances,
+        strict=True,
+    )
+    return [
+        {
+            "id": name,
+            "position": position,
+            "attitude_rad": attitude,
+            "position_covariance": covariance[:3, :3].tolist(),
+            "attitude_covariance": covariance[3:, 3:].tolist(),
+            "covariance": covariance.tolist(),
+        }
+        for name, position, attitude, covariance in columns
+    ]
+
+
+def _points(result: AdjustedBlock) -> list[dict[str, Any]]:
+    columns = zip(
+        result.block.point_ids,
+        _outward(result, result.point_positions).tolist(),
+        result.point_covariances.tolist(),
+        result.point_rays.tolist(),
+        result.point_kinds.tolist(),
+        strict=True,
+    )
+    return [
+        {"id": name, "position": position, "covariance": covariance, "rays": rays, "kind": kind}
+        for name, position, covariance, rays, kind in columns
+        if rays
+    ]
+
+
+def _observations(result: AdjustedBlock) -> list[dict[str, Any]]:
+    block, used = result.block, result.used_images
+    columns = zip(
+        block.image_photos[used].tolist(),
+        block.image_points[used].tolist(),
+        result.residuals[used].tolist(),
+        result.redundancy[used].tolist(),
+        result.standardized[used].tolist(),
+        result.image_weights[used].tolist(),
+        strict=True,
+    )
+    return [
+        {
+            "photo": block.photo_ids[photo],
+            "point": block.point_ids[point],
+            "residual_mm": residual,
+            "redundancy": redundancy,
+            "standardized": standardized,
+            **({"weight_factor": weight} if result.loss else {}),
+        }
+        for photo, point, residual, redundancy, standardized, weight in columns
+    ]
+
+
+def _global_test(result: AdjustedBlock) -> dict[str, Any] | None:
+    test = result.global_test
+    if test is None:
+        return None
+    return {
+        "variance": test.variance,
+        "limits": test.limits,
+        "level": test.level,
+        "probability": test.probability,
+        "rejected": "high" if test.rejected_high else "low" if test.rejected_low else None,
+    }
+
+
+def _control(result: AdjustedBlock) -> list[dict[str, Any]]:
+    block = result.block
+    rows = np.flatnonzero(result.used_points & np.isfinite(block.point_sd).any(axis=1))
+    columns = zip(
+        rows.tolist(),
+        _outward(result, result.point_residuals[rows]).tolist(),
+        _outward(result, block.point_sd[rows]).tolist(),
+        result.point_redundancy[rows].tolist(),
+        result.point_standardized[rows].tolist(),
+        strict=True,
+    )
+    return [
+        {
+            "id": block.point_ids[row],
+            "position_residual": residual,
+            "position_sd": sd,
+            "redundancy": redundancy,
+            "standardized": standardized,
+        }
+        for row, residual, sd, redundancy, standardized in columns
+    ]
+
+
+def _stations(result: AdjustedBlock) -> list[dict[str, Any]]:
+    block, given_sd = result.block, result.photo_given_sd
+    rows = np.flatnonzero(np.isfinite(given_sd).any(axis=1))
+    residuals = result.photo_residuals[rows]
+    columns = zip(
+        rows.tolist(),
+        _outward(result, residuals[:, :3]).tolist(),
+        _outward(result, given_sd[rows, :3]).tolist(),
+        residuals[:, 3:].tolist(),
+        given_sd[rows, 3:].tolist(),
+        result.photo_redundancy[rows].tolist(),
+        result.photo_standardized[rows].tolist(),
+        strict=True,
+    )
+    return [
+        {
+            "id": block.photo_ids[row],
+            "position_residual": position,
+            "position_sd": position_sd,
+            "attitude_residual_rad": attitude,
+            "attitude_sd_rad": attitude_sd,
+            "redundancy": redundancy,
+            "standardized": standardized,
+        }
+        for row, position, position_sd, attitude, attitude_sd, redundancy, standardized in columns
+    ]
+
+
+def _check_points(result: AdjustedBlock) -> list[dict[str, Any]]:
+    check = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
+    differences = _outward(result, result.point_differences[check]).tolist()
+    return [
+        {"id": result.block.point_ids[point], "difference": difference}
+        for point, difference in zip(check, differences, strict=True)
+    ]

@@ -1,0 +1,418 @@
+"""The adjustment report as text: problems, then how good it is, then values with their deviations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.network.structuring import structure
+from photogram.show.angles import ARCSEC, degrees_minutes_seconds
+from photogram.show.sections import Section, composed, headline, problems
+from photogram.statistics.limits import normal_limit
+from photogram.statistics.outliers import Observations, outliers
+from photogram.statistics.reliability import TESTABLE
+
+if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
+    from photogram.results.adjusted import AdjustedBlock
+
+__all__ = ["bandwidths", "problems_of", "report", "summary"]
+
+_SUSPECTS = 20
+_BLUNDER = 3.0
+_ORDERINGS = {
+    "input": "in input order",
+    "rcm": "by reverse Cuthill-McKee",
+    "amd": "by minimum degree",
+    "dissection": "by nested dissection",
+    "graph-dissection": "by dissection of the graph",
+}
+
+
+@np.errstate(over="ignore")  # what is too large for its unit is infinite
+def report(result: AdjustedBlock) -> str:
+    """Return the report of an adjusted block."""
+    sections = [
+        *summary(result),
+        ("Iterations", _iterations(result)),
+        ("Check points: adjusted minus supplied", _difference_table(result, _check_differences(result))),
+        (
+            "Control as observations: observed minus adjusted, redundancy, standardized residual",
+            _control(result),
+        ),
+        (
+            "Components of control that are not held: adjusted minus supplied",
+            _difference_table(result, _unheld_differences(result)),
+        ),
+        (
+            "Stations as observations: observed minus adjusted, redundancy, standardized residual",
+            _stations(result),
+        ),
+        ("Photos", _photos(result)),
+        ("Points", _points(result)),
+        ("Work", _work(result)),
+    ]
+    return composed(headline("block adjustment", result.block.title), sections)
+
+
+@np.errstate(over="ignore")
+def summary(result: AdjustedBlock) -> list[Section]:
+    """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
+    return [
+        ("Problems", problems_of(result)),
+        ("Adjustment", _adjustment(result)),
+        ("Residuals", _residuals(result)),
+        (f"Image coordinates with |standardized residual| > {_BLUNDER:g}, largest first", _suspects(result)),
+    ]
+
+
+def problems_of(result: AdjustedBlock) -> list[str]:
+    """Return what keeps a reader from using the values: a failed test and outliers before other remarks."""
+    found = outliers(_tested(result), normal_limit, "standardized residuals")
+    messages = [*found, *result.messages]
+    return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
+
+
+def _tested(result: AdjustedBlock) -> list[Observations]:
+    """Return all observations with their standardized residuals, where these say something."""
+    block = result.block
+    axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
+    unknowns = (*axes, "omega", "phi", "kappa")
+
+    def image(index: tuple[int, ...]) -> str:
+        point, photo = block.image_points[index[0]], block.image_photos[index[0]]
+        return f"{'xy'[index[1]]} of point {block.point_ids[point]} on photo {block.photo_ids[photo]}"
+
+    def testable(standardized: Floats, redundancy: Floats) -> Floats:
+        return np.where(redundancy > TESTABLE, standardized, np.nan)
+
+    return [
+        Observations("image coordinates", testable(result.standardized, result.redundancy), image),
+        Observations(
+            "components of control",
+            testable(result.point_standardized, result.point_redundancy),
+            lambda index: f"{axes[index[1]]} of control point {block.point_ids[index[0]]}",
+        ),
+        Observations(
+            "components of stations",
+            testable(result.photo_standardized, result.photo_redundancy),
+            lambda index: f"{unknowns[index[1]]} of photo {block.photo_ids[index[0]]}",
+        ),
+    ]
+
+
+def _adjustment(result: AdjustedBlock) -> list[str]:
+    block, sums = result.block, result.sums_of_squares
+    kinds = result.point_kinds[result.used_points].tolist()
+    variance = result.variance_of_unit_weight
+    held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
+    axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
+    components = ", ".join(f"{axis} {count}" for axis, count in zip(axes, held.sum(axis=0), strict=True))
+    basis = {"free": "cameras free", "constrained": "cameras constrained", "unity": "set to 1"}[
+        result.unit_variance
+    ]
+    rows = [
+        ("status", result.status),
+        ("iterations", f"{len(result.iterations)}"),
+        ("variance of unit weight", f"{variance:.6f} ({basis})" if variance is not None else "undefined"),
+        (
+            "standard deviation of unit weight",
+            f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
+        ),
+        ("degrees of freedom", f"{result.degrees_of_freedom}"),
+        ("weighted sum of squares, camera", f"{sums.camera:.6f}"),
+        ("weighted sum of squares, ground", f"{sums.ground:.6f}"),
+        ("weighted sum of squares, plates", f"{sums.plates:.6f}"),
+        ("weighted sum of squares, total", f"{sums.total:.6f}"),
+        ("photos", f"{len(block.photo_ids)}"),
+        ("points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
+        ("held components of control", components),
+        ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
+        ("object space", "geographic" if block.geographic else "rectangular"),
+        ("rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
+        ("refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
+    ]
+    return [f"{name:<36}{value}" for name, value in rows]
+
+
+def _residuals(result: AdjustedBlock) -> list[str]:
+    used = result.used_images
+    lines = [
+        f"rms of image residuals              {_rms(result.residuals[used][:, axis]) * 1000:.3f} um in {name}"
+        for axis, name in enumerate("xy")
+    ]
+    redundancy = result.redundancy[used]
+    if np.isfinite(redundancy).all() and redundancy.size:
+        lines.append(
+            f"mean redundancy number              {redundancy.mean():.3f} (least {redundancy.min():.3f})"
+        )
+        largest = np.nan_to_num(np.abs(result.standardized[used])).max()
+        lines.append(f"largest |standardized residual|     {largest:.2f}")
+    for what, differences in (
+        ("control points", _held_differences(result)),
+        ("unheld components", _unheld_differences(result)),
+        ("check points", _check_differences(result)),
+    ):
+        values = [_rms(column[np.isfinite(column)]) for column in differences.T]
+        if np.isfinite(differences).any():
+            lines.append(f"{f'rms of {what}':<36}{', '.join(_differences(result, values))}")
+    return lines
+
+
+def _iterations(result: AdjustedBlock) -> list[str]:
+    lines = [f"{'number':>6} {'weighted sum of squares':>24} {'largest change / sd':>20} {'damping':>9}"]
+    lines.append(f"{0:>6} {result.initial_weighted_sum_of_squares:>24.6f}")
+    lines += [
+        f"{i.number:>6} {i.weighted_sum_of_squares:>24.6f} {i.largest_change:>20.3e} {i.damping:>9.1e}"
+        for i in result.iterations
+    ]
+    return lines
+
+
+def _suspects(result: AdjustedBlock) -> list[str]:
+    testable = result.redundancy > TESTABLE
+    size = np.where(testable, np.nan_to_num(np.abs(result.standardized)), 0.0)
+    images, axes = np.nonzero(size > _BLUNDER)
+    if not images.size:
+        return ["none"]
+    order = np.argsort(-size[images, axes], kind="stable")[:_SUSPECTS]
+    block = result.block
+    lines = [f"{'photo':<10} {'point':<10}   {'residual um':>12} {'redundancy':>11} {'standardized':>13}"]
+    lines += [
+        f"{block.photo_ids[block.image_photos[i]]:<10} {block.point_ids[block.image_points[i]]:<10} "
+        f"{'xy'[axis]}"
+        f" {result.residuals[i, axis] * 1000:>12.2f} {result.redundancy[i, axis]:>11.3f}"
+        f" {result.standardized[i, axis]:>13.2f}"
+        for i, axis in zip(images[order], axes[order], strict=True)
+    ]
+    return lines if images.size == len(order) else [*lines, f"and {images.size - len(order)} more"]
+
+
+def _held_differences(result: AdjustedBlock) -> Floats:
+    return _differences_where(result, np.isfinite(result.block.point_sd))
+
+
+def _unheld_differences(result: AdjustedBlock) -> Floats:
+    """Return those of components of control that are not held, but have a value to compare with."""
+    held = np.isfinite(result.block.point_sd)
+    return _differences_where(result, held.any(axis=1, keepdims=True) & ~held)
+
+
+def _check_differences(result: AdjustedBlock) -> Floats:
+    return _differences_where(result, (result.point_kinds == "check")[:, np.newaxis])
+
+
+def _differences_where(result: AdjustedBlock, which: np.ndarray) -> Floats:
+    """Return (n, 3) adjusted minus supplied coordinates, NaN where not asked for or not supplied."""
+    used = result.used_points[:, np.newaxis]
+    differences: Floats = np.where(used & which, result.point_differences, np.nan)
+    return differences
+
+
+def _difference_table(result: AdjustedBlock, differences: Floats) -> list[str]:
+    points = np.flatnonzero(np.isfinite(differences).any(axis=1))
+    if len(points) == 0:
+        return []
+    axes = ("dlon", "dlat", "dh") if result.block.geographic else ("dX", "dY", "dZ")
+    units = _difference_units(result)
+    lines = [
+        f"{'point':<10}" + "".join(f"{f'{axis} {unit}':>16}" for axis, unit in zip(axes, units, strict=True))
+    ]
+    for point, values in zip(points, differences[points] * _outward(result), strict=True):
+        lines.append(f"{result.block.point_ids[point]:<10}" + "".join(_number(value, 5) for value in values))
+    return lines
+
+
+def _control(result: AdjustedBlock) -> list[str]:
+    rows = np.flatnonzero(result.used_points & np.isfinite(result.block.point_sd).any(axis=1))
+    units, outward = _difference_units(result), _outward(result)
+    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+    return _observed_table(
+        "point",
+        [result.block.point_ids[row] for row in rows],
+        [f"{axis} {unit}" for axis, unit in zip(axes, units, strict=True)],
+        result.block.point_sd[rows] * outward,
+        result.point_residuals[rows] * outward,
+        result.point_redundancy[rows],
+        result.point_standardized[rows],
+    )
+
+
+def _stations(result: AdjustedBlock) -> list[str]:
+    given_sd = result.photo_given_sd
+    rows = np.flatnonzero(np.isfinite(given_sd).any(axis=1))
+    units, outward = _difference_units(result), np.append(_outward(result), [1.0 / ARCSEC] * 3)
+    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+    names = [f"{axis} {unit}" for axis, unit in zip(axes, units, strict=True)]
+    return _observed_table(
+        "photo",
+        [result.block.photo_ids[row] for row in rows],
+        [*names, "omega arcsec", "phi arcsec", "kappa arcsec"],
+        given_sd[rows] * outward,
+        result.photo_residuals[rows] * outward,
+        result.photo_redundancy[rows],
+        result.photo_standardized[rows],
+    )
+
+
+def _observed_table(
+    kind: str,
+    names: list[str],
+    columns: list[str],
+    sd: Floats,
+    residuals: Floats,
+    redundancy: Floats,
+    standardized: Floats,
+) -> list[str]:
+    """Four lines for each of some observed positions: what was observed, and how it fits."""
+    if not names:
+        return []
+    lines = [f"{kind:<10}{'':<14}" + "".join(f"{column:>18}" for column in columns)]
+    held = np.isfinite(sd)
+    weighted = held & (sd > 0)
+    for row, name in enumerate(names):
+        deviations = [
+            "free" if math.isinf(each) else "fixed" if each == 0 else f"{each:.5f}" for each in sd[row]
+        ]
+        parts = (
+            ("sd", deviations),
+            ("residual", _cells(residuals[row], held[row], 5)),
+            ("redundancy", _cells(redundancy[row], weighted[row], 3)),
+            ("standardized", _cells(standardized[row], weighted[row], 2)),
+        )
+        lines += [
+            f"{name if part == 'sd' else '':<10}{part:<14}" + "".join(f"{cell:>18}" for cell in cells)
+            for part, cells in parts
+        ]
+    return lines
+
+
+def _cells(values: Floats, there: np.ndarray, decimals: int) -> list[str]:
+    return [
+        f"{value:.{decimals}f}" if use and math.isfinite(value) else "-"
+        for value, use in zip(values, there, strict=True)
+    ]
+
+
+def _photos(result: AdjustedBlock) -> list[str]:
+    position, sd_position = _position_formats(result)
+    lines = [
+        f"{'photo':<10}{_position_head(result)}{'omega deg':>15}{'phi deg':>15}{'kappa deg':>15}",
+        f"{'':<10}{_sd_head(result)}{'sd arcsec':>15}{'sd arcsec':>15}{'sd arcsec':>15}",
+    ]
+    rows = zip(
+        result.block.photo_ids,
+        result.photo_positions,
+        np.degrees(result.photo_attitudes),
+        result.photo_sd,
+        strict=True,
+    )
+    for name, values, angles, sd in rows:
+        lines.append(f"{name:<10}{position(values)}" + "".join(f"{angle:>15.7f}" for angle in angles))
+        lines.append(f"{'':<10}{sd_position(sd[:3])}" + "".join(f"{each / ARCSEC:>15.3f}" for each in sd[3:]))
+    return lines
+
+
+def _points(result: AdjustedBlock) -> list[str]:
+    position, sd_position = _position_formats(result)
+    lines = [f"{'point':<10}{_position_head(result)}  rays  kind", f"{'':<10}{_sd_head(result)}"]
+    rows = zip(
+        result.block.point_ids,
+        result.point_positions,
+        result.point_sd,
+        result.point_rays,
+        result.point_kinds,
+        strict=True,
+    )
+    for name, values, sd, rays, kind in rows:
+        if rays:
+            lines.append(f"{name:<10}{position(values)}  {rays:>4}  {kind}")
+            lines.append(f"{'':<10}{sd_position(sd)}")
+    return lines
+
+
+def _work(result: AdjustedBlock) -> list[str]:
+    order = _ORDERINGS[result.ordering]
+    lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
+    lines += [
+        f"{f'multiply-adds if {_ORDERINGS[name]}':<36}{count:.3e}"
+        for name, count in result.predictions.items()
+        if name != result.ordering
+    ]
+    lines += bandwidths(result)
+    lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
+    return lines
+
+
+def bandwidths(result: AdjustedBlock) -> list[str]:
+    """Return what the 1987 program would have needed, for the order of the input and for the one chosen."""
+    images = result.block.image_photos, result.block.image_points
+    lines = ["bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)"]
+    for name, order in (("of the input", None), ("chosen", result.photo_order)):
+        structured = structure(*images, order)
+        lines.append(
+            f"{f'  in the order {name}':<36}{structured.effective_bandwidth} effective,"
+            f" {structured.naive_bandwidth} without sharing"
+        )
+    return lines
+
+
+def _rms(values: Floats) -> float:
+    return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
+
+
+def _outward(result: AdjustedBlock) -> Floats:
+    """Return the factors from inner units to those of the report: arcsec for angles."""
+    return np.array([1.0 / ARCSEC, 1.0 / ARCSEC, 1.0] if result.block.geographic else [1.0, 1.0, 1.0])
+
+
+def _difference_units(result: AdjustedBlock) -> tuple[str, str, str]:
+    unit = result.block.linear_unit
+    return ("arcsec", "arcsec", unit) if result.block.geographic else (unit, unit, unit)
+
+
+def _differences(result: AdjustedBlock, values: Iterable[float]) -> list[str]:
+    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+    outward = np.array(list(values)) * _outward(result)
+    triples = zip(axes, outward, _difference_units(result), strict=True)
+    return [f"{axis} {value:.5f} {unit}" for axis, value, unit in triples if math.isfinite(value)]
+
+
+def _position_head(result: AdjustedBlock) -> str:
+    unit = result.block.linear_unit
+    planimetry = ("longitude", "latitude") if result.block.geographic else (f"X {unit}", f"Y {unit}")
+    names = (*planimetry, f"height {unit}" if result.block.geographic else f"Z {unit}")
+    return "".join(f"{name:>20}" for name in names)
+
+
+def _sd_head(result: AdjustedBlock) -> str:
+    return "".join(f"{f'sd {unit}':>20}" for unit in _difference_units(result))
+
+
+def _position_formats(result: AdjustedBlock) -> tuple[Callable[[Floats], str], Callable[[Floats], str]]:
+    """How positions and their standard deviations are written."""
+
+    def position(values: Floats) -> str:
+        if result.block.geographic:
+            return f"{_dms(values[0], 5):>20}{_dms(values[1], 5):>20}{values[2]:>20.4f}"
+        return "".join(f"{value:>20.4f}" for value in values)
+
+    outward = _outward(result)
+
+    def deviations(values: Floats) -> str:
+        return "".join(f"{value:>20.5f}" for value in values * outward)
+
+    return position, deviations
+
+
+def _dms(angle: float, decimals: int) -> str:
+    degrees, minutes, seconds = degrees_minutes_seconds(angle, decimals)
+    sign = "-" if angle < 0 else ""
+    return f"{sign}{degrees} {minutes:02d} {seconds:0{decimals + 3}.{decimals}f}"
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:>16.{decimals}f}" if math.isfinite(value) else f"{'-':>16}"

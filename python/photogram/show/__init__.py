@@ -1,0 +1,1 @@
+"""What reports and pictures of all programs are made of."""

@@ -1,0 +1,75 @@
+"""What the pictures of all programs share; matplotlib is an extra (`pip install 'photogram[plots]'`)."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.quiver import Quiver
+
+__all__ = ["arrows", "drawn", "new_figure", "open_frame", "round_length"]
+
+DPI = 120
+"""Dots an inch of pictures that are made of dots."""
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return a figure that belongs to no window (inches)."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # takes long to import
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained", dpi=DPI)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def drawn(figure: Figure, path: Path | None = None) -> bytes:
+    """Return a figure in the format that the name of a file asks for, PNG without one.
+
+    Raises
+    ------
+    InputError
+        The suffix names no format of matplotlib.
+    """
+    suffix = "" if path is None else path.suffix.lower().removeprefix(".")
+    suffix = suffix or "png"
+    if suffix not in figure.canvas.get_supported_filetypes():
+        raise InputError(f"matplotlib draws no {suffix!r}; png, pdf and svg are possible", file=path)
+    content = io.BytesIO()
+    # Equal figures give equal files, whatever version draws them.
+    figure.savefig(content, format=suffix, metadata={"Software": None} if suffix == "png" else None)
+    return content.getvalue()
+
+
+def arrows(axes: Axes, places: Floats, vectors: Floats, scale: float = 1.0, **style: Any) -> Quiver:
+    """Draw vectors from places, `scale` units of the vectors for one of the axes; the limits make room."""
+    ends = places + vectors / scale
+    drawn = axes.quiver(*places.T, *vectors.T, angles="xy", scale_units="xy", scale=scale, **style)
+    # Quiver does not count its heads when limits are set.
+    axes.update_datalim(ends)
+    axes.autoscale_view()
+    return drawn
+
+
+def open_frame(axes: Axes) -> None:
+    """Take away the frame above and to the right."""
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def round_length(value: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that is not above a value.
+
+    For a value that is not positive, which has none, it is 1.
+    """
+    if not value > 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9))

@@ -1,9 +1,0 @@
-"""The one writer of all results: sets of files that are put in place together, or not at all.
-
-How it looks from outside stands in `docs/command-line.md`.
-"""
-
-from photogram.writing.guard import check_outputs
-from photogram.writing.outputs import OutputSet, write_whole
-
-__all__ = ["OutputSet", "check_outputs", "write_whole"]

@@ -1,0 +1,162 @@
+"""Options mean the same for every command; former names say what is written now; shells complete them."""
+
+import inspect
+import os
+import shutil
+import subprocess
+import sys
+from typing import get_args
+
+import pytest
+from typer.models import ArgumentInfo, OptionInfo
+
+from photogram.cli.commands import app
+from photogram.cli.job import Former, Writes
+
+PROMPT = [
+    sys.executable,
+    "-c",
+    "import sys; sys.argv[0] = 'photogram'; from photogram.cli import main; main()",
+]
+"""The command under its own name, by which shells know it."""
+
+
+def registered(typer_app=app):
+    """Return the functions of all commands by their names."""
+    found = {each.name or each.callback.__name__: each.callback for each in typer_app.registered_commands}
+    for group in typer_app.registered_groups:
+        found |= registered(group.typer_instance)
+    return found
+
+
+COMMANDS = registered()
+
+
+def options(command):
+    """Return the options of a command that are shown: kind and marks by name."""
+    found = {}
+    for parameter in inspect.signature(command, eval_str=True).parameters.values():
+        kind, *marks = get_args(parameter.annotation)
+        info = next(mark for mark in marks if isinstance(mark, OptionInfo | ArgumentInfo))
+        if isinstance(info, OptionInfo) and not info.hidden:
+            found[parameter.name] = kind, [mark for mark in marks if mark is not info]
+    return found
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_an_option_means_the_same_for_every_command(name):
+    shown = options(COMMANDS[name])
+    same = {"json": [Writes.FILE], "out": [Writes.DIRECTORY], "plots": [], "quiet": [], "threads": []}
+    for option, marks in same.items():
+        assert shown.get(option, (None, marks))[1] == marks
+    assert not {"plot", "pictures", "report"} & set(shown)
+    assert "listing" not in shown or name == "adjust"
+    assert "quiet" in shown or name == "correct"
+    assert "out" in shown or "plots" not in shown
+
+
+@pytest.mark.parametrize(
+    ("command", "former", "now"),
+    [
+        ("perspective-center --example", "--listing x.txt", "--out x"),
+        ("perspective-center --example", "--plot x.svg", "--out x --plots"),
+        ("absolute-orientation --example", "--listing x.txt", "--out x"),
+        ("absolute-orientation --example", "--plot x.png", "--out x --plots"),
+        ("collection --example", "--report x.txt", "--out x"),
+        ("plan --strips 1 --photos-per-strip 4", "--plot x.pdf", "--out x --plots"),
+        ("comparator --example --linear-only", "--no-pictures", "--no-plots"),
+    ],
+)
+def test_a_former_name_does_its_work_and_says_what_is_written_now(run, tmp_path, command, former, now):
+    done = run(*command.split(), *former.split())
+    assert done.exit_code == 0, done.output
+    option, _, file = former.partition(" ")
+    assert f"remark: {option.replace('--no-', '--')} will go" in done.stderr
+    if file:
+        assert (tmp_path / file).stat().st_size > 0
+    assert option not in run(*command.split(), "--help").output.split()
+    clean = run(*command.split(), *now.split())
+    assert clean.exit_code == 0, clean.output
+    assert "will go" not in clean.stderr
+    if file.endswith(".txt"):
+        assert (tmp_path / file).read_bytes() in [path.read_bytes() for path in (tmp_path / "x").iterdir()]
+
+
+def test_every_hidden_option_is_a_former_name():
+    hidden = 0
+    for command in COMMANDS.values():
+        for parameter in inspect.signature(command, eval_str=True).parameters.values():
+            marks = get_args(parameter.annotation)[1:]
+            former = any(isinstance(mark, Former) for mark in marks)
+            assert former == any(isinstance(mark, OptionInfo) and mark.hidden for mark in marks)
+            hidden += former
+    assert hidden > 5
+
+
+def test_pictures_without_a_place_are_refused(run, tmp_path):
+    for command in (["plan"], ["perspective-center", "--example"], ["absolute-orientation", "--example"]):
+        refused = run(*command, "--plots")
+        assert refused.exit_code == 2
+        assert "goes with --out DIR" in refused.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_is_no_place_for_an_adjusted_collection(run, tmp_path):
+    for name in ("adjusted.txt", "adjusted.txt.bz2"):
+        refused = run("collection", "--example", "--out", name)
+        assert refused.exit_code == 2
+        assert "adjusted.txt goes there" in refused.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_told_of_results_that_could_not_be_written(run, tmp_path, monkeypatch):
+    (tmp_path / "locked").mkdir()
+
+    def full(*_):
+        raise OSError(28, "No space left on device", str(tmp_path / "locked" / "report.txt"))
+
+    monkeypatch.setattr("photogram.io.writing.outputs.OutputSet.write", full)
+    for command in (
+        ["stellar-camera", "--example", "--out", "locked"],
+        ["giant", "--example", "--out", "locked"],
+        ["collection", "--example", "--out", "locked"],
+        ["perspective-center", "--example", "--out", "locked"],
+        ["plan", "--strips", "1", "--photos-per-strip", "4", "--out", "locked"],
+    ):
+        done = run(*command)
+        assert done.exit_code == 1, done.output
+        assert done.stdout == ""
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_of_completion_is_printed(shell):
+    environment = {**os.environ, "_PHOTOGRAM_COMPLETE": f"source_{shell}"}
+    done = subprocess.run(PROMPT, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert f"_COMPLETE=complete_{shell}" in done.stdout
+    if shutil.which(shell) and shell == "bash":
+        subprocess.run(["bash", "-n"], input=done.stdout, text=True, check=True)
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("photogram pl", {"plan"}),
+        ("photogram giant ", {"adjust", "check"}),
+        ("photogram giant ch", {"check"}),
+        ("photogram giant --o", {"--out", "--ordering", "--overwrite"}),
+        ("photogram giant check --th", {"--threads"}),
+        ("photogram giant block --ordering d", {"dissection"}),
+        ("photogram perspective-center --p", {"--plots"}),
+    ],
+)
+def test_words_are_completed(line, expected):
+    environment = {
+        **os.environ,
+        "_PHOTOGRAM_COMPLETE": "complete_bash",
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(line.count(" ")),
+    }
+    done = subprocess.run(PROMPT, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert set(done.stdout.split()) == expected

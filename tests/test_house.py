@@ -1,0 +1,71 @@
+"""The house of the Python package: arrows point down, and files import each other in no circle."""
+
+import ast
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import photogram
+
+SOURCES = Path(photogram.__file__).parent
+PROGRAMS = ("giant", "collection", "perspective_center", "absolute_orientation", "comparator", "stellar")
+FLOORS = (
+    ("cli",),
+    PROGRAMS,
+    ("planning", "checks"),
+    ("adjustment",),
+    ("results",),
+    ("network",),
+    ("show", "io"),
+    ("statistics",),
+    ("arguments",),
+    ("memory",),
+    ("errors",),
+    ("messages",),
+)
+"""From the top down, as CONTRIBUTING has them: a file knows its own folder and floors below."""
+
+
+def modules():
+    """Return the files of the package by the names of their modules, without what hands names on."""
+    found = {}
+    for path in sorted(SOURCES.rglob("*.py")):
+        parts = path.relative_to(SOURCES.parent).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    for name in ("photogram", "photogram.former_names"):
+        del found[name]
+    return found
+
+
+def imports():
+    """Return what each file imports of the package: also within functions, and for types only."""
+    found = modules()
+    graph = {}
+    for name, path in found.items():
+        arrows = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                inside = {f"{node.module}.{each.name}" for each in node.names} & set(found)
+                arrows |= inside or ({node.module} & set(found))
+            elif isinstance(node, ast.Import):
+                arrows |= {each.name for each in node.names} & set(found)
+        graph[name] = arrows - {name}
+    return graph
+
+
+def test_files_import_each_other_in_no_circle():
+    faces = {name for name, path in modules().items() if path.name == "__init__.py"}
+    graph = {name: arrows - faces for name, arrows in imports().items() if name not in faces}
+    assert len(graph) > 200
+    assert list(TopologicalSorter(graph).static_order())
+
+
+def test_arrows_point_down():
+    floor = {folder: number for number, folders in enumerate(FLOORS) for folder in folders}
+    seen = set()
+    for name, arrows in imports().items():
+        for other in arrows:
+            own, foreign = name.split(".")[1], other.split(".")[1]
+            seen |= {own, foreign}
+            if own != foreign:
+                assert floor[own] < floor[foreign], f"{name} imports {other}"
+    assert seen == set(floor)
