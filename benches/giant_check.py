@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram import Block, simulate
+from photogram import Block, adjust, simulate
 from photogram.giant import Finding, Project, check
 from photogram.network.geometry import Spheroid
 
@@ -29,11 +29,15 @@ class Planted:
         or point that is in no target is innocent.
     kinds
         For each target the kinds of finding that count; empty for any.
+    test
+        The test value to be expected of the one error, its size x root of redundancy number / standard
+        deviation; NaN where it is not known.
     """
 
     block: Block
     targets: list[set[str]]
     kinds: list[set[str]]
+    test: float = math.nan
 
 
 def main() -> None:
@@ -101,6 +105,7 @@ def outcome(
         print(
             f"  seed {seed}: {[t for t, n in zip(planted.targets, named, strict=True) if not n]} not named,"
             f" {len(false)} false; planted {planted.targets if len(str(planted.targets)) < 80 else '...'}"
+            + ("" if math.isnan(planted.test) else f", expected test value {planted.test:.1f}")
         )
         for finding in false[:3]:
             print(f"    false: {finding.kind}: {finding.text[:150]}")
@@ -220,8 +225,11 @@ def wrong_control(size: float) -> Callable[[Block, np.random.Generator], Planted
         rays = np.bincount(block.image_points, minlength=len(block.point_ids))
         point, axis = int(rng.permutation(full[rays[full] >= 2])[0]), int(rng.integers(3))
         positions = block.point_positions.copy()
-        positions[point, axis] += size / (6.4e6 if block.geographic and axis < 2 else 1)
-        return Planted(block.replace(point_positions=positions), [{block.point_ids[point]}], [set()])
+        error = size / (6.4e6 if block.geographic and axis < 2 else 1)
+        positions[point, axis] += error
+        redundancy = float(adjust(block, threads=1).point_redundancy[point, axis])
+        test = error * math.sqrt(redundancy) / float(block.point_sd[point, axis])
+        return Planted(block.replace(point_positions=positions), [{block.point_ids[point]}], [set()], test)
 
     return plant
 

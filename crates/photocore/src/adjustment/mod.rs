@@ -1,8 +1,57 @@
 //! Least squares: weighted unknowns and observations, iteration, convergence, statistics. Knows no photograph.
 //!
 //! A [`Model`] says how observations follow from unknowns; a [`Problem`] adds what is known beforehand: the standard
-//! deviation of every observation and of every unknown, from free (infinite) to fixed (zero). [`adjust`] iterates to the
+//! deviation of every observation and of every unknown, from free (infinite) to fixed (zero). [`Problem::adjust`] iterates to the
 //! least-squares solution and computes the cofactors of all unknowns and the redundancy numbers of all observations.
+//!
+//! A levelling net: heights of points (local blocks of one unknown) above those of two instruments (kept blocks of one); the first
+//! point is a fixed bench mark.
+//!
+//! ```
+//! use photocore::adjustment::{Model, Options, Problem, Status};
+//! use photocore::normals::{GroupRows, Layout, Ordering, System};
+//!
+//! struct Levelling {
+//!     /// Each reading with its instrument, point by point.
+//!     readings: Vec<(f64, usize)>,
+//! }
+//!
+//! impl Model for Levelling {
+//!     type Prepared = Vec<f64>;
+//!
+//!     fn prepare(&self, heights: &[f64]) -> Vec<f64> {
+//!         heights.to_vec()
+//!     }
+//!
+//!     fn observe(&self, heights: &Vec<f64>, point: usize, reading: usize, rows: &mut GroupRows<'_>) {
+//!         let (value, instrument) = self.readings[reading];
+//!         rows.constant[0] = value - (heights[point] - heights[3 + instrument]);
+//!         rows.local[0] = 1.0;
+//!         rows.kept[0] = -1.0;
+//!     }
+//! }
+//!
+//! // Three points, each read from two instruments.
+//! let readings = vec![(1.001, 0), (2.0, 1), (1.5, 0), (2.498, 1), (0.3, 0), (1.301, 1)];
+//! let layout = Layout::new(1, 1, &[1, 1], vec![0, 2, 4, 6], vec![0, 1, 0, 1, 0, 1])?;
+//! let problem = Problem {
+//!     model: Levelling { readings },
+//!     system: System::new(layout, Ordering::Auto),
+//!     observation_sd: vec![0.001; 6],
+//!     initial: vec![100.0, 0.0, 0.0, 0.0, 0.0],
+//!     prior: vec![0.0; 5],
+//!     sd: [vec![0.0], vec![f64::INFINITY; 4]].concat(),
+//! };
+//! let adjusted = problem.adjust(&Options::default())?;
+//! assert_eq!(adjusted.status, Status::Converged);
+//! assert!((adjusted.unknowns[1] - 100.4985).abs() < 1e-9);
+//! assert_eq!(adjusted.counts.degrees_of_freedom(), 2);
+//! let redundancy: f64 = adjusted.redundancy.iter().flatten().sum();
+//! assert!((redundancy - 2.0).abs() < 1e-12);
+//! // Its cofactor: half the variance of a reading from each end, for each of two ways.
+//! assert!((adjusted.cofactors.expect("asked for").local[1] - 1e-6).abs() < 1e-15);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod datum;
 mod distributions;

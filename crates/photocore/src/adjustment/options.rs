@@ -29,7 +29,7 @@ pub enum Criterion {
     Decrease(f64),
 }
 
-/// How to adjust.
+/// How to adjust. By default: squares, to a hundred-thousandth of the standard deviations, with cofactors.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// When to stop.
@@ -40,6 +40,12 @@ pub struct Options {
     pub covariance: bool,
     /// What takes the place of the squares of the observations; None for least squares.
     pub loss: Option<Loss>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { criterion: Criterion::Fraction(1e-5), max_iterations: 100, covariance: true, loss: None }
+    }
 }
 
 /// How an adjustment ended.

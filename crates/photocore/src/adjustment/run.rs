@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use rayon::ThreadPool;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::loss::Reweighting;
 use super::options::{Criterion, Event, Iteration, Options, Phase, Status};
@@ -11,6 +11,20 @@ use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
 use super::trust_region::FIRST_DAMPING;
 use crate::normals::{Cofactors, Factor, Inversion, Prior, Stopped};
+
+/// Bytes that the stack of a thread takes: none is started where there is no memory for it.
+const STACK: usize = 2 << 20;
+
+impl<M: Model> Problem<M> {
+    /// Adjusts by least squares on all processors; [`adjust`] takes threads of its caller and tells what is going on.
+    ///
+    /// # Errors
+    /// Unknowns that are not determined, or observations that cannot be computed; threads that cannot be started.
+    pub fn adjust(&self, options: &Options) -> Result<Adjustment, AdjustError> {
+        let pool = ThreadPoolBuilder::new().build().map_err(|_| AdjustError::OutOfMemory(STACK))?;
+        adjust(self, options, &pool, &mut |_| ControlFlow::Continue(()))
+    }
+}
 
 /// Adjusts a problem by least squares.
 ///

@@ -10,6 +10,32 @@
 //!    panels), front by front;
 //! 4. [`System::solve`], and [`System::solve_for`] for any other right-hand sides;
 //! 5. [`System::invert`]: the selected inverse, and cofactors of everything.
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! use photocore::normals::{Equations, GroupRows, Layout, Ordering, Prior, System};
+//!
+//! /// x_local - y_kept = 1 for every pair.
+//! struct Differences;
+//!
+//! impl Equations for Differences {
+//!     fn write(&self, _local: usize, _group: usize, rows: &mut GroupRows<'_>) {
+//!         (rows.constant[0], rows.local[0], rows.kept[0]) = (1.0, 1.0, -1.0);
+//!     }
+//! }
+//!
+//! // Three local and two kept unknowns; the first local one is held at zero by an equation of its own.
+//! let layout = Layout::new(1, 1, &[1, 1], vec![0, 2, 4, 6], vec![0, 1, 0, 1, 0, 1])?;
+//! let system = System::new(layout, Ordering::Auto);
+//! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5] };
+//! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+//! let mut go_on = |_| ControlFlow::Continue(());
+//! let factor = system.factor(&pool, &Differences, &prior, 0.0, &mut go_on).continue_value().expect("not stopped");
+//! let x = system.solve(&pool, &factor, &Differences, &prior, 0.0, &mut go_on).continue_value().expect("not stopped");
+//! assert!(x.iter().zip([0.0, 0.0, 0.0, -1.0, -1.0]).all(|(x, expected)| (x - expected).abs() < 1e-12));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod cofactors;
 mod dense;
