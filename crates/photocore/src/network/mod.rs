@@ -4,6 +4,50 @@
 //! each weighted from free to fixed; observations are image coordinates. A block of aerial photographs (GIANT guide, sections 4 to 9)
 //! has cameras that are held, and poses in angles; a collection "in the large" (Agarwal, Snavely, Seitz and Szeliski 2010) has a
 //! camera of its own for every photo, and poses in vectors. Positions are X, Y, Z or longitude, latitude, height.
+//!
+//! Two photos over four control points:
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! use photocore::geometry::{self, ObjectSpace, Perspective, PoseNumbers, RotationSense};
+//! use photocore::network::{Camera, Image, Network, Options, Photo, Point};
+//!
+//! let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
+//! let camera = Perspective { principal_distance: -150.0 };
+//! let corners = [[0.0, 0.0, 0.0], [900.0, 0.0, 40.0], [0.0, 900.0, 70.0], [900.0, 900.0, 10.0]];
+//! let stations = [[200.0, 450.0, 1500.0], [700.0, 450.0, 1500.0]];
+//! let mut images = vec![];
+//! for (point, corner) in corners.into_iter().enumerate() {
+//!     for (photo, station) in stations.into_iter().enumerate() {
+//!         let seen = geometry::Photo::new(space, sense, station, [0.01, -0.02, 0.1], -150.0);
+//!         let xy = seen.project(&geometry::Point::new(space, corner));
+//!         images.push(Image { photo, point, xy, sd: [0.005; 2] });
+//!     }
+//! }
+//! // Poses are known to some metres and degrees.
+//! let photo = |[x, y, z]: [f64; 3]| {
+//!     let pose = [x + 5.0, y - 4.0, z + 9.0, 0.0, 0.0, 0.0];
+//!     Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 }
+//! };
+//! let network = Network {
+//!     space,
+//!     poses: PoseNumbers::Angles(sense),
+//!     refraction: None,
+//!     cameras: vec![Camera::held(camera.into())],
+//!     photos: stations.map(photo).to_vec(),
+//!     points: corners.map(|coordinates| Point { coordinates, sd: [0.02; 3] }).to_vec(),
+//!     images,
+//! };
+//! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+//! let solution = network.adjust(&Options::default(), &pool, &mut |_| ControlFlow::Continue(()))?;
+//! let photo = &solution.photos[1];
+//! assert!((photo.pose[0] - 700.0).abs() < 1e-6 && (photo.pose[5] - 0.1).abs() < 1e-9);
+//! // Four points seen twice, and their coordinates, less twelve unknowns of the photos and twelve of the points.
+//! assert_eq!(solution.degrees_of_freedom, 16 + 12 - 12 - 12);
+//! assert!(photo.cofactors[0].sqrt() < 1.0, "standard deviation of the station's X in metres");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod error;
 mod model;
@@ -146,6 +190,20 @@ pub struct Options {
     pub hold_unused: bool,
     /// Bytes that the adjustment may take (see [`crate::normals::System::memory`]); None for any number.
     pub memory: Option<usize>,
+}
+
+impl Default for Options {
+    /// Strict least squares of constrained photos, points from where their rays meet.
+    fn default() -> Self {
+        Self {
+            adjustment: adjustment::Options::default(),
+            ordering: Ordering::Auto,
+            unit_variance: UnitVariance::default(),
+            start: Start::default(),
+            hold_unused: false,
+            memory: None,
+        }
+    }
 }
 
 impl Network {
