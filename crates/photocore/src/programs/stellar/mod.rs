@@ -19,7 +19,7 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Event, NormalEquations, Phase, Problem};
-use crate::geometry::{Station, Vector3};
+use crate::geometry::Station;
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 use model::{Partials, StarImages};
@@ -96,7 +96,7 @@ pub struct Calibration {
     /// What is estimated of the camera.
     pub kind: Kind,
     /// Initial alpha, omega, kappa of every attitude in radians.
-    pub pointings: Vec<Vector3>,
+    pub pointings: Vec<[f64; 3]>,
     /// Initial interior parameters, then coefficients of refraction in seconds of arc.
     pub common: [f64; COMMON],
     /// Which parameters are held: attitudes three each, then the common ones.

@@ -138,7 +138,7 @@ fn approximate(
     // A direction behind the camera has no image.
     let q = if q > 0.0 { q } else { f64::NAN };
     let computed = [cx * m / q + xp + lens.shift[0] - epsilon * measured[1], cy * n / q + yp + lens.shift[1]];
-    let [[a1, b1, _], [a2, b2, _], [d, e, _]] = attitude.matrix;
+    let [[a1, a2, d], [b1, b2, e], _] = attitude.matrix.data.0;
     let (p1, p2) = ((computed[0] - xp) / cx, (computed[1] - yp) / cy);
     let (p3, p4, p6, p7) = (p1 * d - a1, p1 * e - b1, p2 * d - a2, p2 * e - b2);
     let p9 = p2 * b1 - p1 * b2;
