@@ -18,11 +18,11 @@ PACKAGES = (
     "photogram.absolute_orientation",
     "photogram.collection",
     "photogram.comparator",
-    "photogram.geometry",
+    "photogram.network.geometry",
     "photogram.giant",
     "photogram.perspective_center",
-    "photogram.refraction",
-    "photogram.robust",
+    "photogram.network.refraction",
+    "photogram.adjustment.robust",
     "photogram.stellar",
 )
 MADE_BY_THE_LIBRARY = {
@@ -34,7 +34,7 @@ MADE_BY_THE_LIBRARY = {
     "photogram.giant": "Check ErrorWarning Finding ImageFrame Project Section",
     "photogram.perspective_center": "Cycle PerspectiveCenter Run Stop",
     "photogram.stellar": "Result",
-    "photogram.robust": "remark loss_row",
+    "photogram.adjustment.robust": "remark loss_row",
 }
 """Results and what readers make: nobody calls them with values of their own."""
 
@@ -114,7 +114,7 @@ def good(tmp_path_factory):
     problem = read_plain(examples / "stellar" / "plate.toml")
     points, places = np.array([[100.0, 200.0, 30.0]]), np.array([[0.0, 0.0, 1000.0]])
     resected = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 5.0], [0.0, 100.0, 3.0], [100.0, 100.0, 0.0]])
-    seen = photogram.geometry.project(
+    seen = photogram.network.geometry.project(
         resected, [[50.0, 50.0, 500.0]] * 4, np.zeros((4, 3)), np.full(4, -150.0)
     )
     return {
@@ -177,7 +177,7 @@ def good(tmp_path_factory):
             "to_csv": {"session": session},
             "to_json": {"calibration": calibration},
         },
-        "photogram.geometry": {
+        "photogram.network.geometry": {
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "geocentric_to_geographic": {
                 "xyz": [[6378137.0, 0.0, 0.0]],
@@ -232,8 +232,11 @@ def good(tmp_path_factory):
             },
             "run_deck": {"path": grid_deck},
         },
-        "photogram.refraction": {"Refraction": {"air": "giant"}, "metres_per_unit": {"linear_unit": "m"}},
-        "photogram.robust": {},
+        "photogram.network.refraction": {
+            "Refraction": {"air": "giant"},
+            "metres_per_unit": {"linear_unit": "m"},
+        },
+        "photogram.adjustment.robust": {},
         "photogram.stellar": {
             "Air": {"temperature": 280.0, "pressure": 760.0},
             "Axis": {"azimuth": 0.0, "zenith_distance": 0.0, "xy": np.zeros(2), "weight": np.eye(2)},

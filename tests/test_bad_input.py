@@ -25,7 +25,7 @@ from photogram import (
     adjust,
     simulate,
 )
-from photogram.geometry import project
+from photogram.network.geometry import project
 
 # Arrays
 

@@ -13,7 +13,7 @@ import pytest
 import photogram
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.giant import read_project
-from photogram.simulation import simulate as simulate_function
+from photogram.network.simulation import simulate as simulate_function
 
 STRASBOURG = Path(__file__).parents[2] / "shared" / "data" / "strasbourg" / "giant"
 SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]

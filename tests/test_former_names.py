@@ -4,11 +4,12 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
 import photogram
-from photogram.former_names import TODAY
+from photogram.former_names import TODAY, today
 
 SOURCES = Path(photogram.__file__).parent
 
@@ -55,3 +56,12 @@ def test_other_names_are_not_found():
             import_module(name)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         import_module("photogram.adjustment").nothing  # noqa: B018
+
+
+def test_the_reference_says_the_names_of_today():
+    page = (Path(__file__).parents[1] / "docs" / "reference.md").read_text()
+    said = [line.removeprefix("::: ") for line in page.splitlines() if line.startswith("::: ")]
+    assert len(said) > 40
+    for name in said:
+        assert today(name) is None, name
+        assert resolve_name(name) is not None

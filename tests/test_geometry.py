@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photogram import InputError, geometry
-from photogram.geometry import Spheroid
+from photogram.network.geometry import Spheroid
 
 GIANT = Path(__file__).parent / "data" / "giant"
 GOLDEN: dict[str, Any] = json.loads((GIANT / "golden_cases.json").read_text())

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from photogram import InputError
 from photogram.cli import app
-from photogram.writing import check_outputs
+from photogram.io.writing import check_outputs
 
 EXAMPLES = Path(str(files("photogram") / "examples"))
 

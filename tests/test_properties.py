@@ -60,7 +60,8 @@ def block_of(arguments: dict[str, Any]) -> Block:
 def jacobian(block: Block, result: Result) -> Floats:
     """Return partials of all image coordinates by photos (6 each), then points (3 each), (2 m, u).
 
-    Fourth-order differences of `photogram.geometry.project`, which knows nothing of the engine's partials.
+    Fourth-order differences of `photogram.network.geometry.project`, which knows nothing of the engine's
+    partials.
     """
     photos, points = len(block.photo_ids), len(block.point_ids)
     metre = np.ones(3) if not block.geographic else np.array([1 / 6.4e6, 1 / 6.4e6, 1.0])

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-import photogram.resection
+import photogram.adjustment.resection
 from photogram import AdjustmentError, InputError, RankError, Spheroid, resect
-from photogram.geometry import project, rotation_matrix
+from photogram.network.geometry import project, rotation_matrix
 
 BENCH = Path(__file__).parents[1] / "benches" / "resect_random.py"
 GROUND = np.array(
@@ -203,9 +203,11 @@ def test_the_danger_cylinder_is_named():
 
 def resect_from(points, station):
     """Resect with the true pose as start."""
-    observed = photogram.resection.Observed.checked(points, 0.0, view(points, station=station), 0.01, C, None)
+    observed = photogram.adjustment.resection.Observed.checked(
+        points, 0.0, view(points, station=station), 0.01, C, None
+    )
     start = np.concatenate([station, ANGLES])
-    return photogram.resection.solve(observed, start=start, limit=1e-5, max_iterations=50)
+    return photogram.adjustment.resection.solve(observed, start=start, limit=1e-5, max_iterations=50)
 
 
 def test_images_that_no_position_explains():
@@ -253,7 +255,7 @@ def test_wrong_input_is_named(change, message):
 
 
 def test_the_example_of_the_docstring():
-    assert doctest.testmod(photogram.resection).failed == 0
+    assert doctest.testmod(photogram.adjustment.resection).failed == 0
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from photogram.errors import InputError
+from photogram.io.numbers import finite_number, is_whole_number, whole_number
+from photogram.io.places import Place
+from photogram.io.rows import LONGEST_RECORD, Table, cells, read_rows
 from photogram.messages import MOST_CHARACTERS, Message, quoted
-from photogram.numbers import finite_number, is_whole_number, whole_number
-from photogram.places import Place
-from photogram.rows import LONGEST_RECORD, Table, cells, read_rows
 
 
 def written(tmp_path, text):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from photogram import Block, InputError, geometry
-from photogram.geometry import Spheroid
-from photogram.simulation import simulate
+from photogram.network.geometry import Spheroid
+from photogram.network.simulation import simulate
 
 GALVESTON = (math.radians(-95.0), math.radians(29.7), 0.0)
 SPACES = {

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from contextlib import contextmanager
 
-from photogram.writing import guard, markers, outputs, staging, targets
+from photogram.io.writing import guard, markers, outputs, staging, targets
 
 CALLS = (
     "open",

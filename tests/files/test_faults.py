@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from faults import faulty
 
-from photogram.writing import OutputSet, write_whole
+from photogram.io.writing import OutputSet, write_whole
 
 NAMES = ("a", "b", "made/new/c", "there/d")
 EXAMPLE = Path(str(files("photogram") / "examples" / "absolute_orientation"))
@@ -144,7 +144,7 @@ def test_a_disk_that_is_full(tmp_path):
     target, other = tmp_path / "large", tmp_path / "small"
     other.write_bytes(b"old")
     program = (
-        "import sys; from pathlib import Path; from photogram.writing import write_whole\n"
+        "import sys; from pathlib import Path; from photogram.io.writing import write_whole\n"
         "write_whole({Path(sys.argv[1]): b'new', Path(sys.argv[2]): bytes(1 << 20)})"
     )
     limit = (1 << 16, 1 << 16)
@@ -167,7 +167,7 @@ def test_a_directory_that_is_read_only(tmp_path):
     program = (
         "import os, secrets, sys\n"
         "from pathlib import Path\n"
-        "from photogram.writing import write_whole\n"
+        "from photogram.io.writing import write_whole\n"
         "os.getuid() or os.setuid(65534)\n"
         "for name in ('new', 'old'):\n"
         "    try: write_whole({Path(name): b'x'})\n"

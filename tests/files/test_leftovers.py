@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from photogram.writing import OutputSet, write_whole
-from photogram.writing.interruption import deferred
-from photogram.writing.markers import doubtful
+from photogram.io.writing import OutputSet, write_whole
+from photogram.io.writing.interruption import deferred
+from photogram.io.writing.markers import doubtful
 
 DEATH = """\
 import os, sys
 from pathlib import Path
-from photogram.writing import OutputSet, outputs
+from photogram.io.writing import OutputSet, outputs
 place = Path(sys.argv[1])
 real, moved = os.replace, []
 def replace(source, target):
@@ -86,7 +86,7 @@ def test_a_run_that_lives_is_let_alone(tmp_path):
             [
                 sys.executable,
                 "-c",
-                "import sys; from pathlib import Path; from photogram.writing import write_whole;"
+                "import sys; from pathlib import Path; from photogram.io.writing import write_whole;"
                 "write_whole({Path(sys.argv[1]): b'quick'})",
                 tmp_path / "quick",
             ],
@@ -167,7 +167,7 @@ def test_a_signal_that_ends_a_command_leaves_nothing(tmp_path, number):
         "import os, sys\n"
         "from pathlib import Path\n"
         "from photogram.cli.ending import end_by_signals\n"
-        "from photogram.writing import OutputSet\n"
+        "from photogram.io.writing import OutputSet\n"
         "end_by_signals()\n"
         "with OutputSet() as outputs:\n"
         "    outputs.write(Path('made/deeper/new'), b'new')\n"

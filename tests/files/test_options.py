@@ -82,6 +82,12 @@ def test_a_former_name_does_its_work_and_says_what_is_written_now(run, tmp_path,
         assert (tmp_path / file).read_bytes() in [path.read_bytes() for path in (tmp_path / "x").iterdir()]
 
 
+def test_quiet_silences_remarks_on_former_names(run, tmp_path):
+    done = run("absolute-orientation", "--example", "--listing", "x.txt", "--quiet")
+    assert (done.exit_code, done.output) == (0, "")
+    assert (tmp_path / "x.txt").is_file()
+
+
 def test_every_hidden_option_is_a_former_name():
     hidden = 0
     for command in COMMANDS.values():
@@ -99,6 +105,25 @@ def test_pictures_without_a_place_are_refused(run, tmp_path):
         assert refused.exit_code == 2
         assert "goes with --out DIR" in refused.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("command", "ending", "head"),
+    [
+        ("plan --strips 1 --photos-per-strip 4", "svg", b"<?xml"),
+        ("perspective-center --example", "pdf", b"%PDF"),
+        ("absolute-orientation --example", "svg", b"<?xml"),
+        ("stellar-camera --example", "png", b"\x89PNG"),
+        ("stellar-camera --example", "pdf", b"%PDF"),
+    ],
+)
+def test_pictures_have_the_format_that_is_asked_for(run, tmp_path, command, ending, head):
+    pytest.importorskip("matplotlib")
+    done = run(*command.split(), "--out", "o", "--plots", "--plot-format", ending)
+    assert done.exit_code == 0, done.output
+    pictures = [path for path in (tmp_path / "o").iterdir() if path.suffix in (".png", ".pdf", ".svg")]
+    assert pictures
+    assert all(path.suffix == f".{ending}" and path.read_bytes().startswith(head) for path in pictures)
 
 
 def test_a_file_is_no_place_for_an_adjusted_collection(run, tmp_path):
@@ -147,7 +172,7 @@ def test_the_script_of_completion_is_printed(shell):
         ("photogram giant --o", {"--out", "--ordering", "--overwrite"}),
         ("photogram giant check --th", {"--threads"}),
         ("photogram giant block --ordering d", {"dissection"}),
-        ("photogram perspective-center --p", {"--plots"}),
+        ("photogram perspective-center --p", {"--plots", "--plot-format"}),
     ],
 )
 def test_words_are_completed(line, expected):

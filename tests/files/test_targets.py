@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from photogram import InputError
-from photogram.writing import OutputSet, check_outputs, write_whole
+from photogram.io.writing import OutputSet, check_outputs, write_whole
 
 
 def names(directory):
@@ -80,7 +80,7 @@ def test_standard_output_gets_the_document_in_its_place(tmp_path, name):
     """Also where it is a file, which is not replaced: what is printed before and after is kept."""
     (tmp_path / "link").symlink_to("/dev/stdout")
     program = (
-        "import sys; from pathlib import Path; from photogram.writing import write_whole\n"
+        "import sys; from pathlib import Path; from photogram.io.writing import write_whole\n"
         "print('before'); write_whole({Path(sys.argv[1]): b'document\\n'}); print('after')"
     )
     command = [sys.executable, "-c", program, name]

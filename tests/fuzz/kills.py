@@ -27,7 +27,7 @@ WRITER = """\
 import sys
 from itertools import count
 from pathlib import Path
-from photogram.writing import write_whole
+from photogram.io.writing import write_whole
 print("ready", flush=True)
 for version in count(1):
     write_whole({Path(name): str(version).encode() * 2000 for name in sys.argv[1:]})

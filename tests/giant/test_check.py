@@ -10,17 +10,17 @@ import pytest
 from typer.testing import CliRunner
 
 from photogram import simulate
+from photogram.checks.editing import kept_images, without_photos
+from photogram.checks.heights import neighbours
+from photogram.checks.orientation import MIRRORS
+from photogram.checks.predictions import exchange
+from photogram.checks.rays import Rays
+from photogram.checks.robust import critical, fit, mad_sd
+from photogram.checks.stations import strips_of
+from photogram.checks.structure import parts_of
 from photogram.cli import app
-from photogram.geometry import Spheroid
 from photogram.giant import Limits, Project, check, write_project
-from photogram.giant.checks.editing import kept_images, without_photos
-from photogram.giant.checks.heights import neighbours
-from photogram.giant.checks.orientation import MIRRORS
-from photogram.giant.checks.predictions import exchange
-from photogram.giant.checks.rays import Rays
-from photogram.giant.checks.robust import critical, fit, mad_sd
-from photogram.giant.checks.stations import strips_of
-from photogram.giant.checks.structure import parts_of
+from photogram.network.geometry import Spheroid
 
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
 
@@ -329,7 +329,7 @@ def test_section_13_a_gross_error_of_control_is_given_in_full_and_spoils_nothing
 
 @pytest.mark.parametrize("photos", [5, 8])
 def test_a_photo_turned_by_180_degrees_departs_by_180_degrees(photos):
-    from photogram.giant.checks.stations import stations
+    from photogram.checks.stations import stations
 
     block = simulate(strips=1, photos_per_strip=photos, points_per_photo=30, crab=0.001, seed=4).block
     turned = changed(block, "photo_attitudes", 2, 2, np.pi)
@@ -348,7 +348,7 @@ def test_section_13_an_outlying_initial_station(block):
 
 @pytest.mark.giant("13", "7 outlying stations")
 def test_section_13_a_station_off_the_path_without_an_adjustment(block):
-    from photogram.giant.checks.stations import stations
+    from photogram.checks.stations import stations
 
     one = changed(block, "photo_positions", block.photo_ids.index("0305"), 2, 900.0)
     one = changed(one, "photo_attitudes", block.photo_ids.index("0407"), 2, 0.6)

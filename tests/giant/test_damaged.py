@@ -12,7 +12,7 @@ from photogram import Spheroid, simulate
 from photogram.cli import app
 from photogram.giant import Common, Project
 from photogram.giant.files import NAMES, to_bytes
-from photogram.writing import write_whole
+from photogram.io.writing import write_whole
 
 PROJECTS = 840
 RUNS = 8

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram.adjusted import Iteration, SumsOfSquares
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame
 from photogram.giant.fields import printed_order
 from photogram.giant.listing.control import control_pages
@@ -30,6 +29,7 @@ from photogram.giant.listing.points import point_pages, propagated_point_pages
 from photogram.giant.listing.residuals import PointResiduals, residual_pages, statistics
 from photogram.giant.listing.stations import station_pages
 from photogram.giant.listing.warnings import warning_pages
+from photogram.results.adjusted import Iteration, SumsOfSquares
 
 DATA = Path(__file__).parents[1] / "data" / "giant"
 SCAN = DATA / "scanned_pages.txt"

@@ -8,7 +8,9 @@ import numpy as np
 
 from photogram.absolute_orientation.document import to_json
 from photogram.absolute_orientation.oriented import OrientedModel
+from photogram.absolute_orientation.plot import figure
 from photogram.absolute_orientation.report import report
+from photogram.show.pictures import drawn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,6 +50,4 @@ class Orientation(OrientedModel):
 
     def plot(self) -> bytes:
         """Return a plan of the residuals of the control as a picture (PNG)."""
-        from photogram.absolute_orientation.plot import plot  # matplotlib takes long to import
-
-        return plot(self)
+        return drawn(figure(self))

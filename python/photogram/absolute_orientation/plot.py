@@ -9,25 +9,26 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.oriented import OrientedModel
 from photogram.arguments.types import Floats
-from photogram.show.pictures import arrows, drawn, new_figure, round_length
+from photogram.show.pictures import arrows, new_figure, round_length
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-__all__ = ["plot"]
+__all__ = ["figure"]
 
 
 LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""
 
 
-def plot(result: OrientedModel) -> bytes:
-    """Draw plan residuals as arrows and those of elevations as bars, given minus transformed; return a PNG.
+def figure(result: OrientedModel) -> Figure:
+    """Draw plan residuals as arrows and those of elevations as bars, given minus transformed.
 
     Needs matplotlib (`pip install 'photogram[plots]'`).
     """
-    figure = new_figure(8, 7.5)
-    axes = figure.add_subplot()
+    made = new_figure(8, 7.5)
+    axes = made.add_subplot()
     rows = np.flatnonzero(result.took_part)
     plan = result.adjusted_control[rows, :2]
     residuals = result.residuals_ground[rows]
@@ -45,8 +46,8 @@ def plot(result: OrientedModel) -> bytes:
     rms = result.rms / result.similarity.scale
     axes.set_title(f"Control, given minus transformed; rms {rms:.3g} {result.stations.ground_unit}")
     axes.locator_params(nbins=6)
-    figure.legend(loc="outside lower center", ncols=3, frameon=False)
-    return drawn(figure)
+    made.legend(loc="outside lower center", ncols=3, frameon=False)
+    return made
 
 
 def _stations(axes: Axes, result: OrientedModel, rows: NDArray[np.intp], plan: Floats) -> None:

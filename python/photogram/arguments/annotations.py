@@ -1,6 +1,10 @@
 """Arguments of public functions, checked against their annotations: a wrong one is an error that names it.
 
 An argument of a wrong kind would otherwise fail somewhere inside, as whatever Python or NumPy makes of it.
+
+Packages that check annotations would do less here: beartype converts nothing (strings to paths, integers of
+NumPy to integers), raises errors of its own, and takes NaN, NUL and half a surrogate pair for good values;
+pydantic knows no arrays, and brings a compiled core to an install that is light.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram.adjustment.adjustment import adjust
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.checks.findings import Finding, Section
 from photogram.checks.gross import Suspects
 from photogram.checks.predictions import (
@@ -31,9 +31,6 @@ from photogram.results.result import Result
 
 __all__ = ["Edited", "edit"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 Adjust = Callable[[Block], Result]
 
 ROUNDS = 20
@@ -243,13 +240,13 @@ def blunder_section() -> Section:
     )
 
 
-def kept_images(block: Block, kept: Mask) -> Block:
+def kept_images(block: Block, kept: Bools) -> Block:
     """Return a block with some of its images."""
     names = ("image_photos", "image_points", "image_xy", "image_sd")
     return block.replace(**{name: getattr(block, name)[kept] for name in names})
 
 
-def without_photos(block: Block, photos: Mask) -> Block:
+def without_photos(block: Block, photos: Bools) -> Block:
     """Return a block without some of its photos and their images."""
     fewer = kept_images(block, ~photos[block.image_photos])
     number = np.cumsum(~photos) - 1
@@ -267,7 +264,7 @@ def without_photos(block: Block, photos: Mask) -> Block:
     )
 
 
-def _first(block: Block, bad: Mask, adjusted: Adjust, section: Section) -> tuple[Result, Block]:
+def _first(block: Block, bad: Bools, adjusted: Adjust, section: Section) -> tuple[Result, Block]:
     """Adjust with all photos, or without those bad ones with which the block does not fit."""
     error = None
     if not bad.any():

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-import orjson
-
 from photogram import _photocore
+from photogram.io import json
 from photogram.show.sections import composed, headline
 
 if TYPE_CHECKING:
@@ -120,4 +119,4 @@ class Check:
             "grave": len(self.grave),
             "sections": [asdict(section) for section in self.sections],
         }
-        return orjson.dumps(document, option=orjson.OPT_INDENT_2)
+        return json.to_json(document)

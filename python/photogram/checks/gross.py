@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.checks.findings import Finding, Level, Section
 from photogram.checks.rays import Rays, meet
 from photogram.checks.robust import fit, mad_sd
@@ -19,9 +19,6 @@ from photogram.results.result import Result
 
 __all__ = ["Suspects", "disproved", "gross", "without"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 BAD_PHOTO = 4.0
 """A photo is bad when its median residual is so many times that of the median photo, ..."""
@@ -63,9 +60,9 @@ class Suspects:
         (n,) control points far from where their rays meet.
     """
 
-    images: Mask
-    photos: Mask
-    control: Mask
+    images: Bools
+    photos: Bools
+    control: Bools
 
 
 def gross(block: Block) -> tuple[Section, Suspects]:
@@ -93,7 +90,7 @@ def gross(block: Block) -> tuple[Section, Suspects]:
     return section, Suspects(images, photos, control)
 
 
-def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Mask:
+def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Bools:
     """Tell which suspected images do not break the pattern any more when seen from the adjusted stations.
 
     A station far off spoils the intersections of its neighbours, so that good images look wrong beside it.
@@ -123,7 +120,7 @@ def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Mask:
     return suspects.images & ~wrong & ~gone
 
 
-def without(block: Block, findings: list[Finding], images: Mask) -> list[Finding]:
+def without(block: Block, findings: list[Finding], images: Bools) -> list[Finding]:
     """Return the findings of :func:`gross` without those that rest on nothing but the given images."""
 
     def stands(finding: Finding) -> bool:
@@ -147,7 +144,7 @@ def _overrun(rays: Rays, findings: list[Finding]) -> int | None:
     return int(np.argmax(np.where(overrun, shares / np.maximum(images, 1), 0))) if overrun.any() else None
 
 
-def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Mask]:
+def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
     """Leave out the photo without which the others fit best, as long as it stands out from them."""
     block = rays.block
     bad = np.zeros(len(block.photo_ids), dtype=bool)
@@ -198,7 +195,7 @@ def _worst(rays: Rays, medians: Floats, known: Indices) -> tuple[int, float, Ray
     return photo, float(np.exp(middle)), without
 
 
-def _medians(block: Block, sizes: Floats, used: Mask) -> Floats:
+def _medians(block: Block, sizes: Floats, used: Bools) -> Floats:
     """(P,) median size of each photo's residuals; NaN with fewer than three."""
     rows = np.flatnonzero(used & np.isfinite(sizes))
     order = rows[np.lexsort((sizes[rows], block.image_photos[rows]))]
@@ -209,7 +206,7 @@ def _medians(block: Block, sizes: Floats, used: Mask) -> Floats:
     return medians
 
 
-def _broken(rays: Rays) -> tuple[list[Finding], Mask]:
+def _broken(rays: Rays) -> tuple[list[Finding], Bools]:
     """Find images that break the pattern of their photo, and say what explains each."""
     block = rays.block
     departure = _departures(rays, rays.intersect().residuals)
@@ -359,7 +356,7 @@ def _exchanged(solver: _Solver, rows_of: dict[int, Indices]) -> tuple[list[Findi
     return findings, found
 
 
-def _control(rays: Rays, section: Section) -> Mask:
+def _control(rays: Rays, section: Section) -> Bools:
     """Compare held control with the intersected positions; what stands out from the others is named.
 
     Returns (n,) the points that are gravely off.

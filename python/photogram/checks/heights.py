@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats, Indices
 from photogram.checks.findings import Finding, Section
 from photogram.checks.rays import local_axes
 from photogram.checks.robust import MAD_TO_SD
@@ -12,8 +12,6 @@ from photogram.results.result import Result
 
 __all__ = ["neighbours", "two_ray_heights"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 NEIGHBOURS = 8
 """Points that a local plane rests on."""

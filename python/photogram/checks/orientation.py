@@ -8,16 +8,14 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Bools, Floats
 from photogram.checks.findings import Finding, Section
 from photogram.checks.rays import Intersection, Rays, frame_radius, meet
 from photogram.network.block import Block
 
 __all__ = ["orientation", "spare_explained"]
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SUSPICIOUS = 0.25
 """Cost above which an orientation is doubted: 0 for rays that meet in front, 1 for rays that miss."""
@@ -133,7 +131,7 @@ def _unexplained(
     return [finding for finding in above if not (before - after).issuperset(finding.points)]
 
 
-def spare_explained(section: Section, block: Block, photos: Mask) -> None:
+def spare_explained(section: Section, block: Block, photos: Bools) -> None:
     """Take out of a section what some bad photos explain: points above a camera, rays that do not meet."""
     rays = Rays.of(block).without(photos[block.image_photos])
     met = rays.intersect()
@@ -182,18 +180,18 @@ def _photo_costs(block: Block, costs: Floats) -> Floats:
     return np.where(images > 0, sums / np.maximum(images, 1), np.nan)
 
 
-def _turned(block: Block, photos: Mask, angle: float) -> Block:
+def _turned(block: Block, photos: Bools, angle: float) -> Block:
     attitudes = block.photo_attitudes.copy()
     attitudes[photos, 2] += angle
     return block.replace(photo_attitudes=attitudes)
 
 
-def _sign_changed(block: Block, photos: Mask) -> Block:
+def _sign_changed(block: Block, photos: Bools) -> Block:
     distances = np.where(photos, -block.principal_distances, block.principal_distances)
     return block.replace(principal_distances=distances)
 
 
-def _mirrored(block: Block, photos: Mask, mirror: Floats) -> Block:
+def _mirrored(block: Block, photos: Bools, mirror: Floats) -> Block:
     images = photos[block.image_photos][:, np.newaxis]
     return block.replace(image_xy=np.where(images, block.image_xy @ mirror.T, block.image_xy))
 
@@ -283,7 +281,7 @@ class _PhotoTrial:
 
     kind: str
     text: str
-    change: Callable[[Mask], Block]
+    change: Callable[[Bools], Block]
 
 
 def _photo_trials(block: Block) -> list[_PhotoTrial]:
@@ -302,7 +300,7 @@ def _photo_trials(block: Block) -> list[_PhotoTrial]:
     return trials
 
 
-def _alone(rays: Rays, images: Mask, changed: Rays) -> Floats:
+def _alone(rays: Rays, images: Bools, changed: Rays) -> Floats:
     """(P,) cost of each photo when it alone is changed, over the given images."""
     own, own_right = rays.equations()
     new, new_right = changed.equations()

@@ -10,8 +10,8 @@ import math
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats, Indices
 from photogram.checks.rays import Rays
 from photogram.checks.robust import normal_of_chi_square
 from photogram.network.block import Block
@@ -19,8 +19,6 @@ from photogram.results.result import Result
 
 __all__ = ["exchange", "exchanged_pair", "exchanged_where_rays_meet", "freed", "tests_of_predictions"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 FEWEST = 3
 """Control points that tell which two of them are exchanged."""

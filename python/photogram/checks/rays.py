@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network import geometry
 from photogram.network.block import Block
 
 __all__ = ["Intersection", "LocalAxes", "Rays", "frame_radius", "local_axes", "meet"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 PARALLEL = 1e-8
 """Determinant of the normal matrix of a mean ray below which the rays of a point count as parallel."""
@@ -90,7 +87,7 @@ class Intersection:
 
     positions: Floats
     residuals: Floats
-    in_front: Mask
+    in_front: Bools
 
     @property
     def sizes(self) -> Floats:
@@ -121,16 +118,16 @@ class Rays:
     axes: LocalAxes
     centres: Floats
     cameras: Floats
-    used: Mask
+    used: Bools
 
     @classmethod
-    def of(cls, block: Block, used: Mask | None = None) -> Rays:
+    def of(cls, block: Block, used: Bools | None = None) -> Rays:
         """Return the rays of a block from its initial stations."""
         axes = local_axes(block)
         used = np.ones(len(block.image_xy), dtype=bool) if used is None else used
         return cls(block, axes, axes.positions(block.photo_positions), axes.cameras(), used)
 
-    def without(self, images: Mask) -> Rays:
+    def without(self, images: Bools) -> Rays:
         """Return the rays with some images left out."""
         return replace(self, used=self.used & ~images)
 
@@ -171,7 +168,7 @@ class Rays:
         residuals, in_front = self.residuals(positions[self.block.image_points])
         return Intersection(positions, residuals, in_front)
 
-    def residuals(self, positions: Floats, rows: Indices | None = None) -> tuple[Floats, Mask]:
+    def residuals(self, positions: Floats, rows: Indices | None = None) -> tuple[Floats, Bools]:
         """Return residuals, observed minus computed in mm, and whether the positions are in front.
 
         Parameters

@@ -6,8 +6,8 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats, Indices
 from photogram.checks.findings import Finding, Section
 from photogram.checks.rays import frame_radius
 from photogram.checks.robust import critical, normal_of_chi_square
@@ -15,8 +15,6 @@ from photogram.results.result import Result
 
 __all__ = ["residuals"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 FEWEST = 20
 """Images of a photo that a test of its pattern needs."""

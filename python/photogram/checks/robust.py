@@ -6,11 +6,11 @@ import math
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
+
+from photogram.arguments.types import Floats
 
 __all__ = ["critical", "fit", "mad_sd", "normal_of_chi_square"]
 
-Floats = NDArray[np.float64]
 
 MAD_TO_SD = 1 / NormalDist().inv_cdf(0.75)
 ROUNDING = 1e-9

@@ -6,8 +6,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats, Indices
 from photogram.checks.findings import Finding, Level, Section
 from photogram.checks.rays import local_axes
 from photogram.checks.robust import MAD_TO_SD, fit
@@ -17,8 +17,6 @@ from photogram.results.result import Result
 
 __all__ = ["stations", "strips_of"]
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 LOOK, GRAVE = 8.0, 20.0
 """Departures from the path, in robust standard deviations of all departures of their kind."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Indices
 from photogram.checks.findings import Finding, Section
 from photogram.messages import listed
 from photogram.network.block import Block
@@ -14,8 +14,6 @@ from photogram.results.report import bandwidths
 from photogram.results.result import Result
 
 __all__ = ["parts_of", "structure_section"]
-
-Indices = NDArray[np.int64]
 
 
 def structure_section(block: Block, result: Result | None) -> Section:

@@ -13,7 +13,16 @@ from rich.markup import escape
 
 from photogram.cli.console import output, print_sections
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
-from photogram.cli.options import FormerPlot, JsonFile, Plots, Quiet, needs_out, out_option
+from photogram.cli.options import (
+    FormerPlot,
+    JsonFile,
+    PictureFormat,
+    PlotFormat,
+    Plots,
+    Quiet,
+    out_option,
+    picture_places,
+)
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity, Stations
@@ -99,6 +108,7 @@ def absolute_orientation(
     ] = None,
     json: JsonFile = None,
     plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     listing: Annotated[
         Path | None, Writes.FILE, Former("--out DIR writes the report there"), typer.Option(hidden=True)
     ] = None,
@@ -161,7 +171,6 @@ def absolute_orientation(
     Prints problems, figures, parameters and residuals; writes what is asked for, whole or not at all.
     Stations without control are transformed too. Exit code 3: not converged, or control that does not fit.
     """
-    needs_out(plots, out)
     if trace and method is Method.RIGOROUS:
         raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
     with job:
@@ -180,7 +189,7 @@ def absolute_orientation(
         if points and not target:
             target = (out or points.parent) / f"{points.stem}-transformed.csv"
         reports = [path for path in (listing, out and out / "report.txt") if path]
-        pictures = [path for path in (plot, out / "residuals.png" if plots and out else None) if path]
+        pictures = picture_places("residuals", plots, plot_format, out, plot)
         job.writes(*reports, *pictures, *([target] if target and target is not points_out else []))
         stations, former, messages = _read(file, format, zero_missing, ground_unit, model_unit)
         result = orient(
@@ -284,7 +293,10 @@ def _small_files(
     if reports:
         made |= dict.fromkeys(reports, result.report().encode())
     if pictures:
-        made |= dict.fromkeys(pictures, result.plot())
+        from photogram.absolute_orientation.plot import figure
+        from photogram.show.pictures import drawn
+
+        made |= {path: drawn(figure(result), path) for path in pictures}
     if trace:
         from photogram.absolute_orientation.trace import trace_text
 

@@ -315,7 +315,7 @@ def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
     if isinstance(value, int) and abs(value) > LARGEST:
         raise typer.BadParameter("is too large", param_hint=_option(parameter))
     for mark in metadata:
-        if isinstance(mark, Former) and value != parameter.default:
+        if isinstance(mark, Former) and value != parameter.default and not values.get("quiet"):
             print_remark(f"{_option(parameter)} will go: {mark.now}")
         if isinstance(mark, ArgumentInfo) and "example" in values and values["example"] == bool(value):
             raise typer.BadParameter(f"give {mark.metavar}, or --example", param_hint=mark.metavar)

@@ -16,12 +16,14 @@ __all__ = [
     "JsonFile",
     "Ordering",
     "OrderingName",
+    "PictureFormat",
+    "PlotFormat",
     "Plots",
     "Quiet",
     "Threads",
     "default_out",
-    "needs_out",
     "out_option",
+    "picture_places",
 ]
 
 
@@ -30,9 +32,18 @@ JsonFile = Annotated[
     Writes.FILE,
     typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
 ]
-Plots = Annotated[
-    bool, typer.Option("--plots", help="Draw the pictures too, as PNG files in --out (needs matplotlib).")
-]
+Plots = Annotated[bool, typer.Option("--plots", help="Draw the pictures too, into --out (needs matplotlib).")]
+
+
+class PictureFormat(StrEnum):
+    """How pictures are written."""
+
+    PNG = "png"
+    PDF = "pdf"
+    SVG = "svg"
+
+
+PlotFormat = Annotated[PictureFormat, typer.Option(help="Format of the pictures.")]
 FormerPlot = Annotated[
     Path | None, Writes.FILE, Former("say --out DIR --plots"), typer.Option("--plot", hidden=True)
 ]
@@ -62,10 +73,14 @@ def out_option(help: str) -> Any:  # noqa: A002  # as typer calls it
     return typer.Option("--out", metavar="DIR", help=help, show_default=False)
 
 
-def needs_out(plots: bool, out: Path | None) -> None:
-    """Refuse pictures without a place."""
+def picture_places(
+    name: str, plots: bool, ending: PictureFormat, out: Path | None, former: Path | None
+) -> list[Path]:
+    """Return where a picture goes: to the results, under its former option, both, or nowhere."""
     if plots and out is None:
         raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
+    places = [out / f"{name}.{ending.value}"] if plots and out else []
+    return [*places, former] if former else places
 
 
 def default_out(source: Path, ending: str) -> Path:

@@ -11,7 +11,16 @@ from rich.markup import escape
 
 from photogram.cli.console import output, print_remark
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
-from photogram.cli.options import FormerPlot, JsonFile, Plots, Quiet, needs_out, out_option
+from photogram.cli.options import (
+    FormerPlot,
+    JsonFile,
+    PictureFormat,
+    PlotFormat,
+    Plots,
+    Quiet,
+    out_option,
+    picture_places,
+)
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
@@ -48,6 +57,7 @@ def perspective_center(
     ] = None,
     json: JsonFile = None,
     plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     listing: Annotated[
         Path | None, Writes.FILE, Former("--out DIR writes the listing there"), typer.Option(hidden=True)
     ] = None,
@@ -70,7 +80,6 @@ def perspective_center(
 
     The run stops at the first set that cannot be read or solved; what was solved before is written.
     """
-    needs_out(plots, out)
     with job:
         from photogram.perspective_center import run_deck
 
@@ -78,7 +87,7 @@ def perspective_center(
             deck = job.packaged(*EXAMPLE)
             job.reads(deck)
         listings = [path for path in (listing, out and out / "listing.txt") if path]
-        pictures = [path for path in (plot, out / "residuals.png" if plots and out else None) if path]
+        pictures = picture_places("residuals", plots, plot_format, out, plot)
         job.writes(*listings, *pictures)
         run = run_deck(deck, as_published=as_published, weights=weights.value)
         stopped = run.stop is not None

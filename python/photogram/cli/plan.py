@@ -11,7 +11,16 @@ import typer
 
 from photogram.cli.console import output, print_remark
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import FormerPlot, JsonFile, Plots, Quiet, needs_out, out_option
+from photogram.cli.options import (
+    FormerPlot,
+    JsonFile,
+    PictureFormat,
+    PlotFormat,
+    Plots,
+    Quiet,
+    out_option,
+    picture_places,
+)
 from photogram.cli.simulated import Control, NetworkOptions, takes_network
 
 if TYPE_CHECKING:
@@ -54,6 +63,7 @@ def plan(
     ] = None,
     json: JsonFile = None,
     plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     plot: FormerPlot = None,
     quiet: Quiet = False,
 ) -> None:
@@ -62,12 +72,11 @@ def plan(
     No measurements are needed or made: expected standard deviations of points by number of rays and by
     location, of photographs, and the gross errors that can be found.
     """
-    needs_out(plots, out)
     with job:
         from photogram.planning import plan as predict
 
         report = out and out / "report.txt"
-        pictures = [path for path in (plot, out / "plan.png" if plots and out else None) if path]
+        pictures = picture_places("plan", plots, plot_format, out, plot)
         job.writes(*pictures, *([report] if report else []))
 
         if projects:

@@ -10,7 +10,7 @@ import typer
 
 from photogram.cli.console import print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Plots, Quiet, Threads, out_option
+from photogram.cli.options import JsonFile, PictureFormat, PlotFormat, Plots, Quiet, Threads, out_option
 
 if TYPE_CHECKING:
     from photogram.stellar.night import CalibratedNight
@@ -48,6 +48,7 @@ def stellar_camera(
         bool, typer.Option("--as-published", help="Iterate with the report's partials and stop rules.")
     ] = False,
     plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a camera by a plate with images of stars (NOAA Technical Report NOS 55).
@@ -62,6 +63,7 @@ def stellar_camera(
             deck = job.packaged("stellar") / "plate.toml"
         problems, inputs = _read(deck)
         job.reads(*inputs)
+        pictures = plot_format.value if plots else ""
         target = out or Path(f"{deck.stem}-calibrated")
         written: dict[Path, bytes] = {}
         documents: dict[Path, bytes] = {}
@@ -72,7 +74,7 @@ def stellar_camera(
             result = calibrate(problem)
             results.append(result)
             mark = f"-{number}" if len(problems) > 1 else ""
-            written |= _files(result, target, mark, plots)
+            written |= _files(result, target, mark, pictures)
             if json is not None:
                 documents[json.with_stem(json.stem + mark)] = to_json(result)
         job.finish(
@@ -102,6 +104,7 @@ def exposures(
     out: Out = None,
     json: JsonFile = None,
     plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     threads: Threads = None,
     quiet: Quiet = False,
 ) -> None:
@@ -115,8 +118,9 @@ def exposures(
         if night is None:
             night = job.packaged("exposures") / "night.toml"
         job.reads(*inputs(night))
+        pictures = plot_format.value if plots else ""
         result = calibrate_night(read_night(night), threads)
-        written = _night_files(result, out or Path(f"{night.stem}-calibrated"), plots)
+        written = _night_files(result, out or Path(f"{night.stem}-calibrated"), pictures)
         documents = {json: to_json(result)} if json is not None else {}
         job.finish(
             written,
@@ -141,7 +145,7 @@ def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
     return ([read_plain(deck)], inputs(deck)) if deck.suffix.lower() == ".toml" else (read_deck(deck), [deck])
 
 
-def _files(result: Result, out: Path, mark: str, plots: bool) -> dict[Path, bytes]:
+def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, bytes]:
     """Make everything that is written for one problem."""
     from photogram.stellar.cameras import camera_document
     from photogram.stellar.listing import listing, plate_list
@@ -152,22 +156,22 @@ def _files(result: Result, out: Path, mark: str, plots: bool) -> dict[Path, byte
     }
     if result.problem.options.plate_list:
         made[out / f"plate{mark}.txt"] = plate_list(result)
-    if plots:
+    if pictures:
+        from photogram.show.pictures import files as drawn
         from photogram.stellar.plots import figures
 
-        made |= {
-            out / name.replace(".png", f"{mark}.png"): content for name, content in figures(result).items()
-        }
+        made |= drawn({f"{name}{mark}": each for name, each in figures(result).items()}, out, pictures)
     return made
 
 
-def _night_files(result: CalibratedNight, out: Path, plots: bool) -> dict[Path, bytes]:
+def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path, bytes]:
     """Make everything that is written for a night."""
     from photogram.stellar.night_report import report
 
     made = {out / "report.txt": report(result).encode(), out / "camera.json": result.camera.to_json()}
-    if plots:
+    if pictures:
+        from photogram.show.pictures import files as drawn
         from photogram.stellar.night_plots import figures
 
-        made |= {out / name: content for name, content in figures(result).items()}
+        made |= drawn(figures(result), out, pictures)
     return made

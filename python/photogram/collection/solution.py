@@ -8,17 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
 from photogram.messages import Message
 from photogram.results.adjusted import Iteration
+from photogram.results.scaled import Scaled
 
 __all__ = ["CollectionSolution"]
 
 
 @dataclass(frozen=True, eq=False)
-class CollectionSolution:
+class CollectionSolution(Scaled):
     """An adjusted collection of P photos, n points and m image points, in the order of the collection.
 
     What was left out of the adjustment is NaN. Cofactors hold for a priori unit weight and for the datum
@@ -100,40 +100,10 @@ class CollectionSolution:
     seconds: Mapping[str, float]
 
     @property
-    def converged(self) -> bool:
-        """Whether the criterion of convergence was met."""
-        return self.status == "converged"
-
-    @property
     def cost(self) -> float:
         """Half the sum that was minimised, at the adjusted values."""
         last = self.iterations[-1].weighted_sum_of_squares if self.iterations else None
         return 0.5 * (self.initial_weighted_sum_of_squares if last is None else last)
-
-    @property
-    def covariance_scale(self) -> float:
-        """What cofactors are multiplied by: the variance of unit weight, or 1 where there is none."""
-        return 1.0 if self.variance_of_unit_weight is None else self.variance_of_unit_weight
-
-    @property
-    def photo_covariances(self) -> Floats:
-        """(P, 9, 9) covariances of the parameters, scaled by the variance of unit weight."""
-        return self.photo_cofactors * self.covariance_scale
-
-    @property
-    def point_covariances(self) -> Floats:
-        """(n, 3, 3) covariances, scaled by the variance of unit weight."""
-        return self.point_cofactors * self.covariance_scale
-
-    @property
-    def photo_sd(self) -> Floats:
-        """(P, 9) standard deviations of the parameters."""
-        return standard_deviations(self.photo_covariances)
-
-    @property
-    def point_sd(self) -> Floats:
-        """(n, 3) standard deviations."""
-        return standard_deviations(self.point_covariances)
 
     @property
     def used_points(self) -> NDArray[np.bool_]:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.results.scaled import Scaled
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import ROUNDING
 
@@ -70,7 +70,7 @@ class SumsOfSquares:
 
 
 @dataclass(frozen=True, eq=False)
-class AdjustedBlock:
+class AdjustedBlock(Scaled):
     """An adjusted block of P photos, n points and m image observations, in the order of the block.
 
     Positions are X, Y, Z or longitude (rad), latitude (rad), height; angles are radians, image coordinates
@@ -180,70 +180,19 @@ class AdjustedBlock:
         loss: tuple[str, float] | None,
         messages: list[Message],
     ) -> Self:
-        """Take over what the core found."""
-        return cls(
-            block=block.kept(),
-            status=solution.status,
-            messages=messages,
-            loss=loss,
-            initial_weighted_sum_of_squares=solution.initial_sum_of_squares,
-            iterations=[Iteration(*row) for row in solution.iterations],
-            sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
-            degrees_of_freedom=solution.degrees_of_freedom,
-            unit_variance=unit_variance,
-            variance_of_unit_weight=solution.variance_of_unit_weight,
-            photo_corrections=solution.photo_corrections,
-            photo_positions=solution.photo_positions,
-            photo_attitudes=solution.photo_attitudes,
-            photo_cofactors=solution.photo_cofactors,
-            photo_redundancy=solution.photo_redundancy,
-            point_positions=solution.point_positions,
-            point_last_corrections=solution.point_last_corrections,
-            point_cofactors=solution.point_cofactors,
-            point_redundancy=solution.point_redundancy,
-            point_rays=solution.point_rays,
-            residuals=solution.residuals,
-            redundancy=solution.redundancy,
-            standardized=solution.standardized,
-            image_weights=solution.image_weights,
-            dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
-            ordering=solution.ordering,
-            predictions=solution.predictions,
-            photo_order=solution.photo_order,
-            operations=solution.operations,
-            formations=solution.formations,
-            seconds=solution.seconds,
-        )
-
-    @property
-    def converged(self) -> bool:
-        """Whether the criterion of convergence was met."""
-        return self.status == "converged"
-
-    @property
-    def covariance_scale(self) -> float:
-        """What cofactors are multiplied by: the variance of unit weight, or 1 where there is none."""
-        return 1.0 if self.variance_of_unit_weight is None else self.variance_of_unit_weight
-
-    @property
-    def photo_covariances(self) -> Floats:
-        """(P, 6, 6) covariances of position and attitude, scaled by the variance of unit weight."""
-        return self.photo_cofactors * self.covariance_scale
-
-    @property
-    def point_covariances(self) -> Floats:
-        """(n, 3, 3) covariances, scaled by the variance of unit weight."""
-        return self.point_cofactors * self.covariance_scale
-
-    @property
-    def photo_sd(self) -> Floats:
-        """(P, 6) standard deviations of position and attitude."""
-        return standard_deviations(self.photo_covariances)
-
-    @property
-    def point_sd(self) -> Floats:
-        """(n, 3) standard deviations."""
-        return standard_deviations(self.point_covariances)
+        """Take over what the core found: under the same names, but for what is put otherwise here."""
+        found: dict[str, Any] = {
+            "block": block.kept(),
+            "messages": messages,
+            "loss": loss,
+            "initial_weighted_sum_of_squares": solution.initial_sum_of_squares,
+            "iterations": [Iteration(*row) for row in solution.iterations],
+            "sums_of_squares": SumsOfSquares(*solution.sums_of_squares),
+            "unit_variance": unit_variance,
+            "dropped": {block.point_ids[point]: reason for point, reason in solution.dropped},
+        }
+        same = {each.name: getattr(solution, each.name) for each in fields(cls) if each.name not in found}
+        return cls(**found, **same)
 
     @property
     def global_test(self) -> GlobalTest | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.quiver import Quiver
 
-__all__ = ["arrows", "drawn", "new_figure", "open_frame", "round_length"]
+__all__ = ["arrows", "drawn", "files", "new_figure", "open_frame", "round_length"]
 
 DPI = 120
 """Dots an inch of pictures that are made of dots."""
@@ -47,6 +48,12 @@ def drawn(figure: Figure, path: Path | None = None) -> bytes:
     # Equal figures give equal files, whatever version draws them.
     figure.savefig(content, format=suffix, metadata={"Software": None} if suffix == "png" else None)
     return content.getvalue()
+
+
+def files(figures: Mapping[str, Figure], folder: Path, ending: str) -> dict[Path, bytes]:
+    """Return figures as files of a folder, in the format of their common ending (`png`, `pdf`, `svg`)."""
+    places = {folder / f"{name}.{ending}": figure for name, figure in figures.items()}
+    return {place: drawn(figure, place) for place, figure in places.items()}
 
 
 def arrows(axes: Axes, places: Floats, vectors: Floats, scale: float = 1.0, **style: Any) -> Quiver:

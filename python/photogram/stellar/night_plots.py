@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.show.pictures import drawn
 from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
 
 if TYPE_CHECKING:
@@ -20,15 +19,14 @@ _NAMED = len(COLOURS)
 """Exposures that have a colour of their own; more are drawn alike."""
 
 
-def figures(result: CalibratedNight) -> dict[str, bytes]:
-    """Return all pictures as PNG files by name."""
-    made = {
-        "stars.png": _stars(result),
-        "residuals.png": _residuals(result),
-        "histogram.png": _histogram(result),
-        "distortion.png": _distortion(result),
+def figures(result: CalibratedNight) -> dict[str, Figure]:
+    """Return all pictures by name."""
+    return {
+        "stars": _stars(result),
+        "residuals": _residuals(result),
+        "histogram": _histogram(result),
+        "distortion": _distortion(result),
     }
-    return {name: drawn(figure) for name, figure in made.items()}
 
 
 def _frame(result: CalibratedNight, title: str) -> tuple[Figure, Any]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.show.angles import ARCSEC
-from photogram.show.pictures import drawn
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes
 from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
 from photogram.stellar.parameters import GROUPS
@@ -21,16 +20,16 @@ if TYPE_CHECKING:
 __all__ = ["figures"]
 
 
-def figures(result: Result) -> dict[str, bytes]:
-    """Return all pictures that the options ask for as PNG files by name; stars and residuals always."""
-    made = {"stars.png": _stars(result), "residuals.png": _residuals(result)}
+def figures(result: Result) -> dict[str, Figure]:
+    """Return all pictures that the options ask for by name; stars and residuals always."""
+    made = {"stars": _stars(result), "residuals": _residuals(result)}
     if result.problem.options.histogram:
-        made["histogram.png"] = _histogram(result)
+        made["histogram"] = _histogram(result)
     if result.problem.options.curves:
-        made["distortion.png"] = _distortion(result)
+        made["distortion"] = _distortion(result)
     if result.problem.options.refraction:
-        made["refraction.png"] = _refraction(result)
-    return {name: drawn(figure) for name, figure in made.items()}
+        made["refraction"] = _refraction(result)
+    return made
 
 
 def _plate(title: str) -> tuple[Figure, Any]:
