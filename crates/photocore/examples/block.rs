@@ -23,7 +23,7 @@ fn noise(index: usize) -> f64 {
 fn block() -> Network {
     let station = |i: usize| [600.0 * (i % 4) as f64, 900.0 * (i / 4) as f64, 1500.0];
     let ground = |i: usize| [300.0 * (i % 7) as f64, 300.0 * (i / 7) as f64, 20.0 * noise(i)];
-    let corner = |i: usize| (i % 7) % 6 == 0 && (i / 7) % 3 == 0;
+    let corner = |i: usize| (i % 7).is_multiple_of(6) && (i / 7).is_multiple_of(3);
     let mut images = vec![];
     for photo in 0..8 {
         let seen = geometry::Photo::new(SPACE, SENSE, station(photo), [0.0, 0.0, 0.1], PRINCIPAL_DISTANCE);
