@@ -942,7 +942,7 @@ class StellarError(Exception):
     """The camera cannot be calibrated.
 
     `args` are the kind (`undetermined stars`, `undetermined`, `weight`, `not finite`, `input`), a message,
-    and the indices of the stars concerned.
+    and the indices of the stars concerned, of the parameters where these are `undetermined`.
     """
 
 def refraction(
@@ -1020,8 +1020,7 @@ class StellarProblem:
     fixed
         3 G + 17 flags: which parameters are held.
     weighted, weighted_values, weight_root
-        (k,) which parameters have weight, their given values, and R (k, k) of their weight matrix R^T R. With
-        more than three attitudes only common parameters can.
+        (k,) which parameters have weight, their given values, and R (k, k) of their weight matrix R^T R.
     star_places, star_catalogue, star_weights, star_fixed
         (S, 2) initial and catalogue places; (S, 2, 2) weights, zero for unknown directions; S flags.
     image_stars, image_pointings, image_xy, image_weights, image_times, image_shifts
@@ -1068,6 +1067,7 @@ class StellarProblem:
         covariance: bool,
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        whole: bool = False,
     ) -> dict[str, Any]:
         """Adjust by least squares with exact partials.
 
@@ -1079,19 +1079,80 @@ class StellarProblem:
             Converged when no unknown changes by more than this fraction of its standard deviation.
         max_iterations, covariance, threads, progress
             As for `adjust_block`.
+        whole
+            Whether to compute the cofactors of every two parameters, where there are cofactors.
 
         Returns
         -------
         `status`, `iterations`, `initial_sum_of_squares` (in units of `unit` squared), `parameters`
-        (3 G + 17,), `cofactors` for unit weight (all parameters squared where G <= 3; else of each attitude
-        3 x 20, then 17 x 17), `places` (S, 2), `place_cofactors` (S, 2, 2), `residuals` (m, 2) measured minus
-        computed, `axis_residual`, `sums_of_squares` (images, stars, parameters, axis), and `redundancy` and
+        (3 G + 17,); `places` (S, 2), `place_cofactors` (S, 2, 2), `place_inverses` (S, 2, 2): what of these
+        would be left if the parameters were known; `residuals` (m, 2) measured minus computed,
+        `axis_residual`, `sums_of_squares` (images, stars, parameters, axis), and `redundancy` and
         `standardized` of `image`, `place`, `axis`: of decorrelated components where weights are correlated.
+        Where there are cofactors, all for unit weight: `pointing_cofactors` (G, 3, 3), `cross_cofactors`
+        (G, 3, 17) of attitudes and common parameters, `common_cofactors` (17, 17); where the whole is asked
+        for, `cofactors` (3 G + 17, 3 G + 17) and `log_determinant`: natural logarithm of the determinant of
+        the normal equations reduced to the parameters.
 
         Raises
         ------
         StellarError
-            Unknowns that are not determined, or initial values that give no image.
+            Stars or parameters that are not determined, or that have no image at the initial values.
+        """
+
+    def without_effect(self) -> list[int]:
+        """Find the parameters, by index, that no image, no weight and not the axis touches.
+
+        Parameters that are held are not among them.
+
+        Raises
+        ------
+        StellarError
+            Stars that have no image at the initial values.
+        """
+
+    def correction(self, *, refraction: float, distortion: float, passes: int) -> dict[str, Any]:
+        """Correct the parameters once with the equations of `published` at the initial values.
+
+        Parameters
+        ----------
+        refraction, distortion, passes
+            As for `published`.
+
+        Returns
+        -------
+        `parameters` (3 G + 17,): corrections; `cofactors` of every two and `log_determinant`, both for unit
+        weight; `without_effect`: indices of the parameters that nothing touches yet, which are not
+        corrected.
+
+        Raises
+        ------
+        StellarError
+            Stars or parameters that are not determined, or that have no image at the initial values.
+        """
+
+    def residual_cycle(
+        self, cofactors: _Floats, *, refraction: float, distortion: float, passes: int
+    ) -> dict[str, Any]:
+        """Correct the stars with the parameters as they are; residuals and their tests (equations 64 to 71).
+
+        Parameters
+        ----------
+        cofactors
+            (3 G + 17, 3 G + 17) of the parameters, for unit weight.
+        refraction, distortion, passes
+            As for `published`.
+
+        Returns
+        -------
+        As `adjust` has them, but of the plate coordinates themselves: `places`, `place_cofactors`,
+        `place_inverses`, `residuals`, `axis_residual`, `sums_of_squares`, and `redundancy` and
+        `standardized` of `image` and `place`.
+
+        Raises
+        ------
+        StellarError
+            Stars that are not determined, or that have no image.
         """
 
     def equations(self) -> dict[str, _Floats]:

@@ -14,9 +14,9 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use photocore::adjustment;
-use photocore::geometry::{self, ObjectSpace, RotationSense};
+use photocore::geometry::{self, ObjectSpace, Orientation, Perspective, PoseNumbers, RotationSense};
+use photocore::network::{Camera, Image, Network, Options, Photo, Point, Start, UnitVariance};
 use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, Stopped, System};
-use photocore::programs::block::{Block, Image, Options, Photo, Point, UnitVariance};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Rows and columns of the dense product.
@@ -38,7 +38,7 @@ const CONTROL: usize = 50;
 const CONTROL_SD: f64 = 0.05;
 
 /// The block of the size that the environment asks for, and a name for it.
-fn block() -> (Block, String) {
+fn block() -> (Network, String) {
     let number = |name: &str, default: usize| {
         std::env::var(name).map_or(default, |text| text.parse().expect("a number of strips or photographs"))
     };
@@ -47,7 +47,7 @@ fn block() -> (Block, String) {
 }
 
 /// A flawless block, but for initial stations that lie off by some ten metres and some milliradians.
-fn strips(strips: usize, photos_per_strip: usize) -> Block {
+fn strips(strips: usize, photos_per_strip: usize) -> Network {
     let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
     let true_photos: Vec<([f64; 3], [f64; 3])> = (0..strips * photos_per_strip)
         .map(|photo| {
@@ -57,20 +57,22 @@ fn strips(strips: usize, photos_per_strip: usize) -> Block {
             (position, [0.01 * wave(1), 0.01 * wave(2), 0.03 * wave(3)])
         })
         .collect();
-    let mut block = Block { space, sense, refraction: None, photos: vec![], points: vec![], images: vec![] };
+    let mut block = Network {
+        space,
+        poses: PoseNumbers::Angles(sense),
+        refraction: None,
+        cameras: vec![Camera::held(Perspective { principal_distance: PRINCIPAL_DISTANCE }.into())],
+        photos: vec![],
+        points: vec![],
+        images: vec![],
+    };
     for (photo, (position, attitude)) in true_photos.iter().enumerate() {
         let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();
-        let position = std::array::from_fn(|k| position[k] + 15.0 * off(k));
-        let attitude = std::array::from_fn(|k| attitude[k] + 0.005 * off(3 + k));
-        block.photos.push(Photo {
-            position,
-            attitude,
-            observed_position: position,
-            observed_attitude: attitude,
-            position_sd: [f64::INFINITY; 3],
-            attitude_sd: [f64::INFINITY; 3],
-            principal_distance: PRINCIPAL_DISTANCE,
+        let pose = std::array::from_fn(|k| match k {
+            0..3 => position[k] + 15.0 * off(k),
+            _ => attitude[k - 3] + 0.005 * off(k),
         });
+        block.photos.push(Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 });
     }
     let cameras: Vec<geometry::Photo> = true_photos
         .iter()
@@ -111,12 +113,13 @@ struct Linear {
 
 impl Linear {
     /// At the positions and attitudes that the block starts from and the true positions of its points.
-    fn new(block: &Block) -> Self {
+    fn new(block: &Network) -> Self {
         let photos: Vec<geometry::Photo> = block
             .photos
             .iter()
-            .map(|p| {
-                geometry::Photo::new(block.space, block.sense, p.position, p.attitude, p.principal_distance)
+            .map(|photo| geometry::Photo {
+                orientation: Orientation::new(block.poses, block.space, &photo.pose),
+                camera: Perspective { principal_distance: PRINCIPAL_DISTANCE },
             })
             .collect();
         let linearize = |image: &Image| {
@@ -151,7 +154,7 @@ struct Phases {
 }
 
 impl Phases {
-    fn new(block: &Block) -> Self {
+    fn new(block: &Network) -> Self {
         let mut start = vec![0];
         for (group, image) in block.images.iter().enumerate() {
             // The images stand point by point.
@@ -233,6 +236,8 @@ fn adjust(criterion: &mut Criterion) {
         },
         ordering: Ordering::Auto,
         unit_variance: UnitVariance::Constrained,
+        start: Start::Intersected,
+        hold_unused: false,
         memory: None,
     };
     let adjust =

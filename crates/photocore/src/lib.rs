@@ -2,14 +2,17 @@
 //!
 //! Four floors; each knows only the ones below it:
 //!
-//! * [`programs`]: the photogrammetric models (unknowns and observation equations);
+//! * [`network`]: cameras, photos, points and images adjusted together; [`programs`]: the other photogrammetric models;
 //! * [`adjustment`]: iteration, weights, convergence, statistics; knows no photograph;
 //! * [`normals`]: block normal equations, ordered, reduced, factored, solved, selectively inverted; knows no observation;
-//! * [`geometry`]: rotation, collinearity, ellipsoid: pure functions with their partial derivatives.
+//! * [`geometry`]: poses, cameras, projection, ellipsoid, refraction: pure functions with their partial derivatives.
 //!
-//! The crate reads no files, prints nothing and has no global state.
+//! Vectors and matrices are those of [`nalgebra`]. The crate reads no files, prints nothing and has no global state.
 
 pub mod adjustment;
 pub mod geometry;
+pub mod network;
 pub mod normals;
 pub mod programs;
+
+pub use nalgebra;

@@ -5,14 +5,13 @@
 use std::ops::ControlFlow;
 
 use photocore::adjustment::{self, Criterion, Status};
-use photocore::geometry::{self, ObjectSpace, Point as At, RotationSense};
-use photocore::normals::Ordering;
-use photocore::programs::Coarse;
-use photocore::programs::block::{Block, BlockError, Image, Options, Photo, Point, Solution, UnitVariance};
+use photocore::geometry::{ObjectSpace, Orientation, Perspective, Point as At, PoseNumbers, RotationSense};
+use photocore::network::{Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Solution};
 use rayon::ThreadPoolBuilder;
 
 const FREE: [f64; 3] = [f64::INFINITY; 3];
-const C: f64 = -150.0;
+const CAMERA: Perspective = Perspective { principal_distance: -150.0 };
+const POSES: PoseNumbers = PoseNumbers::Angles(RotationSense::GroundToPhoto);
 const SD: f64 = 0.005;
 
 /// Noise without a generator: incommensurable angles.
@@ -22,29 +21,18 @@ fn noise(index: usize) -> f64 {
 
 /// Where photos and points are, photos looking down from 1500 m.
 fn photo(position: [f64; 3], attitude: [f64; 3]) -> Photo {
-    Photo {
-        position,
-        attitude,
-        observed_position: position,
-        observed_attitude: attitude,
-        position_sd: FREE,
-        attitude_sd: FREE,
-        principal_distance: C,
-    }
+    let [[x, y, z], [omega, phi, kappa]] = [position, attitude];
+    let pose = [x, y, z, omega, phi, kappa];
+    Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 }
 }
 
 /// A block of photos and points where they are, every point on every photo, with errors of the image coordinates.
-fn block(photos: Vec<Photo>, places: &[[f64; 3]]) -> Block {
+fn block(photos: Vec<Photo>, places: &[[f64; 3]]) -> Network {
     let space = ObjectSpace::Rectangular;
     let mut images = Vec::new();
     for (index, photo) in photos.iter().enumerate() {
-        let view = geometry::Photo::new(
-            space,
-            RotationSense::GroundToPhoto,
-            photo.position,
-            photo.attitude,
-            photo.principal_distance,
-        );
+        let orientation = Orientation::new(POSES, space, &photo.pose);
+        let view = photocore::geometry::Photo { orientation, camera: CAMERA };
         for (point, &place) in places.iter().enumerate() {
             let [x, y] = view.project(&At::new(space, place));
             let n = 2 * images.len();
@@ -52,10 +40,11 @@ fn block(photos: Vec<Photo>, places: &[[f64; 3]]) -> Block {
             images.push(Image { photo: index, point, xy, sd: [SD; 2] });
         }
     }
-    Block {
+    Network {
         space,
-        sense: RotationSense::GroundToPhoto,
+        poses: POSES,
         refraction: None,
+        cameras: vec![Camera::held(CAMERA.into())],
         photos,
         points: places.iter().map(|&coordinates| Point { coordinates, sd: FREE }).collect(),
         images,
@@ -74,7 +63,7 @@ const PLACES: [[f64; 3]; 8] = [
 ];
 
 /// Four photos over fixed control and points of unknown place.
-fn sound() -> Block {
+fn sound() -> Network {
     let stations = [[200.0, 300.0], [800.0, 300.0], [800.0, 700.0], [200.0, 700.0]];
     let photos = stations.iter().enumerate().map(|(i, &[x, y])| {
         let attitude = [0.02 * noise(3 * i), 0.02 * noise(3 * i + 1), 3.0 * noise(3 * i + 2)];
@@ -86,15 +75,14 @@ fn sound() -> Block {
     block
 }
 
-fn adjust(block: &Block) -> Result<Solution, BlockError> {
+fn adjust(block: &Network) -> Result<Solution, NetworkError> {
     let adjustment = adjustment::Options {
         criterion: Criterion::Fraction(1e-6),
         max_iterations: 100,
         covariance: true,
         loss: None,
     };
-    let unit_variance = UnitVariance::Constrained;
-    let options = Options { adjustment, ordering: Ordering::Auto, unit_variance, memory: None };
+    let options = Options { adjustment, ..Options::default() };
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
 }
@@ -104,14 +92,14 @@ fn positions_too_large_for_double_precision_are_named() {
     for value in [1e308, 1e101, -1e16] {
         for sd in [0.0, 30.0, f64::INFINITY] {
             let mut block = sound();
-            block.photos[2].position[0] = value;
-            block.photos[2].position_sd = [sd; 3];
+            block.photos[2].pose[0] = value;
+            block.photos[2].sd[..3].fill(sd);
             let expected = Coarse { photos: vec![2], points: vec![] };
-            assert_eq!(adjust(&block).err(), Some(BlockError::Coarse(expected)), "{value} {sd}");
+            assert_eq!(adjust(&block).err(), Some(NetworkError::Coarse(expected)), "{value} {sd}");
             let mut block = sound();
             block.points[1].coordinates[0] = value;
             let expected = Coarse { photos: vec![], points: vec![1] };
-            assert_eq!(adjust(&block).err(), Some(BlockError::Coarse(expected)), "{value}");
+            assert_eq!(adjust(&block).err(), Some(NetworkError::Coarse(expected)), "{value}");
         }
     }
 }
@@ -122,14 +110,14 @@ fn a_photo_far_off_takes_no_digits_from_the_others() {
     let mut block = sound();
     // Without images, fixed where rounding is a tenth of a millimetre: counted from the mean of all, the others would be rounded so.
     let mut far = photo([1e12, 1e12, 1500.0], [0.0; 3]);
-    (far.position_sd, far.attitude_sd) = ([0.0; 3], [0.0; 3]);
+    far.sd = [0.0; 6];
     block.photos.push(far);
     let found = adjust(&block).unwrap();
     assert_eq!(found.adjustment.status, Status::Converged);
     let sum = expected.sums_of_squares.total();
     assert!((found.sums_of_squares.total() - sum).abs() < 1e-9 * sum);
     for (a, b) in found.photos.iter().zip(&expected.photos) {
-        (0..3).for_each(|k| assert!((a.position[k] - b.position[k]).abs() < 1e-8));
+        (0..3).for_each(|k| assert!((a.pose[k] - b.pose[k]).abs() < 1e-8));
     }
 }
 
@@ -140,11 +128,10 @@ fn points_behind_a_camera_are_told() {
     assert!(seen.behind.is_empty());
     let mut upward = block.clone();
     for (photo, adjusted) in upward.photos.iter_mut().zip(&seen.photos) {
-        (photo.position, photo.attitude) = (adjusted.position, adjusted.attitude);
-        (photo.position_sd, photo.attitude_sd) = ([0.0; 3], [0.0; 3]);
+        (photo.pose, photo.sd) = (adjusted.pose, [0.0; 6]);
     }
     // Turned about the x axis of the photo by half a turn it looks up.
-    upward.photos[2].attitude[0] += std::f64::consts::PI;
+    upward.photos[2].pose[3] += std::f64::consts::PI;
     for (point, adjusted) in upward.points.iter_mut().zip(&seen.points) {
         *point = Point { coordinates: adjusted.unwrap().coordinates, sd: [0.0; 3] };
     }
@@ -157,16 +144,15 @@ fn points_behind_a_camera_are_told() {
 fn what_is_hardly_determined_is_named_and_ends() {
     // Stations on a line, their positions weighted: the roll about it hangs on the ten centimetres by which they leave it.
     let stations = [[200.0, 500.0, 1500.0], [500.0, 500.1, 1500.0], [800.0, 500.0, 1500.0]];
-    let photos =
-        stations.iter().map(|&position| Photo { position_sd: [0.1; 3], ..photo(position, [0.0, 0.0, 0.0]) });
+    let photos = stations.iter().map(|&position| {
+        let mut photo = photo(position, [0.0; 3]);
+        photo.sd[..3].fill(0.1);
+        photo
+    });
     let mut block = block(photos.collect(), &PLACES);
     block.points.iter_mut().for_each(|point| point.coordinates = [f64::NAN; 3]);
     for (index, photo) in block.photos.iter_mut().enumerate() {
-        photo
-            .observed_position
-            .iter_mut()
-            .enumerate()
-            .for_each(|(k, value)| *value += 0.1 * noise(3 * index + k));
+        (0..3).for_each(|k| photo.observed[k] += 0.1 * noise(3 * index + k));
     }
     let solution = adjust(&block).unwrap();
     assert!(solution.adjustment.iterations.len() < 30);

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use num_complex::Complex64 as C;
 use photocore::geometry::atmosphere::Air;
 use photocore::geometry::{
-    AirModel, ObjectSpace, Photo, Point, Refraction, RotationSense, Vector3, Water, WaterModel,
+    AirModel, ObjectSpace, Photo, Point, Refraction, RotationSense, Water, WaterModel,
 };
 use proptest::prelude::*;
 
@@ -130,10 +130,10 @@ mod bent {
 struct Case {
     spheroid: Option<(f64, f64)>,
     sense: RotationSense,
-    position: Vector3,
-    attitude: Vector3,
+    position: [f64; 3],
+    attitude: [f64; 3],
     c: f64,
-    point: Vector3,
+    point: [f64; 3],
     metres: f64,
     datum: f64,
     air: Option<AirModel>,
@@ -213,7 +213,7 @@ proptest! {
         let photo = Photo::new(space, case.sense, case.position, case.attitude, case.c);
         let point = Point::new(space, case.point);
         let (station, foot) = (refraction.vertical(space, case.position), refraction.vertical(space, case.point));
-        let lift = refraction.lift(&photo, &station, &point, &foot);
+        let lift = refraction.lift(&photo.orientation, &station, &point, &foot);
         let projection = photo.linearize_lifted(&point, &lift);
         prop_assert_eq!(photo.project(&point.lifted(&lift)), projection.xy);
 
@@ -260,11 +260,11 @@ proptest! {
 }
 
 /// The lift of a point in rectangular space.
-fn lift_of(refraction: &Refraction, station: Vector3, point: Vector3) -> Vector3 {
+fn lift_of(refraction: &Refraction, station: [f64; 3], point: [f64; 3]) -> [f64; 3] {
     let space = ObjectSpace::Rectangular;
     let photo = Photo::new(space, RotationSense::GroundToPhoto, station, [0.0; 3], -152.74);
     let at = |coordinates| refraction.vertical(space, coordinates);
-    refraction.lift(&photo, &at(station), &Point::new(space, point), &at(point)).vector
+    refraction.lift(&photo.orientation, &at(station), &Point::new(space, point), &at(point)).vector.into()
 }
 
 fn air_only(model: AirModel) -> Refraction {

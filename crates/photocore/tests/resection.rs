@@ -5,7 +5,6 @@
 use std::ops::ControlFlow;
 
 use photocore::adjustment::{Criterion, Options, Status};
-use photocore::geometry::vector::{apply, difference, dot};
 use photocore::geometry::{ObjectSpace, Photo, Point, RotationSense, Vector3, rotation};
 use photocore::programs::resection::{
     ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError, Solution, three_points,
@@ -34,9 +33,9 @@ fn photo(pose: &Pose) -> Photo {
 }
 
 /// Points seen from a pose, with errors of the image coordinates of the given size.
-fn resection(pose: &Pose, points: &[Vector3], error: f64) -> Resection {
+fn resection(pose: &Pose, points: &[[f64; 3]], error: f64) -> Resection {
     let photo = photo(pose);
-    let control = |(index, &coordinates): (usize, &Vector3)| {
+    let control = |(index, &coordinates): (usize, &[f64; 3])| {
         let [x, y] = photo.project(&Point::new(ObjectSpace::Rectangular, coordinates));
         let [ex, ey] = noises(index + 7);
         let xy = [x + error * ex, y + error * ey];
@@ -55,13 +54,17 @@ fn resection(pose: &Pose, points: &[Vector3], error: f64) -> Resection {
     }
 }
 
+fn apart(a: &Pose, b: &Pose) -> f64 {
+    (Vector3::from(a.position) - Vector3::from(b.position)).norm()
+}
+
 fn adjust(resection: &Resection, options: &Options) -> Result<Solution, ResectionError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     resection.adjust(options, &pool, &mut |_| ControlFlow::Continue(()))
 }
 
 const POSE: Pose = Pose { position: [420.0, 310.0, 900.0], attitude: [0.05, -0.08, 2.1] };
-const POINTS: [Vector3; 6] = [
+const POINTS: [[f64; 3]; 6] = [
     [10.0, 20.0, 5.0],
     [820.0, 40.0, 60.0],
     [790.0, 640.0, 12.0],
@@ -74,17 +77,17 @@ const POINTS: [Vector3; 6] = [
 fn three_points_give_every_place_they_are_seen_from() {
     for case in 0..2000 {
         let attitude = noises::<3>(case).map(|value| 3.0 * value);
-        let centre = noises::<3>(case + 5000).map(|value| 50.0 * value);
+        let centre: Vector3 = noises::<3>(case + 5000).map(|value| 50.0 * value).into();
         let m = rotation(attitude);
         // Points along three directions in front of the camera, at one to three units.
         let rays: [Vector3; 3] = std::array::from_fn(|i| {
             let [x, y, _] = noises::<3>(9000 + 3 * case + i);
             let length = (x * x + y * y + 1.0).sqrt();
-            [x / length, y / length, -1.0 / length]
+            Vector3::new(x, y, -1.0) / length
         });
         let points: [Vector3; 3] = std::array::from_fn(|i| {
             let distance = 2.0 + noise(31 * case + i);
-            std::array::from_fn(|k| centre[k] + distance * (0..3).map(|j| m[j][k] * rays[i][j]).sum::<f64>())
+            centre + distance * m.tr_mul(&rays[i])
         });
         let found = three_points(&rays, &points);
         assert!((1..=4).contains(&found.len()), "case {case}: {} places", found.len());
@@ -92,15 +95,12 @@ fn three_points_give_every_place_they_are_seen_from() {
             // The first one is exact; near the danger cylinder others may be nearly solutions only.
             let least = if order == 0 { 1.0 - 1e-9 } else { 0.95 };
             for (ray, point) in rays.iter().zip(&points) {
-                let u = apply(&place.to_photo, &difference(point, &place.centre));
-                let cosine = dot(&u, ray) / dot(&u, &u).sqrt();
+                let u = place.to_photo * (point - place.centre);
+                let cosine = u.dot(ray) / u.norm();
                 assert!(cosine > least, "case {case}, place {order}: cosine {cosine}");
             }
         }
-        let distance = |place: &photocore::programs::resection::Placement| {
-            let apart = difference(&place.centre, &centre);
-            dot(&apart, &apart).sqrt()
-        };
+        let distance = |place: &photocore::programs::resection::Placement| (place.centre - centre).norm();
         let nearest = found.iter().map(distance).fold(f64::INFINITY, f64::min);
         assert!(nearest < 1e-4, "case {case}: the true place is missed by {nearest}");
     }
@@ -110,37 +110,35 @@ fn three_points_give_every_place_they_are_seen_from() {
 fn symmetric_triangles_are_no_exception() {
     // Isosceles and equilateral, seen from the axis: determinants of the cones vanish.
     let root = 3f64.sqrt() / 2.0;
-    let points = [[1.0, 0.0, 0.0], [-0.5, root, 0.0], [-0.5, -root, 0.0]];
+    let points = [[1.0, 0.0, 0.0], [-0.5, root, 0.0], [-0.5, -root, 0.0]].map(Vector3::from);
     for height in [0.5_f64, 1.0, 3.0] {
-        let rays = points.map(|[x, y, _]: Vector3| {
-            let length = (1.0 + height * height).sqrt();
-            [x / length, y / length, -height / length]
-        });
+        let rays = points.map(|at| (at - height * Vector3::z()).normalize());
         let found = three_points(&rays, &points);
-        let apart = |c: &Vector3| {
-            let from = difference(c, &[0.0, 0.0, height]);
-            dot(&from, &from).sqrt()
-        };
+        let apart = |c: &Vector3| (c - height * Vector3::z()).norm();
         assert!(found.iter().any(|place| apart(&place.centre) < 1e-7), "height {height}: {found:?}");
     }
 }
 
 /// The coefficients of the report as its listing has them (specification, section 3), angles first there.
-fn published(pose: &Pose, point: &Vector3, [px, py]: [f64; 2]) -> [[f64; 6]; 2] {
+fn published(pose: &Pose, point: &[f64; 3], [px, py]: [f64; 2]) -> [[f64; 6]; 2] {
     let [(so, co), (sp, cp), (sk, ck)] = pose.attitude.map(f64::sin_cos);
     let m = rotation(pose.attitude);
-    let d = difference(point, &pose.position);
+    let d = Vector3::from(*point) - Vector3::from(pose.position);
     let (n32, n33) = (so * sp, -co * sp);
-    let phi = [[-sp * ck, -ck * m[2][1], -ck * m[2][2]], [sp * sk, sk * m[2][1], sk * m[2][2]]];
-    let r = 1.0 / dot(&m[2], &d);
-    let s = m[2][1] * d[2] - m[2][2] * d[1];
+    let phi = [
+        Vector3::new(-sp * ck, -ck * m[(2, 1)], -ck * m[(2, 2)]),
+        Vector3::new(sp * sk, sk * m[(2, 1)], sk * m[(2, 2)]),
+    ];
+    let u = m * d;
+    let r = 1.0 / u.z;
+    let s = m[(2, 1)] * d[2] - m[(2, 2)] * d[1];
     let t = cp * d[0] + n32 * d[1] + n33 * d[2];
-    let computed = [C * r * dot(&m[0], &d), C * r * dot(&m[1], &d)];
+    let computed = [C * r * u.x, C * r * u.y];
     let kappa = [computed[1], -computed[0]];
     let row = |k: usize, plate: f64| {
-        let omega = -r * (s * plate - C * (m[k][1] * d[2] - m[k][2] * d[1]));
-        let by_phi = -r * (t * plate - C * dot(&phi[k], &d));
-        let position = |j: usize| r * (m[2][j] * plate - m[k][j] * C);
+        let omega = -r * (s * plate - C * (m[(k, 1)] * d[2] - m[(k, 2)] * d[1]));
+        let by_phi = -r * (t * plate - C * phi[k].dot(&d));
+        let position = |j: usize| r * (m[(2, j)] * plate - m[(k, j)] * C);
         [position(0), position(1), position(2), omega, by_phi, kappa[k]]
     };
     [row(0, px), row(1, py)]
@@ -181,20 +179,12 @@ fn the_rule_of_the_report_takes_full_steps_until_the_position_moves_little() {
     let criterion = Criterion::Length { first: 3 * POINTS.len(), count: 3, limit: 1e-3 };
     let solution = adjust(&published, &Options { criterion, ..STRICT }).unwrap();
     assert_eq!(solution.adjustment.status, Status::Converged);
-    let steps: Vec<f64> = solution
-        .history
-        .windows(2)
-        .map(|pair| {
-            let step = difference(&pair[1].position, &pair[0].position);
-            dot(&step, &step).sqrt()
-        })
-        .collect();
+    let steps: Vec<f64> = solution.history.windows(2).map(|pair| apart(&pair[1], &pair[0])).collect();
     let (last, before) = steps.split_last().unwrap();
     assert!(*last < 1e-3 && before.iter().all(|step| *step >= 1e-3), "{steps:?}");
     // The fixed point is that of the report, A^T L = 0 with its own A: near least squares, but not there.
     let strict = adjust(&resection(&POSE, &POINTS, 0.02), &STRICT).unwrap();
-    let apart = difference(&solution.pose.position, &strict.pose.position);
-    let size = dot(&apart, &apart).sqrt();
+    let size = apart(&solution.pose, &strict.pose);
     assert!(size > 1e-5 && size < 0.05, "{size}");
     let short = adjust(&published, &Options { criterion, max_iterations: 2, ..STRICT }).unwrap();
     assert_eq!((short.adjustment.status, short.history.len()), (Status::NotConverged, 2));
@@ -204,10 +194,10 @@ fn the_rule_of_the_report_takes_full_steps_until_the_position_moves_little() {
 fn degenerate_configurations_are_named() {
     let two = adjust(&resection(&POSE, &POINTS[..2], 0.0), &STRICT);
     assert_eq!(two.unwrap_err(), ResectionError::TooFewPoints(2));
-    let line: Vec<Vector3> = (0..5).map(|i| [100.0 * f64::from(i), 50.0 * f64::from(i), 10.0]).collect();
+    let line: Vec<[f64; 3]> = (0..5).map(|i| [100.0 * f64::from(i), 50.0 * f64::from(i), 10.0]).collect();
     assert_eq!(adjust(&resection(&POSE, &line, 0.0), &STRICT).unwrap_err(), ResectionError::Collinear);
 
-    let started = |points: &[Vector3], pose: &Pose| {
+    let started = |points: &[[f64; 3]], pose: &Pose| {
         let mut given = resection(pose, points, 0.0);
         given.start = Some(*pose);
         adjust(&given, &STRICT).unwrap_err()
@@ -229,10 +219,7 @@ fn poses_that_fit_as_well_are_told() {
     let solution = adjust(&resection(&pose, &circle, 0.0), &STRICT).unwrap();
     let all = solution.alternatives.iter().map(|other| other.pose).chain([solution.pose]);
     assert_eq!(all.clone().count(), 4);
-    let from = |other: Pose| {
-        let apart = difference(&other.position, &pose.position);
-        dot(&apart, &apart).sqrt()
-    };
+    let from = |other: Pose| apart(&other, &pose);
     assert!(all.map(from).fold(f64::INFINITY, f64::min) < 1e-6);
     assert!((solution.outside_danger_cylinder.unwrap()).abs() > 1.0);
 }

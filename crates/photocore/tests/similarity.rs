@@ -28,7 +28,7 @@ fn run(stations: &[Station], options: &Options) -> Result<Solution, SimilarityEr
 }
 
 /// Places in the unit square with some relief; the first two far apart.
-const PLACES: [Vector3; 8] = [
+const PLACES: [[f64; 3]; 8] = [
     [-0.5, -0.4, 0.02],
     [0.5, 0.45, -0.06],
     [-0.45, 0.4, 0.1],
@@ -41,16 +41,11 @@ const PLACES: [Vector3; 8] = [
 
 /// Stations of a similarity without errors; `known` says which coordinates of each are.
 fn stations(truth: &Parameters, known: impl Fn(usize) -> [bool; 3]) -> Vec<Station> {
-    let model = |x: &Vector3| -> Vector3 {
-        std::array::from_fn(|i| {
-            let turned: f64 = (0..3).map(|j| truth.rotation[i][j] * x[j]).sum();
-            truth.scale * turned + truth.translation[i]
-        })
-    };
-    let station = |(i, place): (usize, &Vector3)| {
+    let model = |x: &[f64; 3]| truth.scale * (truth.rotation * Vector3::from(*x)) + truth.translation;
+    let station = |(i, place): (usize, &[f64; 3])| {
         let part = known(i);
         Station {
-            control: std::array::from_fn(|k| if part[k] { place[k] } else { NAN }),
+            control: Vector3::from_fn(|k, _| if part[k] { place[k] } else { NAN }),
             control_sd: [0.0; 3],
             model: model(place),
             model_sd: [1.0; 3],
@@ -63,8 +58,8 @@ fn mixed(i: usize) -> [bool; 3] {
     [[true; 3], [true, true, false], [false, false, true], [true; 3]][i % 4]
 }
 
-fn truth(angles: Vector3, scale: f64) -> Parameters {
-    Parameters { rotation: rotation(angles), scale, translation: [3.0 * scale, -2.0 * scale, 0.7 * scale] }
+fn truth(angles: [f64; 3], scale: f64) -> Parameters {
+    Parameters { rotation: rotation(angles), scale, translation: scale * Vector3::new(3.0, -2.0, 0.7) }
 }
 
 proptest! {
@@ -85,7 +80,7 @@ proptest! {
         for i in 0..3 {
             prop_assert!((found.translation[i] - truth.translation[i]).abs() < 1e-9 * truth.scale);
             for j in 0..3 {
-                prop_assert!((found.rotation[i][j] - truth.rotation[i][j]).abs() < 1e-10);
+                prop_assert!((found.rotation[(i, j)] - truth.rotation[(i, j)]).abs() < 1e-10);
             }
         }
     }
@@ -112,8 +107,7 @@ fn the_cycles_of_the_report_end_where_the_engine_does() {
     let report = run(&given, &Options { method: Method::Report, start: Start::Report, ..PLAIN }).unwrap();
     assert!(strict.cycles.is_none());
     assert!(report.cycles.unwrap().len() <= 5);
-    for (a, b) in strict.similarity.rotation.iter().flatten().zip(report.similarity.rotation.iter().flatten())
-    {
+    for (a, b) in strict.similarity.rotation.iter().zip(report.similarity.rotation.iter()) {
         assert!((a - b).abs() < 1e-9);
     }
     for (a, b) in strict.tangent_cofactors.iter().flatten().zip(report.tangent_cofactors.iter().flatten()) {
@@ -129,8 +123,8 @@ fn control_that_does_not_determine_is_refused() {
     let mut line = stations(&truth, |_| [true; 3]);
     for (i, station) in line.iter_mut().enumerate() {
         let along = i as f64 - 3.0;
-        (station.control, station.model) =
-            ([along, 2.0 * along, 0.1 * along], [along, 2.0 * along, 0.1 * along]);
+        let at = Vector3::new(along, 2.0 * along, 0.1 * along);
+        (station.control, station.model) = (at, at);
     }
     let Err(SimilarityError::Undetermined { cause, stations }) = run(&line, &PLAIN) else { panic!() };
     assert_eq!((cause, stations.len()), (Cause::StationsInLine, 8));

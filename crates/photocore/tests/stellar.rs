@@ -185,7 +185,7 @@ proptest! {
         }
         for i in 0..3 {
             for j in 0..3 {
-                let product: f64 = (0..3).map(|k| matrix[i][k] * matrix[j][k]).sum();
+                let product: f64 = (0..3).map(|k| matrix[(i, k)] * matrix[(j, k)]).sum();
                 prop_assert!((product - f64::from(u8::from(i == j))).abs() < 1e-14);
             }
         }

@@ -1,6 +1,7 @@
 //! Rows of NumPy arrays: shapes are checked here, and what is wrong is said with the name of the argument.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use photocore::geometry::Matrix3;
 use pyo3::import_exception;
 use pyo3::prelude::*;
 
@@ -56,6 +57,16 @@ pub fn squares<const N: usize>(
 ) -> PyResult<Bound<'_, PyArray3<f64>>> {
     let count = matrices.len();
     PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, N, N])
+}
+
+/// The rows of a matrix.
+pub fn row_major(matrix: &Matrix3) -> [[f64; 3]; 3] {
+    matrix.transpose().data.0
+}
+
+/// The matrix of given rows.
+pub fn from_rows(rows: [[f64; 3]; 3]) -> Matrix3 {
+    Matrix3::from(rows).transpose()
 }
 
 /// Refuses arrays whose lengths differ from the first one's.

@@ -1,10 +1,10 @@
 //! The geometry functions, row by row over arrays; their documentation is in `_photocore.pyi`.
 
-use crate::arrays::{check_lengths, matrices, numbers, rows, table};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
+use crate::arrays::{check_lengths, from_rows, matrices, numbers, row_major, rows, squares, table};
+use numpy::{PyArray2, PyArray3, PyReadonlyArrayDyn};
 use photocore::geometry::{
     self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Photo, Point, Refraction, RotationSense,
-    Vector3, Water, WaterModel,
+    Water, WaterModel,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -25,9 +25,10 @@ fn rotation_matrix<'py>(
     angles: PyReadonlyArrayDyn<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let angles = rows("angles", &angles)?;
-    let count = angles.len();
-    let matrices: Vec<_> = py.detach(|| angles.into_iter().map(geometry::rotation).collect());
-    PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, 3, 3])
+    squares(
+        py,
+        py.detach(|| angles.into_iter().map(|angles| row_major(&geometry::rotation(angles))).collect()),
+    )
 }
 
 #[pyfunction]
@@ -36,7 +37,8 @@ fn rotation_angles<'py>(
     matrices: PyReadonlyArrayDyn<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let matrices = self::matrices("matrices", &matrices)?;
-    table(py, py.detach(|| matrices.iter().map(geometry::rotation_angles).collect()))
+    let angles = |matrix| geometry::rotation_angles(&from_rows(matrix));
+    table(py, py.detach(|| matrices.into_iter().map(angles).collect()))
 }
 
 #[pyfunction]
@@ -47,7 +49,10 @@ fn geographic_to_geocentric<'py>(
     b: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (positions, ellipsoid) = (rows("positions", &positions)?, ellipsoid((a, b))?);
-    table(py, py.detach(|| positions.into_iter().map(|position| ellipsoid.geocentric(position)).collect()))
+    table(
+        py,
+        py.detach(|| positions.into_iter().map(|position| ellipsoid.geocentric(position).into()).collect()),
+    )
 }
 
 #[pyfunction]
@@ -58,7 +63,8 @@ fn geocentric_to_geographic<'py>(
     b: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (xyz, ellipsoid) = (rows("xyz", &xyz)?, ellipsoid((a, b))?);
-    table(py, py.detach(|| xyz.into_iter().map(|position| ellipsoid.geographic(position)).collect()))
+    let geographic = |xyz: [f64; 3]| ellipsoid.geographic(xyz.into());
+    table(py, py.detach(|| xyz.into_iter().map(geographic).collect()))
 }
 
 #[pyfunction]
@@ -75,9 +81,9 @@ fn project<'py>(
     photo_to_ground: bool,
     refraction: Option<RefractionRow>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let points: Vec<Vector3> = rows("points", &points)?;
-    let positions: Vec<Vector3> = rows("positions", &positions)?;
-    let attitudes: Vec<Vector3> = rows("attitudes", &attitudes)?;
+    let points: Vec<[f64; 3]> = rows("points", &points)?;
+    let positions: Vec<[f64; 3]> = rows("positions", &positions)?;
+    let attitudes: Vec<[f64; 3]> = rows("attitudes", &attitudes)?;
     let principal_distances = numbers("principal_distances", &principal_distances)?;
     check_lengths(
         ("points", points.len()),
@@ -113,8 +119,8 @@ fn refraction_shift<'py>(
     spheroid: Option<(f64, f64)>,
     refraction: RefractionRow,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let points: Vec<Vector3> = rows("points", &points)?;
-    let positions: Vec<Vector3> = rows("positions", &positions)?;
+    let points: Vec<[f64; 3]> = rows("points", &points)?;
+    let positions: Vec<[f64; 3]> = rows("positions", &positions)?;
     check_lengths(("points", points.len()), &[("positions", positions.len())])?;
     let space = object_space(spheroid)?;
     let refraction = self::refraction(refraction)?;
@@ -122,7 +128,7 @@ fn refraction_shift<'py>(
         // Where the camera looks does not matter.
         let photo = Photo::new(space, RotationSense::GroundToPhoto, positions[i], [0.0; 3], -1.0);
         let point = Point::new(space, points[i]);
-        lift(&refraction, space, (&photo, positions[i]), (&point, points[i])).vector
+        lift(&refraction, space, (&photo, positions[i]), (&point, points[i])).vector.into()
     };
     table(py, py.detach(|| (0..points.len()).map(shift).collect()))
 }
@@ -131,11 +137,11 @@ fn refraction_shift<'py>(
 fn lift(
     refraction: &Refraction,
     space: ObjectSpace,
-    (photo, position): (&Photo, Vector3),
-    (point, coordinates): (&Point, Vector3),
+    (photo, position): (&Photo, [f64; 3]),
+    (point, coordinates): (&Point, [f64; 3]),
 ) -> Lift {
     let at = |coordinates| refraction.vertical(space, coordinates);
-    refraction.lift(photo, &at(position), point, &at(coordinates))
+    refraction.lift(&photo.orientation, &at(position), point, &at(coordinates))
 }
 
 /// Model of the air, model of the water, its level (linear unit), its refractive index, metres in the linear unit.

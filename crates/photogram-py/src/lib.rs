@@ -1,12 +1,11 @@
 //! The extension module `photogram._photocore`: converts arrays, releases the GIL, decides nothing.
 
 mod arrays;
-mod block;
-mod collection;
 mod comparator;
 mod distributions;
 mod geometry;
 mod memory;
+mod network;
 mod options;
 mod resection;
 mod similarity;
@@ -25,8 +24,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     distributions::register(module)?;
     geometry::register(module)?;
-    block::register(module)?;
-    collection::register(module)?;
+    network::register(module)?;
     comparator::register(module)?;
     resection::register(module)?;
     similarity::register(module)?;

@@ -1,7 +1,6 @@
 //! Absolute orientation; its documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
-use photocore::geometry::{Matrix3, Vector3};
 use photocore::programs::similarity::{
     AdjustedStation, Matrix7, Method, Options, Parameters, Similarity, SimilarityError as Failure, Solution,
     Start, Started, Station, Trace, gauss_crout as crout, orient,
@@ -10,7 +9,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{check_lengths, rows, squares, table};
+use crate::arrays::{check_lengths, from_rows, row_major, rows, squares, table};
 use crate::solution::{IterationRow, iteration_row, status_name};
 use crate::work::{Workers, watched};
 
@@ -32,15 +31,21 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 }
 
 /// Scale, rotation, shift, centre of the control, centre of the model.
-type CentredRow = (f64, Matrix3, Vector3, Vector3, Vector3);
+type CentredRow = (f64, [[f64; 3]; 3], [f64; 3], [f64; 3], [f64; 3]);
 
 fn centred_row(similarity: &Similarity) -> CentredRow {
     let Similarity { scale, rotation, shift, control_centre, model_centre } = *similarity;
-    (scale, rotation, shift, control_centre, model_centre)
+    (scale, row_major(&rotation), shift.into(), control_centre.into(), model_centre.into())
 }
 
 fn from_row((scale, rotation, shift, control_centre, model_centre): CentredRow) -> Similarity {
-    Similarity { rotation, scale, shift, control_centre, model_centre }
+    Similarity {
+        rotation: from_rows(rotation),
+        scale,
+        shift: shift.into(),
+        control_centre: control_centre.into(),
+        model_centre: model_centre.into(),
+    }
 }
 
 #[pyfunction]
@@ -53,23 +58,23 @@ fn orient_model(
     model_sd: PyReadonlyArrayDyn<'_, f64>,
     method: &str,
     start: &str,
-    former: Option<(f64, Matrix3, Vector3)>,
+    former: Option<(f64, [[f64; 3]; 3], [f64; 3])>,
     max_iterations: usize,
     tolerance: f64,
     threads: usize,
     trace: bool,
 ) -> PyResult<SimilaritySolution> {
-    let control: Vec<Vector3> = rows("control", &control)?;
-    let (control_sd, model) = (rows("control_sd", &control_sd)?, rows("model", &model)?);
+    let control: Vec<[f64; 3]> = rows("control", &control)?;
+    let (control_sd, model): (_, Vec<[f64; 3]>) = (rows("control_sd", &control_sd)?, rows("model", &model)?);
     let model_sd = rows("model_sd", &model_sd)?;
     check_lengths(
         ("control", control.len()),
         &[("control_sd", control_sd.len()), ("model", model.len()), ("model_sd", model_sd.len())],
     )?;
     let station = |i: usize| Station {
-        control: control[i],
+        control: control[i].into(),
         control_sd: control_sd[i],
-        model: model[i],
+        model: model[i].into(),
         model_sd: model_sd[i],
     };
     let stations: Vec<Station> = (0..control.len()).map(station).collect();
@@ -81,9 +86,11 @@ fn orient_model(
             other => return Err(PyValueError::new_err(format!("method cannot be {other:?}"))),
         },
         start: match (start, former) {
-            (_, Some((scale, rotation, translation))) => {
-                Start::Given(Parameters { rotation, scale, translation })
-            }
+            (_, Some((scale, rotation, translation))) => Start::Given(Parameters {
+                rotation: from_rows(rotation),
+                scale,
+                translation: translation.into(),
+            }),
             ("auto", None) => Start::Auto,
             ("report", None) => Start::Report,
             ("closed-form", None) => Start::ClosedForm,
@@ -121,7 +128,7 @@ fn failure(error: &Failure) -> PyErr {
 
 /// Rotation; stations, components and rows of the equations; normal equations; auxiliary table; results; parameters.
 type TraceRow<'py> = (
-    Matrix3,
+    [[f64; 3]; 3],
     (Vec<(usize, usize)>, Bound<'py, PyArray2<f64>>),
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray2<f64>>,
@@ -133,7 +140,7 @@ fn trace_row<'py>(py: Python<'py>, trace: &Trace) -> PyResult<TraceRow<'py>> {
     let places = trace.equations.iter().map(|&(station, component, _)| (station, component)).collect();
     let rows = table(py, trace.equations.iter().map(|(_, _, row)| *row).collect())?;
     let [normal, auxiliary] = [trace.normal, trace.auxiliary].map(|matrix| table(py, matrix.to_vec()));
-    Ok((trace.rotation, (places, rows), normal?, auxiliary?, trace.results, trace.parameters))
+    Ok((row_major(&trace.rotation), (places, rows), normal?, auxiliary?, trace.results, trace.parameters))
 }
 
 /// An oriented model.
@@ -146,7 +153,7 @@ impl SimilaritySolution {
     fn stations<'py>(
         &self,
         py: Python<'py>,
-        part: impl Fn(&AdjustedStation) -> Vector3,
+        part: impl Fn(&AdjustedStation) -> [f64; 3],
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         table(py, self.solution.stations.iter().map(part).collect())
     }
@@ -220,22 +227,22 @@ impl SimilaritySolution {
 
     #[getter]
     fn misclosures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.stations(py, |station| station.misclosure)
+        self.stations(py, |station| station.misclosure.into())
     }
 
     #[getter]
     fn model_residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.stations(py, |station| station.model_residual)
+        self.stations(py, |station| station.model_residual.into())
     }
 
     #[getter]
     fn adjusted_control<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.stations(py, |station| station.control)
+        self.stations(py, |station| station.control.into())
     }
 
     #[getter]
     fn control_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        squares(py, self.solution.stations.iter().map(|station| station.cofactors).collect())
+        squares(py, self.solution.stations.iter().map(|station| row_major(&station.cofactors)).collect())
     }
 
     #[getter]
@@ -261,12 +268,16 @@ fn transform_points<'py>(
     points_sd: PyReadonlyArrayDyn<'py, f64>,
 ) -> PyResult<Points<'py>> {
     let similarity = from_row(similarity);
-    let points: Vec<Vector3> = rows("points", &points)?;
-    let points_sd: Vec<Vector3> = rows("points_sd", &points_sd)?;
+    let points: Vec<[f64; 3]> = rows("points", &points)?;
+    let points_sd: Vec<[f64; 3]> = rows("points_sd", &points_sd)?;
     check_lengths(("points", points.len()), &[("points_sd", points_sd.len())])?;
     let covariance = square7("tangent_covariance", &tangent_covariance)?;
     let (positions, covariances): (Vec<_>, Vec<_>) = py.detach(|| {
-        points.iter().zip(&points_sd).map(|(point, sd)| similarity.transform(point, sd, &covariance)).unzip()
+        let transform = |(&point, sd): (&[f64; 3], &[f64; 3])| {
+            let (position, covariance) = similarity.transform(&point.into(), sd, &covariance);
+            (<[f64; 3]>::from(position), row_major(&covariance))
+        };
+        points.iter().zip(&points_sd).map(transform).unzip()
     });
     Ok((table(py, positions)?, squares(py, covariances)?))
 }

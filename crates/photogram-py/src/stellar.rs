@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::adjustment::{Criterion, Options as AdjustmentOptions, Status};
-use photocore::geometry::{Air, Station, Vector3, pointing, pointing_angles};
+use photocore::geometry::{Air, Station, pointing, pointing_angles};
 use photocore::programs::stellar::{
     Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Observations, Options, Rows,
     Star, StellarError as Failure, Tested, Tolerances, Weights,
@@ -12,7 +12,7 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{check_lengths, indices, matrices, numbers, rows, squares, table};
+use crate::arrays::{check_lengths, from_rows, indices, matrices, numbers, row_major, rows, squares, table};
 use crate::solution::iteration_row;
 use crate::work::{Watch, Workers, watched};
 
@@ -111,14 +111,14 @@ fn star_places<'py>(
 
 #[pyfunction]
 fn pointing_matrix<'py>(py: Python<'py>, angles: Array<'py>) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
-    table(py, pointing(fixed_size("angles", &angles)?).to_vec())
+    table(py, row_major(&pointing(fixed_size("angles", &angles)?)).to_vec())
 }
 
 #[pyfunction]
 fn pointing_of_matrix<'py>(py: Python<'py>, matrix: Array<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let matrix: Vec<Vector3> = rows("matrix", &matrix)?;
+    let matrix: Vec<[f64; 3]> = rows("matrix", &matrix)?;
     let matrix = matrix.try_into().map_err(|_| PyValueError::new_err("matrix does not have 3 rows"))?;
-    Ok(PyArray1::from_vec(py, pointing_angles(&matrix).to_vec()))
+    Ok(PyArray1::from_vec(py, pointing_angles(&from_rows(matrix)).to_vec()))
 }
 
 #[pyfunction]

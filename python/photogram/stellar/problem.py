@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.stellar.options import Options
@@ -15,10 +15,6 @@ from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.sky import TAU, Site
 
 __all__ = ["Axis", "Problem", "default_parameters"]
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 def default_parameters(principal_distance: float) -> Floats:

@@ -11,9 +11,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Bools, Floats
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.failures import failure, singular
 from photogram.stellar.problem import Problem
@@ -21,8 +21,6 @@ from photogram.stellar.state import Level, Solved
 
 __all__ = ["DIVERGED", "SETTLED", "iterate", "residual_cycle", "stop_reason"]
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 DIVERGED = "FOUR DIVERGENT STEPS OCCURRED"
 SETTLED = "ITERATION RESULTS DIFFER BY LESS THAN TOLERANCE SETTING"

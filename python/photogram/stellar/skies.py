@@ -18,6 +18,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import available_memory
+from photogram.messages import listed
 from photogram.stellar.cameras import BROWN_PLACE, COMMON, BrownCamera, weight_of
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
@@ -220,7 +221,8 @@ def calibrate_exposures(
             unit=1.0, fraction=1e-5, max_iterations=100, covariance=True, threads=threads or 0, progress=None
         )
     except _photocore.StellarError as error:
-        raise AdjustmentError(f"the stars do not determine the camera: {error.args[1]}") from None
+        undetermined = _undetermined(error, len(exposures))
+        raise AdjustmentError(f"the stars do not determine the camera: {undetermined}") from None
     weighted = 0 if prior is None else int((prior.known & free).sum())
     freedom = 2 * len(images.xy) + weighted - 3 * len(exposures) - int(free.sum())
     result = _result(found, images, len(exposures), freedom)
@@ -230,6 +232,19 @@ def calibrate_exposures(
     turned = [transformed_angles(angles, place, site, earth.pole) for angles in result.attitudes]
     change = np.array(turned) - result.attitudes
     return replace(result, attitudes=result.attitudes + np.remainder(change + np.pi, 2 * np.pi) - np.pi)
+
+
+def _undetermined(error: _photocore.StellarError, exposures: int) -> str:
+    """Name what the stars of so many exposures do not determine."""
+    kind, message, indices = error.args
+    if kind != "undetermined" or not indices:
+        return str(message)
+    attitudes = sorted({index // 3 + 1 for index in indices if index < 3 * exposures})
+    places = dict(zip(BROWN_PLACE, BrownCamera.NAMES, strict=True))
+    left = [places[index - 3 * exposures] for index in indices if index >= 3 * exposures]
+    if attitudes:
+        left.append(f"the attitudes of exposures {listed([str(number) for number in attitudes])}")
+    return f"they leave {', '.join(left)} open"
 
 
 def _refuse_too_large(images: int, exposures: int, weigh_stars: bool) -> None:

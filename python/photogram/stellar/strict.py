@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.types import Bools, Floats
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.failures import failure
 from photogram.stellar.problem import Problem
@@ -17,8 +17,6 @@ from photogram.stellar.state import Level, Solved
 
 __all__ = ["iterate"]
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 _EXPECTED = 1e-6
 """Mean error of a direction to begin with, radians."""

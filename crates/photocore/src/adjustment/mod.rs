@@ -77,5 +77,5 @@ pub use options::{Criterion, Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Problem};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
-pub use run::adjust;
+pub use run::{Watch, adjust, on_all_processors};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};

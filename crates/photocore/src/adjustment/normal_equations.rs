@@ -60,16 +60,28 @@ impl<'a, M: Model> NormalEquations<'a, M> {
         self.factor.log_determinant()
     }
 
-    /// The corrections of all unknowns.
-    ///
-    /// # Errors
-    /// An interruption, no memory.
-    pub fn corrections(
-        &self,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
-    ) -> Result<Vec<f64>, AdjustError> {
-        let Self { problem, pool, equations, prior, factor, .. } = self;
-        unless_stopped(problem.system.solve(pool, factor, equations, prior, 0.0, between))
+    /// Weighted sum of squares of the observations at these values; not finite where some cannot be computed.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.factor.sum_of_squares
+    }
+
+    /// The corrections of the unknowns that are not local, in the order of the layout.
+    pub fn corrections(&self) -> Vec<f64> {
+        self.factor.reduced_corrections(self.problem.layout())
+    }
+
+    /// The cofactors of every two unknowns that are not local, in the order of the layout, row by row; zero for those that are fixed or
+    /// held.
+    pub fn cofactors(&self) -> Vec<f64> {
+        let layout = self.problem.layout();
+        let (first, count) = (layout.all_locals().end, layout.unknowns() - layout.all_locals().end);
+        let mut rights = vec![0.0; count * count];
+        for k in 0..count {
+            // What is fixed or held stands in the normal equations by itself, with unit weight.
+            let free = self.problem.sd[first + k] != 0.0 && !self.held.contains(&(first + k));
+            rights[k * (count + 1)] = f64::from(u8::from(free));
+        }
+        self.factor.solve_reduced(layout, &rights)
     }
 
     /// Solves for other right-hand sides, each over all unknowns, one after the other; so are the solutions.
@@ -83,26 +95,5 @@ impl<'a, M: Model> NormalEquations<'a, M> {
     ) -> Result<Vec<f64>, AdjustError> {
         let Self { problem, pool, equations, prior, factor, .. } = self;
         unless_stopped(problem.system.solve_for(pool, factor, equations, prior, 0.0, rights, between))
-    }
-
-    /// The cofactors of every two of the given unknowns, row by row; zero for those that are fixed or held.
-    ///
-    /// # Errors
-    /// An interruption, no memory.
-    pub fn cofactors(
-        &self,
-        unknowns: &[usize],
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
-    ) -> Result<Vec<f64>, AdjustError> {
-        let count = self.problem.layout().unknowns();
-        let mut rights = vec![0.0; count * unknowns.len()];
-        for (column, &unknown) in unknowns.iter().enumerate() {
-            // What is fixed or held stands in the normal equations by itself, with unit weight.
-            if self.problem.sd[unknown] != 0.0 && !self.held.contains(&unknown) {
-                rights[column * count + unknown] = 1.0;
-            }
-        }
-        let columns = self.solve_for(&rights, between)?;
-        Ok(columns.chunks_exact(count).flat_map(|column| unknowns.iter().map(|&row| column[row])).collect())
     }
 }

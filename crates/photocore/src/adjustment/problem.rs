@@ -27,7 +27,8 @@ pub trait Model: Sync {
     }
 
     /// Local blocks that the iterations have led to where they harm all others: what they say of one kept block is so much more than
-    /// all others say together that rounding takes what these say; and those that are on their way there. Asked after every damped step, with the unknowns before and after it.
+    /// all others say together that rounding takes what these say; and those that are on their way there. Asked after every damped
+    /// step, with the unknowns before and after it.
     fn collapsed(&self, _before: &[f64], _after: &[f64]) -> Vec<usize> {
         vec![]
     }

@@ -12,8 +12,20 @@ use super::result::{AdjustError, Adjustment, Seconds};
 use super::trust_region::FIRST_DAMPING;
 use crate::normals::{Cofactors, Factor, Inversion, Prior, Stopped};
 
+/// Whoever is told on the calling thread what is going on; breaking stops the work.
+pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
+
 /// Bytes that the stack of a thread takes: none is started where there is no memory for it.
 const STACK: usize = 2 << 20;
+
+/// Does work on all processors with nobody watching it: for callers without threads of their own.
+///
+/// # Errors
+/// Threads that cannot be started, as [`AdjustError::OutOfMemory`].
+pub fn on_all_processors<T>(work: impl FnOnce(&ThreadPool, Watch<'_>) -> T) -> Result<T, AdjustError> {
+    let pool = ThreadPoolBuilder::new().build().map_err(|_| AdjustError::OutOfMemory(STACK))?;
+    Ok(work(&pool, &mut |_| ControlFlow::Continue(())))
+}
 
 impl<M: Model> Problem<M> {
     /// Adjusts by least squares on all processors; [`adjust`] takes threads of its caller and tells what is going on.
@@ -21,8 +33,7 @@ impl<M: Model> Problem<M> {
     /// # Errors
     /// Unknowns that are not determined, or observations that cannot be computed; threads that cannot be started.
     pub fn adjust(&self, options: &Options) -> Result<Adjustment, AdjustError> {
-        let pool = ThreadPoolBuilder::new().build().map_err(|_| AdjustError::OutOfMemory(STACK))?;
-        adjust(self, options, &pool, &mut |_| ControlFlow::Continue(()))
+        on_all_processors(|pool, watch| adjust(self, options, pool, watch))?
     }
 }
 
@@ -36,7 +47,7 @@ pub fn adjust<M: Model>(
     problem: &Problem<M>,
     options: &Options,
     pool: &ThreadPool,
-    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
     let mut run = Run {
         problem,

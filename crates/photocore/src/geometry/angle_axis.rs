@@ -1,8 +1,9 @@
 //! Rotations as one vector: its direction is the axis, its length the angle in radians.
 
-use super::vector::{Matrix3, Vector3, square};
+use super::{Matrix3, Vector3};
 
-/// Square of the angle below which the closed form of (a - sin a) / a^3 loses digits, and its series does not.
+/// Square of the angle below which the closed forms of (a - sin a) / a^3 and of 1/a^2 - cot(a/2) / (2a) lose digits, and their
+/// series do not.
 const SMALL: f64 = 0.1;
 
 /// sin a / a, (1 - cos a) / a^2 and (a - sin a) / a^3.
@@ -20,25 +21,81 @@ fn ratios(square: f64) -> (f64, f64, f64) {
 }
 
 /// a I + b [w]x + c w w^T
-fn combined(w: Vector3, a: f64, b: f64, c: f64) -> Matrix3 {
-    let [x, y, z] = w;
-    let skew = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| f64::from(u8::from(i == j)) * a + b * skew[i][j] + c * w[i] * w[j])
-    })
+fn combined(w: &Vector3, a: f64, b: f64, c: f64) -> Matrix3 {
+    Matrix3::from_diagonal_element(a) + b * w.cross_matrix() + c * w * w.transpose()
 }
 
-/// The rotation by an angle-axis vector (Rodrigues).
-pub fn angle_axis_rotation(w: Vector3) -> Matrix3 {
-    let (sine, versine, _) = ratios(square(&w));
-    combined(w, 1.0 - versine * square(&w), sine, versine)
+/// The rotation by an angle-axis vector (Rodrigues): Exp.
+pub fn angle_axis_rotation(w: &Vector3) -> Matrix3 {
+    let (sine, versine, _) = ratios(w.norm_squared());
+    combined(w, 1.0 - versine * w.norm_squared(), sine, versine)
 }
 
 /// The rotation R and its left Jacobian J: a small change dw turns further by J dw, d(R v) = (J dw) x R v.
 ///
 /// J is singular at full turns.
-pub fn angle_axis_with_jacobian(w: Vector3) -> (Matrix3, Matrix3) {
-    let (sine, versine, rest) = ratios(square(&w));
-    let rotation = combined(w, 1.0 - versine * square(&w), sine, versine);
+pub fn angle_axis_with_jacobian(w: &Vector3) -> (Matrix3, Matrix3) {
+    let (sine, versine, rest) = ratios(w.norm_squared());
+    let rotation = combined(w, 1.0 - versine * w.norm_squared(), sine, versine);
     (rotation, combined(w, sine, versine, rest))
+}
+
+/// The angle-axis vector of a rotation, no longer than pi: Log.
+///
+/// By way of the quaternion, largest component first, so that no digits are lost near half a turn.
+pub fn rotation_angle_axis(r: &Matrix3) -> Vector3 {
+    let [w, x, y, z] = quaternion(r);
+    let axis = Vector3::new(x, y, z);
+    let sine = axis.norm();
+    // sin(a/2) / a tends to one half.
+    if sine > 0.0 { axis * (2.0 * sine.atan2(w) / sine) } else { 2.0 * axis }
+}
+
+/// The unit quaternion w, x, y, z of a rotation, w not negative (Shepperd 1978).
+pub fn quaternion(r: &Matrix3) -> [f64; 4] {
+    let trace = r.trace();
+    let squares = [trace, 2.0 * r[(0, 0)] - trace, 2.0 * r[(1, 1)] - trace, 2.0 * r[(2, 2)] - trace];
+    let largest = (0..4).fold(0, |best, k| if squares[k] > squares[best] { k } else { best });
+    let double = (1.0 + squares[largest]).sqrt();
+    let (sum, difference) =
+        (|i: usize, j: usize| r[(i, j)] + r[(j, i)], |i: usize, j: usize| r[(i, j)] - r[(j, i)]);
+    let four = match largest {
+        0 => [double * double, difference(2, 1), difference(0, 2), difference(1, 0)],
+        1 => [difference(2, 1), double * double, sum(0, 1), sum(0, 2)],
+        2 => [difference(0, 2), sum(0, 1), double * double, sum(1, 2)],
+        _ => [difference(1, 0), sum(0, 2), sum(1, 2), double * double],
+    };
+    let scale = if four[0] < 0.0 { -0.5 / double } else { 0.5 / double };
+    four.map(|value| scale * value)
+}
+
+/// The rotation of a unit quaternion w, x, y, z.
+pub fn quaternion_rotation([w, x, y, z]: [f64; 4]) -> Matrix3 {
+    Matrix3::new(
+        w * w + x * x - y * y - z * z,
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        w * w - x * x + y * y - z * z,
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        w * w - x * x - y * y + z * z,
+    )
+}
+
+/// Jr^-1, the inverse of the right Jacobian: Log(Exp(r) Exp(rho)) = r + Jr^-1(r) rho to first order. Singular at a full turn.
+pub fn right_jacobian_inverse(r: &Vector3) -> Matrix3 {
+    let square = r.norm_squared();
+    let second = if square > SMALL {
+        let half = 0.5 * square.sqrt();
+        (1.0 - half / half.tan()) / square
+    } else {
+        // sum of |B_2k| a^(2k-2) / (2k)!, B the numbers of Bernoulli.
+        let terms = [1.0 / 12.0, 1.0 / 720.0, 1.0 / 30_240.0, 1.0 / 1_209_600.0, 1.0 / 47_900_160.0];
+        let last = 691.0 / 1_307_674_368_000.0;
+        terms.iter().rev().fold(last, |sum, term| term + square * sum)
+    };
+    let skew = r.cross_matrix();
+    Matrix3::identity() + 0.5 * skew + second * skew * skew
 }

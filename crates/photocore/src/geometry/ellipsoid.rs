@@ -4,7 +4,7 @@
 //! the semi-axes.
 
 use super::GeometryError;
-use super::vector::{Matrix3, Vector3};
+use super::{Matrix3, Vector3};
 
 /// An ellipsoid of revolution, never prolate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,28 +42,28 @@ impl Ellipsoid {
     }
 
     /// Geocentric X, Y, Z of a geographic position.
-    pub fn geocentric(&self, position: Vector3) -> Vector3 {
+    pub fn geocentric(&self, position: [f64; 3]) -> Vector3 {
         let [longitude, latitude, height] = position;
         let ((sl, cl), (sp, cp)) = (longitude.sin_cos(), latitude.sin_cos());
         let w = self.w(sp);
         let normal = self.a / w;
         let polar = self.b * (self.b / self.a) / w;
-        [(normal + height) * cp * cl, (normal + height) * cp * sl, (polar + height) * sp]
+        Vector3::new((normal + height) * cp * cl, (normal + height) * cp * sl, (polar + height) * sp)
     }
 
     /// Geocentric X, Y, Z and the matrix whose columns are its partial derivatives with respect to longitude,
     /// latitude, height.
     ///
     /// The columns are east, north and up, the first two multiplied by the radii (N + h) cos lat and (M + h).
-    pub fn geocentric_with_partials(&self, position: Vector3) -> (Vector3, Matrix3) {
+    pub fn geocentric_with_partials(&self, position: [f64; 3]) -> (Vector3, Matrix3) {
         let [longitude, latitude, height] = position;
-        let [east, north, up] = local_vertical(longitude, latitude);
+        let vertical = local_vertical(longitude, latitude);
         let (sp, cp) = latitude.sin_cos();
         let w = self.w(sp);
         let parallel = (self.a / w + height) * cp;
         let meridian = self.b * (self.b / self.a) / (w * w * w) + height;
-        let partials = std::array::from_fn(|i| [parallel * east[i], meridian * north[i], up[i]]);
-        (self.geocentric(position), partials)
+        let scale = Vector3::new(parallel, meridian, 1.0);
+        (self.geocentric(position), vertical.transpose() * Matrix3::from_diagonal(&scale))
     }
 
     /// Longitude, latitude and height of a geocentric position.
@@ -72,9 +72,9 @@ impl Ellipsoid {
     /// repeated until nothing changes: to the rounding of the coordinates at any height above the evolute, at
     /// the poles too (longitude 0 there). The centre of the ellipsoid, where the latitude is arbitrary, has
     /// the latitude 0.
-    pub fn geographic(&self, xyz: Vector3) -> Vector3 {
+    pub fn geographic(&self, xyz: Vector3) -> [f64; 3] {
         const MOST_STEPS: usize = 20;
-        let [x, y, z] = xyz;
+        let [x, y, z] = xyz.into();
         let axis_distance = x.hypot(y);
         let focal = self.focal_square();
         let mut beta = (self.a * z).atan2(self.b * axis_distance);
@@ -105,13 +105,11 @@ impl Ellipsoid {
 /// R, the rotation from geocentric axes to the local vertical frame: its rows are east, north and up.
 pub fn local_vertical(longitude: f64, latitude: f64) -> Matrix3 {
     let ((sl, cl), (sp, cp)) = (longitude.sin_cos(), latitude.sin_cos());
-    [[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]]
+    Matrix3::new(-sl, cl, 0.0, -sp * cl, -sp * sl, cp, cp * cl, cp * sl, sp)
 }
 
-/// R and its partial derivatives with respect to longitude and latitude.
-pub fn local_vertical_with_partials(longitude: f64, latitude: f64) -> (Matrix3, [Matrix3; 2]) {
-    let r = local_vertical(longitude, latitude);
-    let by_longitude = std::array::from_fn(|i| [-r[i][1], r[i][0], 0.0]);
-    let by_latitude = [[0.0; 3], r[2].map(|value| -value), r[1]];
-    (r, [by_longitude, by_latitude])
+/// The vectors w about which R turns with longitude and latitude, dR/dq = [w]x R, in the local vertical frame.
+pub fn local_vertical_turns(latitude: f64) -> [Vector3; 2] {
+    let (sp, cp) = latitude.sin_cos();
+    [Vector3::new(0.0, -cp, -sp), Vector3::x()]
 }

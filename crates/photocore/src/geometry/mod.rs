@@ -1,40 +1,58 @@
 //! Pure functions of photogrammetric geometry with their partial derivatives.
 //!
-//! * [`vector`]: products of 3-vectors and 3x3 matrices;
-//! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix;
-//! * [`angle_axis`]: rotations as one vector;
-//! * [`bundler`]: the camera of "Bundle Adjustment in the Large", nine unknowns a photo;
-//! * [`ellipsoid`]: longitude, latitude, height, geocentric coordinates, and the local vertical frame;
-//! * [`collinearity`]: the projection of a point into a photo and its linearization;
+//! * [`mod@pose`]: where a photo stands and how it is turned; [`attitude`]: what numbers say how;
+//! * [`camera`]: from a direction to an image, one file for each kind of camera;
+//! * [`orientation`]: a pose as its six unknowns give it; [`projection`]: camera after pose after point;
+//! * [`collinearity`], [`bundler`]: the two photos that the programs use;
+//! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix; [`angle_axis`]: rotations as one vector;
+//! * [`space`]: coordinates of the object space; [`ellipsoid`]: longitude, latitude, height, and the local vertical frame;
 //! * [`lens`]: radial and decentering distortion, forward and inverse;
 //! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates;
-//! * [`mod@pointing`]: the attitude of a camera under the sky.
-//! * [`refraction`]: how air and water displace a point, [`atmosphere`]: the air.
+//! * [`mod@pointing`]: the attitude of a camera under the sky;
+//! * [`refraction`]: how air and water displace a point, [`atmosphere`]: the air;
+//! * [`cramer`]: three linear equations.
 //!
-//! Angles are radians, image coordinates millimetres, lengths the linear unit of the object space.
+//! Vectors and matrices in cartesian axes are those of `nalgebra`; three numbers whose units or meanings differ (coordinates of
+//! the object space, angles, standard deviations) are arrays. Angles are radians, lengths the linear unit of the object space, image
+//! coordinates the unit of the camera.
 
 pub mod angle_axis;
 pub mod atmosphere;
+pub mod attitude;
 pub mod bundler;
+pub mod camera;
 pub mod collinearity;
+pub mod cramer;
 pub mod ellipsoid;
 pub mod lens;
+pub mod orientation;
 pub mod pointing;
+pub mod pose;
+pub mod projection;
 pub mod refraction;
 pub mod rotation;
 pub mod sky;
-pub mod vector;
+pub mod space;
 
 pub use angle_axis::{angle_axis_rotation, angle_axis_with_jacobian};
-pub use bundler::{BundlerImage, BundlerParameters, BundlerPhoto};
-pub use collinearity::{Lift, ObjectSpace, Photo, Point, Projection, Ray, RotationSense};
-pub use ellipsoid::{Ellipsoid, local_vertical, local_vertical_with_partials};
+pub use attitude::{AttitudeNumbers, RotationSense};
+pub use bundler::{BundlerParameters, BundlerPhoto};
+pub use camera::{Bal, Camera, CameraModel, Image, Perspective};
+pub use ellipsoid::{Ellipsoid, local_vertical};
 pub use lens::{Displacement, Distortion, Undistorted};
+pub use orientation::{Orientation, PoseNumbers};
 pub use pointing::{pointing, pointing_angles, pointing_with_partials};
+pub use pose::Pose;
+pub use projection::{Photo, Projection, Ray};
 pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
 pub use rotation::{nearest_turns, rotation, rotation_angles, rotation_with_partials};
 pub use sky::{Air, Standard, Station};
-pub use vector::{Matrix3, Vector3};
+pub use space::{Lift, ObjectSpace, Point};
+
+/// Three components in cartesian axes.
+pub type Vector3 = nalgebra::Vector3<f64>;
+/// A matrix in cartesian axes.
+pub type Matrix3 = nalgebra::Matrix3<f64>;
 
 /// What geometry refuses.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

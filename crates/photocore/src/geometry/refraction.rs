@@ -6,9 +6,9 @@
 
 use super::GeometryError;
 use super::atmosphere::{Air, SCALE_HEIGHT};
-use super::collinearity::{Lift, ObjectSpace, Photo, Point};
 use super::ellipsoid::local_vertical;
-use super::vector::{Matrix3, Vector3, apply_transposed, difference, dot};
+use super::space::{Lift, ObjectSpace, Point};
+use super::{Matrix3, Orientation, Vector3};
 
 /// Refractivity n - 1 of air at sea level (Saastamoinen 1974).
 const REFRACTIVITY: f64 = 277.0e-6;
@@ -109,42 +109,43 @@ struct Bending {
 
 impl Refraction {
     /// The vertical at a position of the object space.
-    pub fn vertical(&self, space: ObjectSpace, coordinates: Vector3) -> Vertical {
+    pub fn vertical(&self, space: ObjectSpace, coordinates: [f64; 3]) -> Vertical {
         let height = coordinates[2] + self.datum;
         let air = match self.air {
             Some(AirModel::Standard) => Air::at(height * self.metres_per_unit),
             _ => Air::NONE,
         };
         let (up, turning) = match space {
-            ObjectSpace::Rectangular => ([0.0, 0.0, 1.0], [[0.0; 3]; 3]),
+            ObjectSpace::Rectangular => (Vector3::z(), Matrix3::zeros()),
             ObjectSpace::Geographic(_) => {
                 // d(up)/d(latitude) is north, d(up)/d(longitude) is east times the cosine of the latitude.
-                let [_, north, up] = local_vertical(coordinates[0], coordinates[1]);
-                (up, [[-up[1], north[0], 0.0], [up[0], north[1], 0.0], [0.0, north[2], 0.0]])
+                let rows = local_vertical(coordinates[0], coordinates[1]);
+                let (north, up) = (rows.row(1).transpose(), rows.row(2).transpose());
+                (up, Matrix3::from_columns(&[Vector3::new(-up.y, up.x, 0.0), north, Vector3::zeros()]))
             }
         };
         Vertical { up, turning, height, air }
     }
 
     /// What lifts a point to where a photo sees it; `station` and `foot` are the verticals at the two.
-    pub fn lift(&self, photo: &Photo, station: &Vertical, point: &Point, foot: &Vertical) -> Lift {
-        let d = difference(&point.position(), &photo.centre());
-        let (square, drop) = (dot(&d, &d), -dot(&station.up, &d));
+    pub fn lift(&self, photo: &Orientation, station: &Vertical, point: &Point, foot: &Vertical) -> Lift {
+        let d = point.position() - photo.centre();
+        let (square, drop) = (d.norm_squared(), -station.up.dot(&d));
         let mut bending = self.air(station, foot);
-        let mut lift = Lift::NONE;
+        let mut lift = Lift::none();
         if let Some(water) = &self.water {
             match water.model {
                 WaterModel::Giant => bending.add(&water.bending(square - drop * drop, station, foot)),
                 WaterModel::Snell => {
-                    let rise = water.rise(square, -dot(&foot.up, &d), foot);
+                    let rise = water.rise(square, -foot.up.dot(&d), foot);
                     let turned = add(&mut lift, &rise, foot, &d, photo, point);
-                    add_to(&mut lift.by_point, &turned);
+                    lift.by_point += turned;
                 }
             }
         }
         if bending.value != 0.0 {
             let turned = add(&mut lift, &bending.rise(square, drop), station, &d, photo, point);
-            add_to(&mut lift.by_photo, &turned);
+            lift.by_photo += turned;
         }
         lift
     }
@@ -212,7 +213,7 @@ struct Depth {
 struct Shallowing {
     value: f64,
     /// With respect to the square of the horizontal distance, the height of the camera above the water, the depth.
-    by: Vector3,
+    by: [f64; 3],
 }
 
 impl Water {
@@ -319,27 +320,18 @@ fn add(
     rise: &Rise,
     vertical: &Vertical,
     d: &Vector3,
-    photo: &Photo,
+    photo: &Orientation,
     point: &Point,
 ) -> Matrix3 {
-    let up = &vertical.up;
-    let by_vector: Vector3 = std::array::from_fn(|i| 2.0 * rise.by_square * d[i] - rise.by_drop * up[i]);
-    let mut by_photo = apply_transposed(photo.centre_partials(), &by_vector).map(|value| -value);
-    let mut by_point = apply_transposed(point.partials(), &by_vector);
-    by_photo[2] += rise.by_heights[0];
-    by_point[2] += rise.by_heights[1];
-    let by_turning = apply_transposed(&vertical.turning, d).map(|value| -rise.by_drop * value);
-    let outer = |row: &Vector3| -> Matrix3 { std::array::from_fn(|i| row.map(|value| up[i] * value)) };
-    (0..3).for_each(|i| lift.vector[i] += rise.value * up[i]);
-    add_to(&mut lift.by_photo, &outer(&by_photo));
-    add_to(&mut lift.by_point, &outer(&by_point));
-    let mut turned = outer(&by_turning);
-    add_to(&mut turned, &vertical.turning.map(|row| row.map(|value| rise.value * value)));
-    turned
-}
-
-fn add_to(sum: &mut Matrix3, other: &Matrix3) {
-    for (row, more) in sum.iter_mut().zip(other) {
-        (0..3).for_each(|k| row[k] += more[k]);
-    }
+    let up = vertical.up;
+    let by_vector = 2.0 * rise.by_square * d - rise.by_drop * up;
+    let mut by_photo = -photo.centre_partials().tr_mul(&by_vector);
+    let mut by_point = point.partials().tr_mul(&by_vector);
+    by_photo.z += rise.by_heights[0];
+    by_point.z += rise.by_heights[1];
+    let by_turning = -rise.by_drop * vertical.turning.tr_mul(d);
+    lift.vector += rise.value * up;
+    lift.by_photo += up * by_photo.transpose();
+    lift.by_point += up * by_point.transpose();
+    up * by_turning.transpose() + rise.value * vertical.turning
 }

@@ -1,6 +1,6 @@
 //! Sequential rotations M = M_kappa M_phi M_omega (GIANT guide, section 5 of its specification).
 
-use super::vector::{Matrix3, Vector3};
+use super::{Matrix3, Vector3};
 
 /// The rotation matrix M(omega, phi, kappa), angles in radians.
 ///
@@ -9,26 +9,39 @@ use super::vector::{Matrix3, Vector3};
 /// -sk cp   -so sp sk + co ck    co sp sk + so ck
 ///  sp      -so cp               co cp
 /// ```
-pub fn rotation(angles: Vector3) -> Matrix3 {
+pub fn rotation(angles: [f64; 3]) -> Matrix3 {
     let [(so, co), (sp, cp), (sk, ck)] = angles.map(f64::sin_cos);
-    [
-        [ck * cp, so * sp * ck + co * sk, -co * sp * ck + so * sk],
-        [-sk * cp, -so * sp * sk + co * ck, co * sp * sk + so * ck],
-        [sp, -so * cp, co * cp],
-    ]
+    Matrix3::new(
+        ck * cp,
+        so * sp * ck + co * sk,
+        -co * sp * ck + so * sk,
+        -sk * cp,
+        -so * sp * sk + co * ck,
+        co * sp * sk + so * ck,
+        sp,
+        -so * cp,
+        co * cp,
+    )
 }
 
 /// M and its partial derivatives with respect to omega, phi and kappa.
-pub fn rotation_with_partials(angles: Vector3) -> (Matrix3, [Matrix3; 3]) {
+pub fn rotation_with_partials(angles: [f64; 3]) -> (Matrix3, [Matrix3; 3]) {
     let m = rotation(angles);
     let [(so, co), (sp, cp), (sk, ck)] = angles.map(f64::sin_cos);
-    let omega = std::array::from_fn(|i| [0.0, -m[i][2], m[i][1]]);
-    let phi = [
-        [-ck * sp, so * cp * ck, -co * cp * ck],
-        [sk * sp, -so * cp * sk, co * cp * sk],
-        [cp, so * sp, -co * sp],
-    ];
-    let kappa = [m[1], m[0].map(|value| -value), [0.0; 3]];
+    let columns = |k: usize| Vector3::from(m.column(k));
+    let omega = Matrix3::from_columns(&[Vector3::zeros(), -columns(2), columns(1)]);
+    let phi = Matrix3::new(
+        -ck * sp,
+        so * cp * ck,
+        -co * cp * ck,
+        sk * sp,
+        -so * cp * sk,
+        co * cp * sk,
+        cp,
+        so * sp,
+        -co * sp,
+    );
+    let kappa = Matrix3::from_rows(&[m.row(1).into(), -m.row(0), Vector3::zeros().transpose()]);
     (m, [omega, phi, kappa])
 }
 
@@ -36,12 +49,12 @@ pub fn rotation_with_partials(angles: Vector3) -> (Matrix3, [Matrix3; 3]) {
 ///
 /// Where phi is +-90 degrees only omega + kappa (or their difference) is determined; the angles returned
 /// still give the matrix.
-pub fn rotation_angles(m: &Matrix3) -> Vector3 {
-    let omega = (-m[2][1]).atan2(m[2][2]);
-    let phi = m[2][0].atan2(m[2][1].hypot(m[2][2]));
+pub fn rotation_angles(m: &Matrix3) -> [f64; 3] {
+    let omega = (-m[(2, 1)]).atan2(m[(2, 2)]);
+    let phi = m[(2, 0)].atan2(m[(2, 1)].hypot(m[(2, 2)]));
     // Turning omega back leaves sin kappa and cos kappa in the second column, whatever phi is.
     let (so, co) = omega.sin_cos();
-    let kappa = (so * m[0][2] + co * m[0][1]).atan2(so * m[1][2] + co * m[1][1]);
+    let kappa = (so * m[(0, 2)] + co * m[(0, 1)]).atan2(so * m[(1, 2)] + co * m[(1, 1)]);
     [omega, phi, kappa]
 }
 

@@ -3,8 +3,6 @@
 //! Standard coordinates are the gnomonic projection on the plane one unit towards the zenith: xi north, eta east. Hour angles are
 //! positive west; azimuths count from south, positive west.
 
-use super::vector::Vector3;
-
 /// One second of arc in radians.
 pub const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
@@ -128,14 +126,14 @@ impl Station {
     }
 
     /// Unit vector north, east, zenith of an hour angle and declination (equations 1 to 3).
-    pub fn direction(&self, [hour, dec]: [f64; 2]) -> Vector3 {
+    pub fn direction(&self, [hour, dec]: [f64; 2]) -> [f64; 3] {
         let (sp, cp) = self.latitude;
         let ((sh, ch), (sd, cd)) = (hour.sin_cos(), dec.sin_cos());
         [cp * sd - sp * cd * ch, -cd * sh, sp * sd + cp * cd * ch]
     }
 
     /// Hour angle and declination of a direction north, east, zenith (equation 5).
-    pub fn equatorial(&self, [north, east, zenith]: &Vector3) -> [f64; 2] {
+    pub fn equatorial(&self, [north, east, zenith]: &[f64; 3]) -> [f64; 2] {
         let (sp, cp) = self.latitude;
         let (x, y, z) = (cp * zenith - sp * north, -east, sp * zenith + cp * north);
         [y.atan2(x), z.atan2(x.hypot(y))]
@@ -150,7 +148,7 @@ impl Station {
         let ((sh, ch), (sd, cd)) = (equatorial[0].sin_cos(), equatorial[1].sin_cos());
         let by_hour = [sp * cd * sh, -cd * ch, -cp * cd * sh];
         let by_dec = [cp * cd + sp * sd * ch, sd * sh, sp * cd - cp * sd * ch];
-        let turned = |k: usize| -> Vector3 {
+        let turned = |k: usize| -> [f64; 3] {
             std::array::from_fn(|i| by_hour[i] * by_place[0][k] + by_dec[i] * by_place[1][k])
         };
         let by_place = [turned(0), turned(1)];
@@ -163,9 +161,9 @@ impl Station {
     /// With s the sine of the true zenith distance and T the tangent of the observed one, xi = north T / s.
     fn refracted(
         &self,
-        &[north, east, zenith]: &Vector3,
+        &[north, east, zenith]: &[f64; 3],
         tau: &[f64; 4],
-    ) -> ([f64; 2], [Vector3; 2], [[f64; 4]; 2]) {
+    ) -> ([f64; 2], [[f64; 3]; 2], [[f64; 4]; 2]) {
         let s = north.hypot(east);
         if s < 1e-9 {
             let w = zenith.recip();
@@ -181,7 +179,7 @@ impl Station {
         let (w, unit) = (tangent / s, [north / s, east / s]);
         let by_s = growth * zenith / s - w / s;
         let by_zenith = -growth;
-        let row = |own: usize| -> Vector3 {
+        let row = |own: usize| -> [f64; 3] {
             let value = unit[own] * s;
             let mut row = [value * by_s * unit[0], value * by_s * unit[1], unit[own] * by_zenith * s];
             row[own] += w;

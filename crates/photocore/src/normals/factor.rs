@@ -366,7 +366,7 @@ impl Factor {
     }
 
     /// The unknowns that are not local, in the order of elimination.
-    fn unknowns<'a>(&'a self, layout: &'a Layout) -> impl Iterator<Item = usize> + 'a {
+    pub(super) fn unknowns<'a>(&'a self, layout: &'a Layout) -> impl Iterator<Item = usize> + 'a {
         let symbolic = &*self.panels.symbolic;
         (0..symbolic.blocks()).flat_map(|position| symbolic.unknowns_at(layout, position))
     }
@@ -378,6 +378,15 @@ impl Factor {
             diagonal.filter(|&(_, &n)| n == 0.0).map(|(unknown, _)| unknown).collect();
         found.sort_unstable();
         found
+    }
+
+    /// The corrections of the unknowns that are not local, in the order of the layout.
+    pub fn reduced_corrections(&self, layout: &Layout) -> Vec<f64> {
+        let (first, mut x) = (layout.all_locals().end, self.right.clone());
+        self.solve_backward(&mut x);
+        let mut corrections = vec![0.0; x.len()];
+        self.unknowns(layout).zip(&x).for_each(|(unknown, &x)| corrections[unknown - first] = x);
+        corrections
     }
 
     /// Natural logarithm of the determinant of the normal equations, the local unknowns reduced out; None where it is zero.

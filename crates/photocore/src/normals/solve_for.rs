@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::incidence::Stacks;
+use super::layout::Layout;
 use super::stack::{Stack, dot};
 use super::system::System;
 use super::vectorised::{Kernel, Rows, run};
@@ -228,6 +229,23 @@ impl<E: Equations> Kernel for Solve<'_, E> {
 }
 
 impl Factor {
+    /// Solves the reduced normal equations for right-hand sides over the unknowns that are not local, in the order of the layout, one
+    /// after the other; so are the solutions. No equation is formed again.
+    pub fn solve_reduced(&self, layout: &Layout, rights: &[f64]) -> Vec<f64> {
+        let (first, order) = (layout.all_locals().end, self.unknowns(layout).collect::<Vec<usize>>());
+        let columns = rights.chunks_exact(order.len().max(1));
+        let mut sorted: Vec<f64> =
+            columns.flat_map(|right| order.iter().map(|&unknown| right[unknown - first])).collect();
+        self.solve_columns(&mut sorted);
+        let mut solutions = vec![0.0; sorted.len()];
+        let pairs =
+            solutions.chunks_exact_mut(order.len().max(1)).zip(sorted.chunks_exact(order.len().max(1)));
+        for (solution, sorted) in pairs {
+            order.iter().zip(sorted).for_each(|(&unknown, &x)| solution[unknown - first] = x);
+        }
+        solutions
+    }
+
     /// Replaces columns, in the order of elimination, by (L L^T)^-1 times them.
     fn solve_columns(&self, columns: &mut [f64]) {
         let symbolic = &*self.panels.symbolic;

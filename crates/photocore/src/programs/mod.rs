@@ -1,11 +1,6 @@
-//! The photogrammetric models.
+//! The photogrammetric models beside the network.
 
-pub mod block;
-pub mod collection;
 pub mod comparator;
-mod precision;
 pub mod resection;
 pub mod similarity;
 pub mod stellar;
-
-pub use precision::Coarse;

@@ -1,7 +1,7 @@
 //! Configurations that do not determine a pose.
 
 use crate::geometry::Vector3;
-use crate::geometry::vector::{cross, difference, dot, square, unit};
+use crate::geometry::cramer::unit;
 
 /// Distances of all points from a line, relative to their extent, below which they count as collinear.
 const COLLINEAR: f64 = 1e-7;
@@ -40,10 +40,14 @@ impl Degeneracy {
 /// Whether all points are on one line.
 pub(super) fn collinear(points: &[Vector3]) -> bool {
     let Some(&first) = points.first() else { return true };
-    let offsets: Vec<Vector3> = points.iter().map(|point| difference(point, &first)).collect();
-    let farthest = offsets.iter().copied().max_by(|a, b| square(a).total_cmp(&square(b))).unwrap_or_default();
-    let limit = (COLLINEAR * square(&farthest)).powi(2);
-    offsets.iter().all(|offset| square(&cross(offset, &farthest)) <= limit)
+    let offsets: Vec<Vector3> = points.iter().map(|point| point - first).collect();
+    let farthest = offsets
+        .iter()
+        .copied()
+        .max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+        .unwrap_or_default();
+    let limit = (COLLINEAR * farthest.norm_squared()).powi(2);
+    offsets.iter().all(|offset| offset.cross(&farthest).norm_squared() <= limit)
 }
 
 /// Distance of a position from the danger cylinder of three points, the right cylinder over the circle through them, negative
@@ -53,15 +57,14 @@ pub(super) fn collinear(points: &[Vector3]) -> bool {
 /// to first order (Finsterwalder 1903). With a fourth point the cylinder is harmless.
 pub(super) fn outside_cylinder(points: &[Vector3], position: &Vector3) -> Option<(f64, f64)> {
     let &[first, second, third] = points else { return None };
-    let (along, side) = (difference(&second, &first), difference(&third, &first));
-    let normal = cross(&along, &side);
+    let (along, side) = (second - first, third - first);
+    let normal = along.cross(&side);
     let axis = unit(&normal)?;
     // The circumcentre of a triangle from one corner: (|a|^2 (b x n) + |b|^2 (n x a)) / 2 |n|^2.
-    let (p, q) = (cross(&side, &normal), cross(&normal, &along));
-    let offset: Vector3 =
-        std::array::from_fn(|k| (square(&along) * p[k] + square(&side) * q[k]) / (2.0 * square(&normal)));
-    let radius = square(&offset).sqrt();
-    let from: Vector3 = std::array::from_fn(|k| position[k] - first[k] - offset[k]);
-    let height = dot(&from, &axis);
-    Some(((square(&from) - height * height).max(0.0).sqrt() - radius, radius))
+    let (p, q) = (side.cross(&normal), normal.cross(&along));
+    let offset = (along.norm_squared() * p + side.norm_squared() * q) / (2.0 * normal.norm_squared());
+    let radius = offset.norm();
+    let from = position - first - offset;
+    let height = from.dot(&axis);
+    Some(((from.norm_squared() - height * height).max(0.0).sqrt() - radius, radius))
 }

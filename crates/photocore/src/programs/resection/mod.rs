@@ -16,7 +16,7 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Options, Problem, Status};
-use crate::geometry::{ObjectSpace, RotationSense, Vector3, rotation, rotation_angles};
+use crate::geometry::{ObjectSpace, RotationSense, rotation, rotation_angles};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 pub use degenerate::Degeneracy;
@@ -29,18 +29,18 @@ pub use three_points::{Placement, three_points};
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
     /// Observed values; NaN where nothing is known.
-    pub value: Vector3,
+    pub value: [f64; 3],
     /// Standard deviations: infinite free, zero fixed.
-    pub sd: Vector3,
+    pub sd: [f64; 3],
 }
 
 /// A control point and its image.
 #[derive(Debug, Clone, Copy)]
 pub struct ControlPoint {
     /// Coordinates in the object space.
-    pub coordinates: Vector3,
+    pub coordinates: [f64; 3],
     /// Their standard deviations, finite: zero fixed.
-    pub sd: Vector3,
+    pub sd: [f64; 3],
     /// Image coordinates in millimetres.
     pub xy: [f64; 2],
     /// Their standard deviations in millimetres.
@@ -51,9 +51,9 @@ pub struct ControlPoint {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Coordinates in the object space.
-    pub position: Vector3,
+    pub position: [f64; 3],
     /// Omega, phi, kappa in radians.
-    pub attitude: Vector3,
+    pub attitude: [f64; 3],
 }
 
 impl Pose {
@@ -71,7 +71,7 @@ impl Pose {
     }
 
     /// The same pose, its position counted from an origin.
-    fn counted_from(&self, origin: Vector3) -> Self {
+    fn counted_from(&self, origin: [f64; 3]) -> Self {
         let position = std::array::from_fn(|k| self.position[k] - origin[k]);
         Self { position, attitude: self.attitude }
     }
@@ -149,7 +149,7 @@ struct Solved {
     problem: Problem<SinglePhoto>,
     adjustment: Adjustment,
     start: Pose,
-    origin: Vector3,
+    origin: [f64; 3],
 }
 
 impl Solved {
@@ -259,7 +259,7 @@ impl Resection {
     }
 
     /// Coordinates are counted from here while the photo is adjusted, so that no digits are lost in large ones.
-    fn origin(&self, start: &Pose) -> Vector3 {
+    fn origin(&self, start: &Pose) -> [f64; 3] {
         match self.space {
             ObjectSpace::Rectangular => start.position.map(f64::round),
             ObjectSpace::Geographic(_) => [0.0; 3],
@@ -267,7 +267,7 @@ impl Resection {
     }
 
     /// The least-squares problem: points are local blocks of three, the photo is the kept block of six.
-    fn problem(&self, start: &Pose, origin: Vector3) -> Result<Problem<SinglePhoto>, LayoutError> {
+    fn problem(&self, start: &Pose, origin: [f64; 3]) -> Result<Problem<SinglePhoto>, LayoutError> {
         let count = self.points.len();
         let shifted = |point: &ControlPoint| ControlPoint {
             coordinates: std::array::from_fn(|k| point.coordinates[k] - origin[k]),

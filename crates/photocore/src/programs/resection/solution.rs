@@ -4,13 +4,13 @@ use super::degenerate::{Degeneracy, outside_cylinder};
 use super::model::SinglePhoto;
 use super::{Pose, Resection, Solved};
 use crate::adjustment::{Adjustment, Model, leading_matrix, standardized};
-use crate::geometry::{Point, Vector3};
+use crate::geometry::Point;
 
 /// A control point after the adjustment.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedControl {
     /// Coordinates in the object space.
-    pub coordinates: Vector3,
+    pub coordinates: [f64; 3],
     /// Cofactors (a priori unit weight); NaN when not asked for.
     pub cofactors: [[f64; 3]; 3],
     /// Redundancy numbers of its coordinates as observations; zero unless weighted, NaN when not asked for.
@@ -166,7 +166,7 @@ impl Resection {
 }
 
 /// A pose counted from the origin of the object space again.
-pub(super) fn absolute(values: &[f64], origin: Vector3) -> Pose {
+pub(super) fn absolute(values: &[f64], origin: [f64; 3]) -> Pose {
     let local = Pose::from_unknowns(values);
     local.counted_from(origin.map(|value| -value))
 }

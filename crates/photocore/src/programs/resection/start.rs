@@ -3,10 +3,11 @@
 use super::degenerate::collinear;
 use super::three_points::{Placement, three_points};
 use super::{ControlPoint, Known, Pose, Resection, ResectionError};
-use crate::geometry::vector::{
-    IDENTITY, Vector3, apply, cross, difference, dot, product, square, transposed, unit,
+use crate::geometry::cramer::unit;
+use crate::geometry::{
+    CameraModel, Matrix3, ObjectSpace, Perspective, RotationSense, Vector3, local_vertical, nearest_turns,
+    rotation_angles,
 };
-use crate::geometry::{ObjectSpace, RotationSense, local_vertical, nearest_turns, rotation_angles};
 
 /// Points among which triples are formed, and triples that are solved.
 const SPREAD_POINTS: usize = 8;
@@ -59,11 +60,8 @@ impl Resection {
     /// The rays of the images and the cartesian positions of the points.
     pub(super) fn sight(&self) -> Sight {
         let c = self.principal_distance;
-        let ray = |[x, y]: [f64; 2]| {
-            // u is parallel to (x, y, c) and u3 is negative: the camera looks along -z.
-            let signed = -(x * x + y * y + c * c).sqrt() * c.signum();
-            [x / signed, y / signed, c / signed]
-        };
+        let camera = Perspective { principal_distance: c };
+        let ray = |xy| camera.direction(xy).unwrap_or_else(|| Vector3::repeat(f64::NAN));
         let count = self.points.len().max(1) as f64;
         let noise = |point: &ControlPoint| (point.xy_sd[0].powi(2) + point.xy_sd[1].powi(2)) / (c * c);
         Sight {
@@ -77,21 +75,21 @@ impl Resection {
     fn pose(&self, placement: &Placement) -> Pose {
         let position = self.space.coordinates(placement.centre);
         let vertical = match self.space {
-            ObjectSpace::Rectangular => IDENTITY,
+            ObjectSpace::Rectangular => Matrix3::identity(),
             ObjectSpace::Geographic(_) => local_vertical(position[0], position[1]),
         };
         // G = M R or M^T R
-        let turn = product(&placement.to_photo, &transposed(&vertical));
+        let turn = placement.to_photo * vertical.transpose();
         let attitude = match self.sense {
             RotationSense::GroundToPhoto => rotation_angles(&turn),
-            RotationSense::PhotoToGround => rotation_angles(&transposed(&turn)),
+            RotationSense::PhotoToGround => rotation_angles(&turn.transpose()),
         };
         Pose { position, attitude: nearest_turns(attitude, self.attitude.value) }
     }
 
     /// Fixed components as they are given.
     fn held(&self, pose: Pose) -> Pose {
-        let hold = |found: Vector3, known: &Known| -> Vector3 {
+        let hold = |found: [f64; 3], known: &Known| -> [f64; 3] {
             std::array::from_fn(|k| if known.sd[k] == 0.0 { known.value[k] } else { found[k] })
         };
         Pose { position: hold(pose.position, &self.position), attitude: hold(pose.attitude, &self.attitude) }
@@ -122,18 +120,18 @@ impl Sight {
     /// Mean square of the chords between seen and computed directions; it grows to 4 behind the camera.
     fn misfit(&self, place: &Placement) -> f64 {
         let chord = |(ray, point): (&Vector3, &Vector3)| {
-            let seen = unit(&apply(&place.to_photo, &difference(point, &place.centre)));
-            seen.map_or(f64::NAN, |seen| square(&difference(&seen, ray)))
+            let seen = unit(&(place.to_photo * (point - place.centre)));
+            seen.map_or(f64::NAN, |seen| (seen - ray).norm_squared())
         };
         self.rays.iter().zip(&self.points).map(chord).sum::<f64>() / self.points.len() as f64
     }
 
     fn alike(&self, a: &Placement, b: &Placement) -> bool {
-        let offset = difference(&a.centre, &b.centre);
-        let from = difference(&self.points[0], &a.centre);
-        let trace: f64 = (0..3).map(|i| dot(&a.to_photo[i], &b.to_photo[i])).sum();
+        let offset = a.centre - b.centre;
+        let from = self.points[0] - a.centre;
+        let trace = a.to_photo.dot(&b.to_photo);
         let angle = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos();
-        angle < APART && square(&offset) < APART * APART * square(&from)
+        angle < APART && offset.norm_squared() < APART * APART * from.norm_squared()
     }
 
     /// The triples that span most, in the image and in space.
@@ -153,16 +151,14 @@ impl Sight {
 
     /// Area of the triangle in the image (in directions) times its area in space.
     fn span(&self, [i, j, k]: [usize; 3]) -> f64 {
-        let area =
-            |p: &[Vector3]| square(&cross(&difference(&p[j], &p[i]), &difference(&p[k], &p[i]))).sqrt();
+        let area = |p: &[Vector3]| (p[j] - p[i]).cross(&(p[k] - p[i])).norm();
         area(&self.rays) * area(&self.points)
     }
 
     /// Points far from each other in the image: each next one is the farthest from those chosen.
     fn spread(&self) -> Vec<usize> {
-        let mean: Vector3 =
-            std::array::from_fn(|k| self.rays.iter().map(|ray| ray[k]).sum::<f64>() / self.rays.len() as f64);
-        let chord = |ray: &Vector3, other: &Vector3| square(&difference(ray, other));
+        let mean = self.rays.iter().sum::<Vector3>() / self.rays.len() as f64;
+        let chord = |ray: &Vector3, other: &Vector3| (ray - other).norm_squared();
         let mut nearest: Vec<f64> = self.rays.iter().map(|ray| chord(ray, &mean)).collect();
         let mut chosen = Vec::new();
         while chosen.len() < SPREAD_POINTS.min(self.rays.len()) {

@@ -5,9 +5,7 @@
 //! of the three equations are homogeneous, l^T D1 l = 0 and l^T D2 l = 0: two cones. A cone D1 + g D2 with zero determinant is
 //! a pair of planes; on each plane one distance is a linear function of the other two, and a quadratic equation is left.
 
-use crate::geometry::vector::{
-    apply, apply_transposed, cross, difference, dot, product, solve, square, transposed, unit,
-};
+use crate::geometry::cramer::{solve, unit};
 use crate::geometry::{Matrix3, Vector3};
 
 /// Where a photo stands in cartesian object space: u = G (P - C).
@@ -35,8 +33,9 @@ pub fn three_points(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Vec<Placement
     candidates.sort_by(|a, b| a.misclosure.total_cmp(&b.misclosure));
     let mut found: Vec<Vector3> = Vec::new();
     for Candidate { distances, .. } in candidates {
-        let twin =
-            |other: &Vector3| square(&difference(other, &distances)) <= (TWINS * TWINS) * square(&distances);
+        let twin = |other: &Vector3| {
+            (other - distances).norm_squared() <= (TWINS * TWINS) * distances.norm_squared()
+        };
         if found.len() < 4 && !found.iter().any(twin) {
             found.push(distances);
         }
@@ -53,24 +52,24 @@ struct Candidate {
 
 /// Squared sides and cosines between rays; `[0, 1, 2]` stand for the pairs 12, 13, 23.
 struct Triangle {
-    side: Vector3,
-    cosine: Vector3,
+    side: [f64; 3],
+    cosine: [f64; 3],
 }
 
 const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
 impl Triangle {
     fn new(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Self {
-        let side = PAIRS.map(|(i, j)| square(&difference(&points[i], &points[j])));
-        Self { side, cosine: PAIRS.map(|(i, j)| dot(&rays[i], &rays[j])) }
+        let side = PAIRS.map(|(i, j)| (points[i] - points[j]).norm_squared());
+        Self { side, cosine: PAIRS.map(|(i, j)| rays[i].dot(&rays[j])) }
     }
 
     /// The matrix of the quadratic form d_ij^2 of one pair.
     fn cone(&self, pair: usize) -> Matrix3 {
         let (i, j) = PAIRS[pair];
-        let mut cone = [[0.0; 3]; 3];
-        (cone[i][i], cone[j][j]) = (1.0, 1.0);
-        (cone[i][j], cone[j][i]) = (-self.cosine[pair], -self.cosine[pair]);
+        let mut cone = Matrix3::zeros();
+        (cone[(i, i)], cone[(j, j)]) = (1.0, 1.0);
+        (cone[(i, j)], cone[(j, i)]) = (-self.cosine[pair], -self.cosine[pair]);
         cone
     }
 
@@ -78,19 +77,18 @@ impl Triangle {
     fn distances(&self) -> Vec<Candidate> {
         let [c12, c13, c23] = [0, 1, 2].map(|pair| self.cone(pair));
         let [a12, a13, a23] = self.side;
-        let d1 = combination(a23, &c12, -a12, &c23);
-        let d2 = combination(a23, &c13, -a13, &c23);
+        let d1 = a23 * c12 - a12 * c23;
+        let d2 = a23 * c13 - a13 * c23;
         let (adjugate1, adjugate2) = (cofactors(&d1), cofactors(&d2));
-        let inner = |a: &Matrix3, b: &Matrix3| (0..3).map(|i| dot(&a[i], &b[i])).sum::<f64>();
         // det(D1 + g D2) = det D1 + g <adj D1, D2> + g^2 <D1, adj D2> + g^3 det D2
         let cubic = [
-            dot(&d1[0], &adjugate1[0]),
-            inner(&adjugate1, &d2),
-            inner(&d1, &adjugate2),
-            dot(&d2[0], &adjugate2[0]),
+            d1.column(0).dot(&adjugate1.column(0)),
+            adjugate1.dot(&d2),
+            d1.dot(&adjugate2),
+            d2.column(0).dot(&adjugate2.column(0)),
         ];
         // Beside each pair of planes stands a cone of the pencil that does not vanish on them.
-        let pair = |g: f64| (combination(1.0, &d1, g, &d2), combination(1.0, &d2, -g, &d1));
+        let pair = |g: f64| (d1 + g * d2, d2 - g * d1);
         let mut pencil: Vec<(Matrix3, Matrix3)> = real_roots(&cubic).into_iter().map(pair).collect();
         if pencil.len() < 3 {
             // The root at infinity, where D2 is a pair of planes (an isosceles triangle seen from above its axis).
@@ -107,18 +105,18 @@ impl Triangle {
         let k = (0..3).max_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs())).unwrap_or(0);
         let (p, q) = ((k + 1) % 3, (k + 2) % 3);
         // l = l_p (e + t f), t = l_q / l_p
-        let (mut e, mut f) = ([0.0; 3], [0.0; 3]);
+        let (mut e, mut f) = (Vector3::zeros(), Vector3::zeros());
         (e[p], e[k]) = (1.0, -n[p] / n[k]);
         (f[q], f[k]) = (1.0, -n[q] / n[k]);
-        let (ce, cf) = (apply(cone, &e), apply(cone, &f));
-        let ratios = quadratic_roots(dot(&f, &cf), 2.0 * dot(&e, &cf), dot(&e, &ce));
+        let (ce, cf) = (cone * e, cone * f);
+        let ratios = quadratic_roots(f.dot(&cf), 2.0 * e.dot(&cf), e.dot(&ce));
         let distances = ratios.into_iter().filter_map(|t| {
-            let direction: Vector3 = std::array::from_fn(|i| e[i] + t * f[i]);
-            let sizes = [0, 1, 2].map(|pair| dot(&direction, &apply(&self.cone(pair), &direction)));
+            let direction = e + t * f;
+            let sizes = [0, 1, 2].map(|pair| direction.dot(&(self.cone(pair) * direction)));
             // The longest side gives the scale.
             let longest = (0..3).max_by(|&a, &b| self.side[a].total_cmp(&self.side[b]))?;
             let scale = (self.side[longest] / sizes[longest]).sqrt();
-            let distances = direction.map(|value| scale * value);
+            let distances = scale * direction;
             let positive = distances.iter().all(|&value| value.is_finite() && value > 0.0);
             positive.then_some(distances)
         });
@@ -128,15 +126,15 @@ impl Triangle {
     /// A few steps of Newton's method on the three equations; None where they lead nowhere.
     fn polish(&self, start: Vector3) -> Option<Candidate> {
         let misclosure = |l: &Vector3| -> Vector3 {
-            std::array::from_fn(|pair| self.side[pair] - dot(l, &apply(&self.cone(pair), l)))
+            Vector3::from_fn(|pair, _| self.side[pair] - l.dot(&(self.cone(pair) * l)))
         };
         let size = |v: &Vector3| (0..3).map(|pair| (v[pair] / self.side[pair]).powi(2)).sum::<f64>();
         let (mut l, mut best) = (start, size(&misclosure(&start)));
         for _ in 0..6 {
-            let jacobian: Matrix3 =
-                std::array::from_fn(|pair| apply(&self.cone(pair), &l).map(|value| 2.0 * value));
+            let row = |pair: usize| 2.0 * (self.cone(pair) * l).transpose();
+            let jacobian = Matrix3::from_rows(&[0, 1, 2].map(row));
             let Some(step) = solve(&jacobian, &misclosure(&l), 1e-14) else { break };
-            let next: Vector3 = std::array::from_fn(|i| l[i] + step[i]);
+            let next = l + step;
             let error = size(&misclosure(&next));
             if error.is_nan() || error >= best {
                 break;
@@ -150,36 +148,31 @@ impl Triangle {
 
 /// The place that puts the points at the given distances along the rays: two congruent triangles made to coincide.
 fn place(rays: &[Vector3; 3], points: &[Vector3; 3], distances: &Vector3) -> Option<Placement> {
-    let seen: [Vector3; 3] = std::array::from_fn(|i| rays[i].map(|value| distances[i] * value));
+    let seen: [Vector3; 3] = std::array::from_fn(|i| distances[i] * rays[i]);
     // Columns of `axes` are unit vectors fixed to the triangle.
-    let to_photo = product(&axes(&seen)?, &transposed(&axes(points)?));
-    let back = apply_transposed(&to_photo, &seen[0]);
-    Some(Placement { centre: difference(&points[0], &back), to_photo })
+    let to_photo = axes(&seen)? * axes(points)?.transpose();
+    Some(Placement { centre: points[0] - to_photo.tr_mul(&seen[0]), to_photo })
 }
 
 fn axes(corners: &[Vector3; 3]) -> Option<Matrix3> {
-    let along = unit(&difference(&corners[1], &corners[0]))?;
-    let normal = unit(&cross(&along, &difference(&corners[2], &corners[0])))?;
-    Some(transposed(&[along, cross(&normal, &along), normal]))
-}
-
-/// a A + b B
-fn combination(a: f64, first: &Matrix3, b: f64, second: &Matrix3) -> Matrix3 {
-    std::array::from_fn(|i| std::array::from_fn(|j| a * first[i][j] + b * second[i][j]))
+    let along = unit(&(corners[1] - corners[0]))?;
+    let normal = unit(&along.cross(&(corners[2] - corners[0])))?;
+    Some(Matrix3::from_columns(&[along, normal.cross(&along), normal]))
 }
 
 /// The matrix of cofactors; of a symmetric matrix also the adjugate.
 fn cofactors(m: &Matrix3) -> Matrix3 {
-    [cross(&m[1], &m[2]), cross(&m[2], &m[0]), cross(&m[0], &m[1])]
+    let [a, b, c] = [0, 1, 2].map(|i| m.row(i).transpose());
+    Matrix3::from_columns(&[b.cross(&c), c.cross(&a), a.cross(&b)]).transpose()
 }
 
 /// The normals of the two planes of a symmetric cone with zero determinant, v1 sqrt(e1) +- v2 sqrt(-e2); none where the
 /// planes are not real.
 fn planes(cone: &Matrix3) -> Vec<Vector3> {
     // Eigenvalues other than zero: their sum is the trace, their product that of the principal minors.
-    let trace = cone[0][0] + cone[1][1] + cone[2][2];
+    let trace = cone.trace();
     let adjugate = cofactors(cone);
-    let minors = adjugate[0][0] + adjugate[1][1] + adjugate[2][2];
+    let minors = adjugate.trace();
     let root = (trace * trace / 4.0 - minors).max(0.0).sqrt();
     let (positive, negative) = (trace / 2.0 + root, trace / 2.0 - root);
     if positive <= 0.0 || negative > 0.0 {
@@ -189,17 +182,14 @@ fn planes(cone: &Matrix3) -> Vec<Vector3> {
         return vec![];
     };
     let (s1, s2) = (positive.sqrt(), (-negative).sqrt());
-    let normal = |sign: f64| std::array::from_fn(|i| s1 * v1[i] + sign * s2 * v2[i]);
-    vec![normal(1.0), normal(-1.0)]
+    vec![s1 * v1 + s2 * v2, s1 * v1 - s2 * v2]
 }
 
 /// The vector across the rows of A - e I: the largest of the three cross products.
 fn eigenvector(matrix: &Matrix3, eigenvalue: f64) -> Option<Vector3> {
-    let mut shifted = *matrix;
-    (0..3).for_each(|i| shifted[i][i] -= eigenvalue);
-    let rows = cofactors(&shifted);
-    let largest = rows.iter().max_by(|a, b| square(a).total_cmp(&square(b)))?;
-    unit(largest)
+    let rows = cofactors(&(matrix - eigenvalue * Matrix3::identity()));
+    let largest = rows.row_iter().max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))?;
+    unit(&largest.transpose())
 }
 
 /// Real roots of c0 + c1 x + c2 x^2 + c3 x^3, of a lower degree where the leading coefficients vanish.

@@ -91,7 +91,7 @@ fn shape(stations: &[Station], similarity: &Similarity, tolerance: f64) -> Optio
     };
     let plan = |list: &[usize]| -> Vec<Vector3> {
         let position = |&i: &usize| similarity.control_at(&stations[i].model);
-        list.iter().map(position).map(|[x, y, _]| [x, y, 0.0]).collect()
+        list.iter().map(position).map(|at| Vector3::new(at.x, at.y, 0.0)).collect()
     };
     // Written so that coincident positions are in line.
     let in_line = |positions: &[Vector3]| {
@@ -148,12 +148,9 @@ pub fn known_mean(stations: &[Station], value: impl Fn(&Station) -> Option<f64>)
 /// Root mean square extents of some positions along their principal axes, the largest first.
 fn extents(positions: &[Vector3]) -> [f64; 3] {
     let count = positions.len().max(1) as f64;
-    let mean: Vector3 = std::array::from_fn(|k| positions.iter().map(|p| p[k]).sum::<f64>() / count);
-    let moment = |i: usize, j: usize| -> f64 {
-        positions.iter().map(|p| (p[i] - mean[i]) * (p[j] - mean[j])).sum::<f64>() / count
-    };
-    let moments: Matrix3 = std::array::from_fn(|i| std::array::from_fn(|j| moment(i, j)));
-    let values = eigenvalues(&moments);
+    let mean = positions.iter().sum::<Vector3>() / count;
+    let moments: Matrix3 = positions.iter().map(|p| (p - mean) * (p - mean).transpose()).sum();
+    let values = eigenvalues(&(moments / count).data.0);
     std::array::from_fn(|k| values[2 - k].max(0.0).sqrt())
 }
 

@@ -9,7 +9,7 @@ use faer::{Mat, Side};
 
 use super::Station;
 use super::transform::{Matrix7, Similarity, propagate};
-use crate::geometry::vector::{apply, solve, transposed};
+use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Vector3};
 
 /// A redundancy number below this is what rounding leaves of zero: a test value would be noise.
@@ -35,36 +35,31 @@ pub fn tangent_cofactors(stations: &[Station], similarity: &Similarity) -> Optio
 
 /// Redundancy numbers, the diagonal of Q_u Q_m^-1, and standardized misclosures u / root of the diagonal of Q_u (Baarda's w) of a
 /// station; NaN where unknown, and where a misclosure is not checked by any other.
-pub fn test(station: &Station, similarity: &Similarity, cofactors: &Matrix7) -> (Vector3, Vector3) {
+pub fn test(station: &Station, similarity: &Similarity, cofactors: &Matrix7) -> ([f64; 3], [f64; 3]) {
     let known = station.known();
     let before = cofactors_before(station, similarity);
     let taken = propagate(&known_partials(station, similarity), cofactors);
-    let after: Matrix3 = std::array::from_fn(|i| std::array::from_fn(|j| before[i][j] - taken[i][j]));
+    let after = Matrix3::from_fn(|i, j| before[(i, j)] - taken[i][j]);
     let u = similarity.misclosure(&station.control, &station.model);
-    let redundancy: Vector3 = std::array::from_fn(|j| {
-        let unit = std::array::from_fn(|k| f64::from(u8::from(k == j)));
+    let redundancy: [f64; 3] = std::array::from_fn(|j| {
+        let unit = Vector3::ith(j, 1.0);
         let column = solve(&before, &unit, 0.0).filter(|_| known[j]);
-        column.map_or(f64::NAN, |column| apply(&after, &column)[j])
+        column.map_or(f64::NAN, |column| (after * column)[j])
     });
     let standardized =
-        std::array::from_fn(|j| if redundancy[j] > CHECKED { u[j] / after[j][j].sqrt() } else { f64::NAN });
+        std::array::from_fn(|j| if redundancy[j] > CHECKED { u[j] / after[(j, j)].sqrt() } else { f64::NAN });
     (redundancy, standardized)
 }
 
 /// Q_m; unknown components stand aside with unit cofactors.
 fn cofactors_before(station: &Station, similarity: &Similarity) -> Matrix3 {
     let known = station.known();
-    let turned = transposed(&similarity.rotation);
-    let element = |i: usize, j: usize| {
-        let own = if i == j { (similarity.scale * station.control_sd[i]).powi(2) } else { 0.0 };
-        own + (0..3).map(|k| turned[i][k] * station.model_sd[k].powi(2) * turned[j][k]).sum::<f64>()
-    };
-    std::array::from_fn(|i| {
-        std::array::from_fn(
-            |j| {
-                if known[i] && known[j] { element(i, j) } else { f64::from(u8::from(i == j)) }
-            },
-        )
+    let own = station.control_sd.map(|sd| (similarity.scale * sd).powi(2));
+    let turned = similarity.rotated_variances(&station.model_sd);
+    Matrix3::from_fn(|i, j| match (known[i] && known[j], i == j) {
+        (true, true) => own[i] + turned[(i, i)],
+        (true, false) => turned[(i, j)],
+        (false, same) => f64::from(u8::from(same)),
     })
 }
 
@@ -79,7 +74,7 @@ fn known_partials(station: &Station, similarity: &Similarity) -> [[f64; 7]; 3] {
 fn weighted(before: &Matrix3, partials: &[[f64; 7]; 3]) -> Option<[[f64; 7]; 3]> {
     let mut result = [[0.0; 7]; 3];
     for i in 0..7 {
-        let column = solve(before, &std::array::from_fn(|k| partials[k][i]), 0.0)?;
+        let column = solve(before, &Vector3::from_fn(|k, _| partials[k][i]), 0.0)?;
         (0..3).for_each(|k| result[k][i] = column[k]);
     }
     Some(result)

@@ -41,11 +41,11 @@ pub struct Station {
     /// Control coordinates X in ground units; NaN where unknown.
     pub control: Vector3,
     /// Their standard deviations; zero for an exact one, infinite for one that takes no part.
-    pub control_sd: Vector3,
+    pub control_sd: [f64; 3],
     /// Model coordinates x in model units.
     pub model: Vector3,
     /// Their standard deviations; zero where those of the control are positive.
-    pub model_sd: Vector3,
+    pub model_sd: [f64; 3],
 }
 
 impl Station {
@@ -223,7 +223,7 @@ fn problem(stations: &[Station], start: &Similarity) -> Result<Problem<AsControl
             sd.push(if known[k] { station.control_sd[k] } else { f64::INFINITY });
         }
     }
-    let [x, y, z] = start.shift;
+    let [x, y, z] = start.shift.into();
     let parameters = [0.0, 0.0, 0.0, start.scale, x, y, z];
     initial.extend(parameters);
     prior.extend(parameters);

@@ -3,7 +3,6 @@
 use super::Station;
 use super::transform::Similarity;
 use crate::adjustment::Model;
-use crate::geometry::vector::{apply, apply_transposed, product};
 use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
 use crate::normals::GroupRows;
 
@@ -33,7 +32,7 @@ impl AsControl {
     /// The model of some stations; the changes of the rotation are counted from a start.
     pub fn new(stations: &[Station], start: &Similarity) -> Self {
         let centre = start.model_centre;
-        let centred = |station: &Station| std::array::from_fn(|i| station.model[i] - centre[i]);
+        let centred = |station: &Station| station.model - centre;
         Self {
             start: *start,
             observed: stations.iter().map(centred).collect(),
@@ -45,9 +44,9 @@ impl AsControl {
     pub fn similarity(&self, changes: &[f64]) -> Similarity {
         let change = rotation([changes[0], changes[1], changes[2]]);
         Similarity {
-            rotation: product(&change, &self.start.rotation),
+            rotation: change * self.start.rotation,
             scale: changes[3],
-            shift: [changes[4], changes[5], changes[6]],
+            shift: Vector3::new(changes[4], changes[5], changes[6]),
             ..self.start
         }
     }
@@ -60,9 +59,9 @@ impl Model for AsControl {
         let (control, changes) = unknowns.split_at(3 * self.observed.len());
         let (_, by_change) = rotation_with_partials([changes[0], changes[1], changes[2]]);
         Prepared {
-            control: control.as_chunks().0.to_vec(),
+            control: control.as_chunks().0.iter().map(|&x: &[f64; 3]| x.into()).collect(),
             similarity: self.similarity(changes),
-            partials: by_change.map(|partial| product(&partial, &self.start.rotation)),
+            partials: by_change.map(|partial| partial * self.start.rotation),
         }
     }
 
@@ -73,8 +72,7 @@ impl Model for AsControl {
         for ((control, observed), free) in
             control.as_chunks_mut::<3>().0.iter_mut().zip(&self.observed).zip(&self.free)
         {
-            let reduced = std::array::from_fn(|i| observed[i] - shift[i]);
-            let carried = apply_transposed(&rotation, &reduced);
+            let carried = rotation.tr_mul(&(observed - shift));
             (0..3).filter(|&k| free[k]).for_each(|k| control[k] = carried[k] / scale);
         }
         true
@@ -84,11 +82,11 @@ impl Model for AsControl {
     fn observe(&self, prepared: &Prepared, local: usize, _group: usize, rows: &mut GroupRows<'_>) {
         let Similarity { rotation, scale, shift, .. } = prepared.similarity;
         let control = &prepared.control[local];
-        let turned = apply(&rotation, control);
-        let by_change = prepared.partials.map(|partial| apply(&partial, control));
+        let turned = rotation * control;
+        let by_change = prepared.partials.map(|partial| partial * control);
         for row in 0..3 {
             rows.constant[row] = self.observed[local][row] - scale * turned[row] - shift[row];
-            rows.local[3 * row..][..3].copy_from_slice(&rotation[row].map(|a| scale * a));
+            (0..3).for_each(|k| rows.local[3 * row + k] = scale * rotation[(row, k)]);
             let kept = &mut rows.kept[CHANGES * row..][..CHANGES];
             kept.fill(0.0);
             (0..3).for_each(|k| kept[k] = scale * by_change[k][row]);

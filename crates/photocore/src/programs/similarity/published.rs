@@ -7,7 +7,6 @@ use super::crout::{Normal, gauss_crout};
 use super::determinacy::Cause;
 use super::transform::{Parameters, Similarity};
 use super::{Method, Options, SimilarityError, Station};
-use crate::geometry::vector::{apply, apply_transposed};
 use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
 
 /// The cycles end when all three corrections of angles are at most this, in radians.
@@ -79,7 +78,8 @@ pub fn iterate(
         let largest = e[..3].iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         corrections.push(largest);
         if options.trace {
-            let Parameters { scale, translation: [b1, b2, b3], .. } = similarity.parameters();
+            let Parameters { scale, translation, .. } = similarity.parameters();
+            let [b1, b2, b3] = translation.into();
             let [omega, phi, kappa] = angles;
             traces.push(Trace {
                 rotation: rotation_before,
@@ -102,9 +102,9 @@ fn misclosure_rows(similarity: &Similarity, partials: &[Matrix3; 3], station: &S
     let reduced = similarity.reduced(&station.model);
     let u = similarity.misclosure(&station.control, &station.model);
     let centred = similarity.centred(&station.control);
-    let turned = partials.map(|partial| apply_transposed(&partial, &reduced));
+    let turned = partials.map(|partial| partial.tr_mul(&reduced));
     std::array::from_fn(|j| {
-        let [a, b, c]: Vector3 = std::array::from_fn(|i| similarity.rotation[i][j]);
+        let [a, b, c] = similarity.rotation.column(j).into();
         [-turned[0][j], -turned[1][j], -turned[2][j], centred[j], a, b, c, -u[j]]
     })
 }
@@ -113,12 +113,12 @@ fn misclosure_rows(similarity: &Similarity, partials: &[Matrix3; 3], station: &S
 fn bulletin_rows(similarity: &Similarity, partials: &[Matrix3; 3], station: &Station) -> [[f64; 8]; 3] {
     let known = station.known();
     let carried = similarity.control_at(&station.model);
-    let filled = std::array::from_fn(|k| if known[k] { station.control[k] } else { carried[k] });
+    let filled = Vector3::from_fn(|k, _| if known[k] { station.control[k] } else { carried[k] });
     let control = similarity.centred(&filled);
     let reduced = similarity.reduced(&station.model);
-    let turned = apply(&similarity.rotation, &control);
+    let turned = similarity.rotation * control;
     let s = similarity.scale;
-    let by_angle = partials.map(|partial| apply(&partial, &control).map(|value| s * value));
+    let by_angle = partials.map(|partial| s * (partial * control));
     std::array::from_fn(|i| {
         let mut row = [
             by_angle[0][i],

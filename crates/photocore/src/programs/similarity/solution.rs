@@ -22,9 +22,9 @@ pub struct AdjustedStation {
     /// Their cofactors (a priori unit weight).
     pub cofactors: Matrix3,
     /// Redundancy numbers of the known components: they sum to the degrees of freedom.
-    pub redundancy: Vector3,
+    pub redundancy: [f64; 3],
     /// Misclosure / root of its own cofactor (Baarda's w), a priori unit weight; NaN without redundancy.
-    pub standardized: Vector3,
+    pub standardized: [f64; 3],
 }
 
 /// An oriented model.
@@ -115,12 +115,13 @@ impl AdjustedStation {
             let exact = known[k] && station.control_sd[k] == 0.0;
             if exact { station.control[k] } else { values[k] + similarity.control_centre[k] }
         };
-        let own: Matrix3 = leading_matrix(adjustment.cofactors.as_ref().map(|all| &all.local[9 * index..]));
+        let own: [[f64; 3]; 3] =
+            leading_matrix(adjustment.cofactors.as_ref().map(|all| &all.local[9 * index..]));
         Self {
-            misclosure: std::array::from_fn(|k| if known[k] { u[k] } else { f64::NAN }),
-            model_residual: std::array::from_fn(|k| -adjustment.residuals[3 * index + k]),
-            control: std::array::from_fn(control),
-            cofactors: own.map(|row| row.map(|cofactor| cofactor / (inner * inner))),
+            misclosure: Vector3::from_fn(|k, _| if known[k] { u[k] } else { f64::NAN }),
+            model_residual: Vector3::from_fn(|k, _| -adjustment.residuals[3 * index + k]),
+            control: Vector3::from_fn(|k, _| control(k)),
+            cofactors: Matrix3::from_fn(|i, j| own[i][j] / (inner * inner)),
             redundancy,
             standardized: standardized.map(|w| inner * w),
         }

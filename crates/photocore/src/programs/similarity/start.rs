@@ -4,7 +4,6 @@ use super::determinacy::{known_mean, spread};
 use super::moments::Moments;
 use super::transform::Similarity;
 use super::{SimilarityError, Start, Station};
-use crate::geometry::vector::{apply, difference};
 use crate::geometry::{Vector3, rotation};
 
 /// Another minimum fits as well when its sum of squares is at most this multiple of the least.
@@ -73,9 +72,9 @@ pub fn choose(stations: &[Station], start: Start) -> Result<Chosen, SimilarityEr
 
 /// Means of the known control coordinates and of the model.
 fn centres(stations: &[Station]) -> (Vector3, Vector3) {
-    let control = std::array::from_fn(|k| known_mean(stations, |s| s.known()[k].then(|| s.control[k])));
-    let model = std::array::from_fn(|k| known_mean(stations, |s| Some(s.model[k])));
-    (control, model)
+    let control = |k: usize, _| known_mean(stations, |s| s.known()[k].then(|| s.control[k]));
+    let model = |k: usize, _| known_mean(stations, |s| Some(s.model[k]));
+    (Vector3::from_fn(control), Vector3::from_fn(model))
 }
 
 fn sum_of_squares(stations: &[Station], similarity: &Similarity) -> f64 {
@@ -88,8 +87,7 @@ fn sum_of_squares(stations: &[Station], similarity: &Similarity) -> f64 {
 
 /// Largest difference of the direction cosines of two rotations.
 fn apart(a: &Similarity, b: &Similarity) -> f64 {
-    let elements = a.rotation.iter().flatten().zip(b.rotation.iter().flatten());
-    elements.map(|(p, q)| (p - q).abs()).fold(0.0, f64::max)
+    (a.rotation - b.rotation).amax()
 }
 
 /// Initial values from the first two stations (TB 19, section 3, with kappa = theta_X - theta_x in its right quadrant):
@@ -105,13 +103,11 @@ fn report(
     if !(first.pair() && second.pair()) {
         return Err(SimilarityError::FirstStations("have no horizontal coordinates"));
     }
-    let [mut control, mut model] =
-        [difference(&second.control, &first.control), difference(&second.model, &first.model)];
-    let [x, y, _] = control;
-    let [p, q, _] = model;
+    let [mut control, mut model] = [second.control - first.control, second.model - first.model];
+    let ([x, y, _], [p, q, _]): ([f64; 3], [f64; 3]) = (control.into(), model.into());
     let kappa = (y * p - x * q).atan2(x * p + y * q);
     if !(first.elevation() && second.elevation()) {
-        (control[2], model[2]) = (0.0, 0.0);
+        (control.z, model.z) = (0.0, 0.0);
     }
     let length = |v: Vector3| v[0].hypot(v[1]).hypot(v[2]);
     let scale = length(model) / length(control);
@@ -121,7 +117,7 @@ fn report(
     let mut similarity = Similarity {
         rotation: rotation([0.0, 0.0, kappa]),
         scale,
-        shift: [0.0; 3],
+        shift: Vector3::zeros(),
         control_centre,
         model_centre,
     };
@@ -129,10 +125,10 @@ fn report(
     let shift = |station: &Station, j: usize| {
         let known = station.known();
         let centred = similarity.centred(&station.control);
-        let needed = std::array::from_fn(|k| if known[k] { centred[k] } else { 0.0 });
-        similarity.reduced(&station.model)[j] - scale * apply(&similarity.rotation, &needed)[j]
+        let needed = Vector3::from_fn(|k, _| if known[k] { centred[k] } else { 0.0 });
+        similarity.reduced(&station.model)[j] - scale * (similarity.rotation * needed)[j]
     };
-    similarity.shift = std::array::from_fn(|j| {
+    similarity.shift = Vector3::from_fn(|j, _| {
         let counts = |s: &Station| if j < 2 { s.pair() } else { s.elevation() };
         known_mean(stations, |station| counts(station).then(|| shift(station, j)))
     });

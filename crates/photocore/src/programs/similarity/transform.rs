@@ -1,6 +1,5 @@
 //! The similarity x = s A X + B of a model and its control, its inverse, and the partials of both.
 
-use crate::geometry::vector::{apply, apply_transposed, cross, difference, transposed};
 use crate::geometry::{Matrix3, Vector3, rotation_angles};
 
 /// The seven parameters of x = s A X + B.
@@ -40,46 +39,41 @@ impl Similarity {
     /// Counts given parameters from given centres.
     pub fn from_parameters(parameters: &Parameters, control_centre: Vector3, model_centre: Vector3) -> Self {
         let Parameters { rotation, scale, translation } = *parameters;
-        let moved = apply(&rotation, &control_centre);
-        let shift = std::array::from_fn(|i| translation[i] + scale * moved[i] - model_centre[i]);
+        let shift = translation + scale * (rotation * control_centre) - model_centre;
         Self { rotation, scale, shift, control_centre, model_centre }
     }
 
     /// The parameters of x = s A X + B: B = t + c_x - s A c_X.
     pub fn parameters(&self) -> Parameters {
-        let moved = apply(&self.rotation, &self.control_centre);
-        let translation =
-            std::array::from_fn(|i| self.shift[i] + self.model_centre[i] - self.scale * moved[i]);
+        let moved = self.rotation * self.control_centre;
+        let translation = self.shift + self.model_centre - self.scale * moved;
         Parameters { rotation: self.rotation, scale: self.scale, translation }
     }
 
     /// Omega, phi, kappa in radians.
-    pub fn angles(&self) -> Vector3 {
+    pub fn angles(&self) -> [f64; 3] {
         rotation_angles(&self.rotation)
     }
 
     /// x - c_x - t, in model units: what the rotation and the scale alone carry into control.
     pub(super) fn reduced(&self, model: &Vector3) -> Vector3 {
-        difference(&difference(model, &self.model_centre), &self.shift)
+        model - self.model_centre - self.shift
     }
 
     /// X - c_X.
     pub(super) fn centred(&self, control: &Vector3) -> Vector3 {
-        difference(control, &self.control_centre)
+        control - self.control_centre
     }
 
     /// X of a model point (TB 19, equation 2.2).
     pub fn control_at(&self, model: &Vector3) -> Vector3 {
-        let turned = apply_transposed(&self.rotation, &self.reduced(model));
-        std::array::from_fn(|j| self.control_centre[j] + turned[j] / self.scale)
+        self.control_centre + self.rotation.tr_mul(&self.reduced(model)) / self.scale
     }
 
     /// u = s X - A^T (x - B): what is missing between a control point and its model point, in control axes and model units.
     /// NaN where X is.
     pub(super) fn misclosure(&self, control: &Vector3, model: &Vector3) -> Vector3 {
-        let turned = apply_transposed(&self.rotation, &self.reduced(model));
-        let centred = self.centred(control);
-        std::array::from_fn(|j| self.scale * centred[j] - turned[j])
+        self.scale * self.centred(control) - self.rotation.tr_mul(&self.reduced(model))
     }
 
     /// Partials of the misclosures with respect to the tangent parameters . The column of the
@@ -87,10 +81,9 @@ impl Similarity {
     pub(super) fn misclosure_partials(&self, control: &Vector3, model: &Vector3) -> [[f64; 7]; 3] {
         let reduced = self.reduced(model);
         let centred = self.centred(control);
-        let columns = transposed(&self.rotation);
         std::array::from_fn(|j| {
-            let [p, q, r] = cross(&columns[j], &reduced);
-            let [a, b, c] = columns[j];
+            let column = Vector3::from(self.rotation.column(j));
+            let ([p, q, r], [a, b, c]): ([f64; 3], [f64; 3]) = (column.cross(&reduced).into(), column.into());
             [p, q, r, centred[j], a, b, c]
         })
     }
@@ -105,17 +98,22 @@ impl Similarity {
 
     /// X of a model point and its covariance from those of the tangent parameters and the standard deviations of the point itself:
     /// J Q J^T + A^T Q_x A / s^2.
-    pub fn transform(&self, model: &Vector3, model_sd: &Vector3, covariance: &Matrix7) -> (Vector3, Matrix3) {
+    pub fn transform(
+        &self,
+        model: &Vector3,
+        model_sd: &[f64; 3],
+        covariance: &Matrix7,
+    ) -> (Vector3, Matrix3) {
         let (control, partials) = self.control_with_partials_at(model);
-        let mut result = propagate(&partials, covariance);
-        for i in 0..3 {
-            for j in 0..3 {
-                let own: f64 =
-                    (0..3).map(|k| self.rotation[k][i] * model_sd[k].powi(2) * self.rotation[k][j]).sum();
-                result[i][j] += own / (self.scale * self.scale);
-            }
-        }
-        (control, result)
+        let result = propagate(&partials, covariance);
+        let own = self.rotated_variances(model_sd) / (self.scale * self.scale);
+        (control, Matrix3::from_fn(|i, j| result[i][j]) + own)
+    }
+
+    /// A^T Q_x A of independent model coordinates.
+    pub(super) fn rotated_variances(&self, model_sd: &[f64; 3]) -> Matrix3 {
+        let variances = Matrix3::from_diagonal(&model_sd.map(|sd| sd * sd).into());
+        self.rotation.tr_mul(&(variances * self.rotation))
     }
 
     /// Partials of omega, phi, kappa, s, b1, b2, b3 with respect to the tangent parameters; those of omega and kappa grow without
@@ -123,15 +121,14 @@ impl Similarity {
     pub fn parameter_partials(&self) -> Matrix7 {
         let mut partials = identity();
         let rates = inverse_rates(self.angles());
-        let moved = apply(&self.rotation, &self.control_centre);
+        let moved = self.rotation * self.control_centre;
+        let lever = -(self.scale * moved).cross_matrix();
         for i in 0..3 {
-            partials[i][..3].copy_from_slice(&rates[i]);
+            (0..3).for_each(|k| partials[i][k] = rates[(i, k)]);
             // dB = dt + s r x (A c_X) - A c_X ds
             partials[4 + i][3] = -moved[i];
+            (0..3).for_each(|k| partials[4 + i][k] = lever[(i, k)]);
         }
-        let [p, q, r] = moved.map(|value| self.scale * value);
-        let lever = [[0.0, r, -q], [-r, 0.0, p], [q, -p, 0.0]];
-        (0..3).for_each(|i| partials[4 + i][..3].copy_from_slice(&lever[i]));
         partials
     }
 }
@@ -160,7 +157,7 @@ fn identity() -> Matrix7 {
 
 /// Partials of omega, phi, kappa with respect to three small rotations r: the inverse of r = (K Phi e1) domega + (K e2) dphi
 /// + e3 dkappa.
-fn inverse_rates([_, phi, kappa]: Vector3) -> Matrix3 {
+fn inverse_rates([_, phi, kappa]: [f64; 3]) -> Matrix3 {
     let ((sp, cp), (sk, ck)) = (phi.sin_cos(), kappa.sin_cos());
-    [[ck / cp, -sk / cp, 0.0], [sk, ck, 0.0], [-ck * sp / cp, sk * sp / cp, 1.0]]
+    Matrix3::new(ck / cp, -sk / cp, 0.0, sk, ck, 0.0, -ck * sp / cp, sk * sp / cp, 1.0)
 }

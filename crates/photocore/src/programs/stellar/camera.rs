@@ -66,14 +66,14 @@ pub struct Attitude {
 
 impl Attitude {
     /// The attitude alpha, omega, kappa.
-    pub fn new(angles: Vector3) -> Self {
+    pub fn new(angles: [f64; 3]) -> Self {
         let (matrix, partials) = pointing_with_partials(angles);
         Self { matrix, partials }
     }
 
     /// m, n, q of standard coordinates.
-    pub fn turned(matrix: &Matrix3, [xi, eta]: [f64; 2]) -> Vector3 {
-        matrix.map(|row| row[0] * xi + row[1] * eta + row[2])
+    pub fn turned(matrix: &Matrix3, [xi, eta]: [f64; 2]) -> [f64; 3] {
+        (matrix * Vector3::new(xi, eta, 1.0)).into()
     }
 }
 
@@ -128,18 +128,14 @@ impl Camera {
             std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j)) + lens.offset[i][j]));
         let by_w: [[f64; 2]; 2] =
             std::array::from_fn(|i| std::array::from_fn(|j| scale[i] * by_base[i][j] * c[j]));
-        let through = |row: &Vector3, i: usize, third: &Vector3| {
-            let [own, axis] = [row, third].map(|r| r[0] * standard[0] + r[1] * standard[1] + r[2]);
-            (own - w[i] * axis) / q
-        };
         let by_angle = |a: usize| {
-            let d = &attitude.partials[a];
-            let dw = [through(&d[0], 0, &d[2]), through(&d[1], 1, &d[2])];
+            let [dm, dn, dq] = Attitude::turned(&attitude.partials[a], standard);
+            let dw = [(dm - w[0] * dq) / q, (dn - w[1] * dq) / q];
             by_w.map(|row| row[0] * dw[0] + row[1] * dw[1])
         };
         let by_standard = |k: usize| {
             let dw: [f64; 2] =
-                std::array::from_fn(|i| (attitude.matrix[i][k] - w[i] * attitude.matrix[2][k]) / q);
+                std::array::from_fn(|i| (attitude.matrix[(i, k)] - w[i] * attitude.matrix[(2, k)]) / q);
             by_w.map(|row| row[0] * dw[0] + row[1] * dw[1])
         };
         let angles: [[f64; 2]; 3] = std::array::from_fn(by_angle);
@@ -226,8 +222,7 @@ impl Camera {
     pub fn standard(&self, matrix: &Matrix3, undistorted: [f64; 2]) -> [f64; 2] {
         let [_, xp, yp, cx, cy, ..] = self.interior;
         let (u, v) = ((undistorted[0] - xp) / cx, (undistorted[1] - yp) / cy);
-        let [xi, eta, zenith]: Vector3 =
-            std::array::from_fn(|k| u * matrix[0][k] + v * matrix[1][k] + matrix[2][k]);
+        let [xi, eta, zenith] = matrix.tr_mul(&Vector3::new(u, v, 1.0)).into();
         [xi / zenith, eta / zenith]
     }
 }

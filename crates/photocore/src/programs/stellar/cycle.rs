@@ -70,9 +70,12 @@ impl Calibration {
         }
         let cofactors = MatRef::from_row_major_slice(cofactors, count, count);
         let model = StarImages::new(self, Partials::Published(*tolerances))?;
-        self.see(&model)?;
         let sight = self.initial();
         let rows: Vec<Rows> = (0..self.images.len()).map(|image| model.image(&sight, image)).collect();
+        let unseen = self.unseen(&rows);
+        if !unseen.is_empty() {
+            return Err(StellarError::NotFinite(unseen));
+        }
         let stars = self.eliminated(&model, &sight, &rows)?;
         let places = sight.places.iter().zip(&stars);
         let places = places.map(|(place, star)| [0, 1].map(|k| place[k] + star.correction[k])).collect();

@@ -19,7 +19,7 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Event, NormalEquations, Phase, Problem};
-use crate::geometry::{Station, Vector3};
+use crate::geometry::Station;
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 use model::{Partials, StarImages};
@@ -96,7 +96,7 @@ pub struct Calibration {
     /// What is estimated of the camera.
     pub kind: Kind,
     /// Initial alpha, omega, kappa of every attitude in radians.
-    pub pointings: Vec<Vector3>,
+    pub pointings: Vec<[f64; 3]>,
     /// Initial interior parameters, then coefficients of refraction in seconds of arc.
     pub common: [f64; COMMON],
     /// Which parameters are held: attitudes three each, then the common ones.
@@ -167,15 +167,13 @@ impl Calibration {
         let problem = self.problem(options.unit, Partials::Exact)?;
         let adjusted = adjustment::adjust(&problem, &options.adjustment, pool, watch)
             .map_err(|error| self.named(&problem, error, pool))?;
-        let whole = if options.whole && adjusted.cofactors.is_some() {
+        let mut whole = None;
+        if options.whole && adjusted.cofactors.is_some() {
             let total = problem.layout().locals();
             let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
             let normal = NormalEquations::form(&problem, &adjusted.unknowns, &[], pool, &mut between);
-            let whole = normal.and_then(|normal| self.whole(&normal, &problem, &mut between));
-            whole.map_err(|error| self.named(&problem, error, pool))?
-        } else {
-            None
-        };
+            whole = of_parameters(&normal.map_err(|error| self.named(&problem, error, pool))?);
+        }
         Solution::new(self, options, &problem, adjusted, whole)
     }
 
@@ -186,24 +184,21 @@ impl Calibration {
     /// A calibration that contradicts itself; stars without images at the initial values.
     pub fn without_effect(&self, pool: &ThreadPool) -> Result<Vec<usize>, StellarError> {
         let problem = self.problem(1.0, Partials::Exact)?;
-        self.see(&problem.model)?;
-        let normal = NormalEquations::form(&problem, &problem.initial, &[], pool, &mut go_on);
-        let normal = normal.map_err(|error| self.named(&problem, error, pool))?;
+        let normal = self.formed(&problem, &[], pool)?;
         Ok(parameters_of(&problem, normal.without_effect()))
     }
 
-    /// Natural logarithm of the determinant of the reduced normal equations for the unit weight of the problem, and the cofactors of
-    /// every two parameters; None where some are not determined.
-    fn whole(
+    /// The normal equations at the initial values, some unknowns held.
+    fn formed<'a>(
         &self,
-        normal: &NormalEquations<'_, StarImages<'_>>,
-        problem: &Problem<StarImages<'_>>,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
-    ) -> Result<Option<(f64, Vec<f64>)>, AdjustError> {
-        let Some(log_determinant) = normal.log_determinant() else { return Ok(None) };
-        let layout = problem.layout();
-        let parameters: Vec<usize> = (layout.all_locals().end..layout.unknowns()).collect();
-        Ok(Some((log_determinant, normal.cofactors(&parameters, between)?)))
+        problem: &'a Problem<StarImages<'a>>,
+        held: &'a [usize],
+        pool: &'a ThreadPool,
+    ) -> Result<NormalEquations<'a, StarImages<'a>>, StellarError> {
+        let failed = |error| self.named(problem, error, pool);
+        let normal =
+            NormalEquations::form(problem, &problem.initial, held, pool, &mut go_on).map_err(failed)?;
+        if normal.sum_of_squares().is_finite() { Ok(normal) } else { Err(failed(AdjustError::NotFinite)) }
     }
 
     /// Says of which stars and parameters an error of the engine tells.
@@ -226,25 +221,25 @@ impl Calibration {
                 let named = found.into_iter().map(|unknowns| parameters_of(problem, unknowns));
                 StellarError::Undetermined(named.collect())
             }
-            AdjustError::NotFinite => match self.see(&problem.model) {
-                Err(unseen) => unseen,
-                Ok(()) => StellarError::NotFinite(vec![]),
-            },
+            AdjustError::NotFinite => {
+                let sight = self.initial();
+                let rows: Vec<Rows> =
+                    (0..self.images.len()).map(|image| problem.model.image(&sight, image)).collect();
+                StellarError::NotFinite(self.unseen(&rows))
+            }
             AdjustError::Interrupted => StellarError::Interrupted,
             AdjustError::OutOfMemory(bytes) => StellarError::OutOfMemory(bytes),
         }
     }
 
-    /// Refuses initial values that leave stars without images.
-    fn see(&self, model: &StarImages<'_>) -> Result<(), StellarError> {
-        let sight = self.initial();
-        let unseen =
-            |image: &usize| model.image(&sight, *image).constant.iter().any(|value| !value.is_finite());
-        let mut stars: Vec<usize> =
-            (0..self.images.len()).filter(unseen).map(|image| self.images[image].star).collect();
+    /// The stars that have no image in the equations of all images.
+    fn unseen(&self, rows: &[Rows]) -> Vec<usize> {
+        let images = self.images.iter().zip(rows);
+        let lost = images.filter(|(_, rows)| rows.constant.iter().any(|value| !value.is_finite()));
+        let mut stars: Vec<usize> = lost.map(|(image, _)| image.star).collect();
         stars.sort_unstable();
         stars.dedup();
-        if stars.is_empty() { Ok(()) } else { Err(StellarError::NotFinite(stars)) }
+        stars
     }
 
     /// Number of parameters: attitudes and common ones.
@@ -307,6 +302,12 @@ impl Calibration {
             .with_border(COMMON, vec![0..COMMON as u32; model.images.len()])?
             .with_ties(model.ties.iter().map(|(_, tie)| tie.clone()).collect())
     }
+}
+
+/// Natural logarithm of the determinant of the normal equations reduced to the parameters, and the cofactors of every two parameters;
+/// None where some are not determined.
+fn of_parameters(normal: &NormalEquations<'_, StarImages<'_>>) -> Option<(f64, Vec<f64>)> {
+    normal.log_determinant().map(|log_determinant| (log_determinant, normal.cofactors()))
 }
 
 /// The parameters among unknowns.

@@ -1,8 +1,11 @@
 //! The observation equations of stars, with exact partials.
 
+use rayon::prelude::*;
+
 use super::published::Tolerances;
-use super::{Attitude, COMMON, Calibration, Camera, INTERIOR, PlateImage, StellarError, TAU, Weights};
+use super::{Attitude, COMMON, Calibration, Camera, INTERIOR, Image, PlateImage, StellarError, TAU, Weights};
 use crate::adjustment::Model;
+use crate::geometry::Standard;
 use crate::normals::{GroupRows, Tie, TieRows};
 
 /// Root R, upper triangular, of a weight matrix P = R^T R.
@@ -53,6 +56,8 @@ pub struct Sight {
     pub tau: [f64; TAU],
     pub places: Vec<[f64; 2]>,
     pub parameters: Vec<f64>,
+    /// Standard coordinates of all images' stars, where they are asked for more than once.
+    seen: Vec<Standard>,
 }
 
 /// The two equations of a group before weighting; the first index is the row.
@@ -79,15 +84,22 @@ impl Sight {
             tau: std::array::from_fn(|k| common[INTERIOR + k]),
             places,
             parameters: parameters.to_vec(),
+            seen: vec![],
         }
+    }
+
+    /// Standard coordinates of the star of an image.
+    fn standard(&self, calibration: &Calibration, image: &Image) -> Standard {
+        let place = self.places[image.star];
+        let place = [place[0] + image.shift[0], place[1] + image.shift[1]];
+        calibration.station.standard(place, image.sidereal_time, &self.tau)
     }
 
     /// An image at a place: measured minus computed, with exact partials.
     pub fn image(&self, calibration: &Calibration, image: usize) -> Rows {
+        let seen = self.seen.get(image).copied();
         let image = &calibration.images[image];
-        let place = self.places[image.star];
-        let place = [place[0] + image.shift[0], place[1] + image.shift[1]];
-        let seen = calibration.station.standard(place, image.sidereal_time, &self.tau);
+        let seen = seen.unwrap_or_else(|| self.standard(calibration, image));
         let plate = self.camera.linearize(&self.attitudes[image.pointing], seen.coordinates);
         let chain = |row: &[f64; 2], k: usize, by: &dyn Fn(usize, usize) -> f64| {
             row[0] * by(0, k) + row[1] * by(1, k)
@@ -247,11 +259,20 @@ impl Calibration {
     }
 }
 
+/// Images that a thread takes at least.
+const AT_LEAST: usize = 256;
+
 impl Model for StarImages<'_> {
     type Prepared = Sight;
 
     fn prepare(&self, unknowns: &[f64]) -> Sight {
-        self.sight(unknowns)
+        let mut sight = self.sight(unknowns);
+        if let Partials::Exact = self.partials {
+            // Normal equations are formed and solved with the same ones.
+            let images = self.calibration.images.par_iter().with_min_len(AT_LEAST);
+            sight.seen = images.map(|image| sight.standard(self.calibration, image)).collect();
+        }
+        sight
     }
 
     /// Computes directions that are not known afresh from their first images.

@@ -6,8 +6,8 @@
 use rayon::ThreadPool;
 
 use super::model::{Partials, Rows, Sight};
-use super::{Attitude, COMMON, Calibration, Camera, StellarError, go_on, parameters_of};
-use crate::adjustment::{AdjustError, NormalEquations};
+use super::{Attitude, COMMON, Calibration, Camera, StellarError, of_parameters, parameters_of};
+use crate::adjustment::AdjustError;
 use crate::geometry::Displacement;
 
 /// Tolerances of the inner iterations.
@@ -54,24 +54,20 @@ impl Calibration {
     /// Stars or parameters that are not determined, stars without images.
     pub fn correction(&self, tolerances: &Tolerances, pool: &ThreadPool) -> Result<Correction, StellarError> {
         let problem = self.problem(1.0, Partials::Published(*tolerances))?;
-        self.see(&problem.model)?;
-        let failed = |error| self.named(&problem, error, pool);
-        let form = |held| NormalEquations::form(&problem, &problem.initial, held, pool, &mut go_on);
-        let first = form(&[]).map_err(failed)?;
+        let first = self.formed(&problem, &[], pool)?;
         let idle = first.without_effect();
-        let normal = if idle.is_empty() { first } else { form(&idle).map_err(failed)? };
+        let normal = if idle.is_empty() { first } else { self.formed(&problem, &idle, pool)? };
         if !normal.undetermined_locals().is_empty() {
-            return Err(failed(AdjustError::UndeterminedLocals(normal.undetermined_locals().to_vec())));
+            let locals = normal.undetermined_locals().to_vec();
+            return Err(self.named(&problem, AdjustError::UndeterminedLocals(locals), pool));
         }
         let undetermined = || {
             let combinations = normal.undetermined().into_iter();
             StellarError::Undetermined(combinations.map(|each| parameters_of(&problem, each)).collect())
         };
-        let whole = self.whole(&normal, &problem, &mut go_on).map_err(failed)?;
-        let (log_determinant, cofactors) = whole.ok_or_else(undetermined)?;
-        let corrections = normal.corrections(&mut go_on).map_err(failed)?;
+        let (log_determinant, cofactors) = of_parameters(&normal).ok_or_else(undetermined)?;
         Ok(Correction {
-            parameters: corrections[problem.layout().all_locals().end..].to_vec(),
+            parameters: normal.corrections(),
             cofactors,
             log_determinant,
             without_effect: parameters_of(&problem, idle.clone()),
@@ -142,7 +138,7 @@ fn approximate(
     // A direction behind the camera has no image.
     let q = if q > 0.0 { q } else { f64::NAN };
     let computed = [cx * m / q + xp + lens.shift[0] - epsilon * measured[1], cy * n / q + yp + lens.shift[1]];
-    let [[a1, b1, _], [a2, b2, _], [d, e, _]] = attitude.matrix;
+    let [[a1, a2, d], [b1, b2, e], _] = attitude.matrix.data.0;
     let (p1, p2) = ((computed[0] - xp) / cx, (computed[1] - yp) / cy);
     let (p3, p4, p6, p7) = (p1 * d - a1, p1 * e - b1, p2 * d - a2, p2 * e - b2);
     let p9 = p2 * b1 - p1 * b2;

@@ -1,6 +1,6 @@
 //! Which points take part in the adjustment.
 
-use super::{Block, PointImages, Screened};
+use super::Network;
 
 /// A point that was left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,9 +16,9 @@ pub struct Dropped {
 pub enum Reason {
     /// It has no image.
     NotPhotographed,
-    /// A pass point on one photograph only.
+    /// A pass point on one photo only.
     PassPointOnOnePhoto,
-    /// A control point on one photograph only, with more than one component not held.
+    /// A control point on one photo only, with more than one component not held.
     ControlPointOnOnePhoto,
 }
 
@@ -33,16 +33,16 @@ impl Reason {
     }
 }
 
-impl Block {
-    /// Leaves out points that their images and held components cannot determine.
+impl Network {
+    /// Leaves out points that their images and held components cannot determine, and those `left_out` already.
     ///
-    /// A point on one photograph stays when at most one of its components is not held: then there are at least four equations for
+    /// A point on one photo stays when at most one of its components is not held: then there are at least four equations for
     /// three unknowns (specification, open point 21).
-    pub(super) fn screen(&self) -> Screened {
+    pub(super) fn screen(&self, left_out: &[bool]) -> Screened {
         let all = self.point_images();
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
         let mut images = PointImages { start: vec![0], order: Vec::with_capacity(self.images.len()) };
-        for point in self.along_curve(&all) {
+        for point in self.along_curve(&all).into_iter().filter(|&point| !left_out[point]) {
             let own = all.of(point);
             let first_photo = own.first().map(|&image| self.images[image].photo);
             let one_photo = own.iter().all(|&image| Some(self.images[image].photo) == first_photo);
@@ -86,4 +86,17 @@ impl PointImages {
     pub fn of(&self, i: usize) -> &[usize] {
         &self.order[self.start[i]..self.start[i + 1]]
     }
+}
+
+/// The points that take part, neighbours together, and what was left out.
+pub(super) struct Screened {
+    pub points: Vec<usize>,
+    pub images: PointImages,
+    pub dropped: Vec<Dropped>,
+}
+
+/// The images of the points that take part, point by point: those of the i-th are `order[start[i]..start[i + 1]]`.
+pub(super) struct PointImages {
+    pub start: Vec<usize>,
+    pub order: Vec<usize>,
 }

@@ -1,0 +1,213 @@
+//! Attitudes as numbers: what files and users mean by them, and how the numbers move with a rotation step.
+//!
+//! A is the matrix photo to object of a [`super::Pose`], which steps by A <- A Exp(rho). With Mx, My, Mz the matrices that turn
+//! the axes about x (y towards z), y (z towards x) and z (x towards y), each representation has A from its numbers, its numbers from A,
+//! and K with rho = K d(numbers), so that cofactors go over by K^-1 Q K^-T. The middle angle comes from `atan2`: an arcsine would lose
+//! half of its digits near 90 degrees.
+
+use std::f64::consts::PI;
+
+use super::angle_axis::{angle_axis_rotation, right_jacobian_inverse, rotation_angle_axis};
+use super::rotation::rotation;
+use super::{Matrix3, Vector3};
+
+/// The sense of omega, phi, kappa.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RotationSense {
+    /// u = M d
+    GroundToPhoto,
+    /// u = M^T d
+    PhotoToGround,
+}
+
+/// Vision axes (x right, y down, z forward) from photo axes, and back.
+pub fn vision_axes() -> Matrix3 {
+    Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))
+}
+
+/// What three numbers of an attitude mean; all angles in radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AttitudeNumbers {
+    /// omega, phi, kappa: A = (Mz My Mx)^T ground to photo, A = Mz My Mx photo to ground.
+    OmegaPhiKappa(RotationSense),
+    /// phi, omega, kappa (phi primary): A = (Mz(kappa) Mx(omega) My(phi))^T.
+    PhiOmegaKappa,
+    /// Azimuth of the direction of view, clockwise from +Y; tilt from the nadir; swing, clockwise from the photo's +y to the nadir
+    /// point: A = (Mz(swing + pi) Mx(tilt) Mz(-azimuth))^T.
+    AzimuthTiltSwing,
+    /// Yaw clockwise from north, pitch nose up, roll right wing down; object axes east, north, up. The matrix is the boresight B,
+    /// photo from body axes (forward, right, down): A = E R(yaw, pitch, roll) B^T.
+    YawPitchRoll(Matrix3),
+    /// A = Exp(r).
+    RotationVector,
+    /// A^T = Exp(r): BAL, Bundler.
+    RotationVectorToPhoto,
+    /// R = F A^T = Exp(r), F being [`vision_axes`]: OpenCV.
+    RotationVectorToVision,
+}
+
+/// Mx, My or Mz (axis 0, 1, 2).
+fn turn(axis: usize, angle: f64) -> Matrix3 {
+    let (sin, cos) = angle.sin_cos();
+    let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mut m = Matrix3::identity();
+    (m[(j, j)], m[(j, k)]) = (cos, sin);
+    (m[(k, j)], m[(k, k)]) = (-sin, cos);
+    m
+}
+
+/// East, north, up from north, east, down; its own inverse.
+fn level_axes() -> Matrix3 {
+    Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0)
+}
+
+/// K of omega, phi, kappa where M = Mz My Mx = A^T.
+fn omega_phi_kappa([_, phi, kappa]: [f64; 3]) -> Matrix3 {
+    let ((sp, cp), (sk, ck)) = (phi.sin_cos(), kappa.sin_cos());
+    Matrix3::new(cp * ck, sk, 0.0, -cp * sk, ck, 0.0, sp, 0.0, 1.0)
+}
+
+impl AttitudeNumbers {
+    /// The boresight, photo from body, of a camera that looks at the nadir with the top of the picture forward, turned `quarters`
+    /// times to the right (1: top of the picture to the right wing).
+    pub fn nadir_boresight(quarters: u8) -> Matrix3 {
+        (level_axes() * turn(2, 0.5 * PI * f64::from(quarters))).transpose()
+    }
+
+    /// A from the numbers.
+    pub fn attitude(&self, numbers: [f64; 3]) -> Matrix3 {
+        let [p, q, r] = numbers;
+        match self {
+            Self::OmegaPhiKappa(RotationSense::GroundToPhoto) => rotation(numbers).transpose(),
+            Self::OmegaPhiKappa(RotationSense::PhotoToGround) => rotation(numbers),
+            Self::PhiOmegaKappa => (turn(2, r) * turn(0, q) * turn(1, p)).transpose(),
+            Self::AzimuthTiltSwing => (turn(2, r + PI) * turn(0, q) * turn(2, -p)).transpose(),
+            Self::YawPitchRoll(boresight) => {
+                let body = (turn(0, r) * turn(1, q) * turn(2, p)).transpose();
+                level_axes() * body * boresight.transpose()
+            }
+            Self::RotationVector => angle_axis_rotation(&numbers.into()),
+            Self::RotationVectorToPhoto => angle_axis_rotation(&numbers.into()).transpose(),
+            Self::RotationVectorToVision => angle_axis_rotation(&numbers.into()).transpose() * vision_axes(),
+        }
+    }
+
+    /// The numbers of A. At a singular attitude (see [`AttitudeNumbers::is_singular`]) the last angle is zero and the first takes
+    /// the sum; of a vertical photo it is the azimuth that is zero.
+    pub fn numbers(&self, attitude: &Matrix3) -> [f64; 3] {
+        let found = self.regular_numbers(attitude);
+        if !self.is_singular(found) {
+            return found;
+        }
+        let m = attitude.transpose();
+        match self {
+            Self::OmegaPhiKappa(sense) => {
+                let m = if *sense == RotationSense::GroundToPhoto { m } else { *attitude };
+                [(found[1].signum() * m[(0, 1)]).atan2(m[(1, 1)]), found[1], 0.0]
+            }
+            // With kappa = 0 the first row of M is cos phi, 0, -sin phi.
+            Self::PhiOmegaKappa => [(-m[(0, 2)]).atan2(m[(0, 0)]), found[1], 0.0],
+            // With azimuth = 0 the first row of M is cos, sin cos t, sin sin t of swing + pi.
+            Self::AzimuthTiltSwing => [0.0, found[1], (-m[(1, 0)]).atan2(m[(0, 0)]) - PI].map(wrapped),
+            Self::YawPitchRoll(boresight) => {
+                let body = level_axes() * attitude * boresight;
+                // With roll = 0 the second column is -sin yaw, cos yaw, 0.
+                [(-body[(0, 1)]).atan2(body[(1, 1)]), found[1], 0.0]
+            }
+            Self::RotationVector | Self::RotationVectorToPhoto | Self::RotationVectorToVision => found,
+        }
+    }
+
+    fn regular_numbers(&self, a: &Matrix3) -> [f64; 3] {
+        // M = A^T: m_ij = a_ji
+        let m = |i: usize, j: usize| a[(j - 1, i - 1)];
+        let sequential = |m: &dyn Fn(usize, usize) -> f64| {
+            [(-m(3, 2)).atan2(m(3, 3)), m(3, 1).atan2(m(1, 1).hypot(m(2, 1))), (-m(2, 1)).atan2(m(1, 1))]
+        };
+        match self {
+            Self::OmegaPhiKappa(RotationSense::GroundToPhoto) => sequential(&m),
+            Self::OmegaPhiKappa(RotationSense::PhotoToGround) => sequential(&|i, j| a[(i - 1, j - 1)]),
+            Self::PhiOmegaKappa => {
+                [m(3, 1).atan2(m(3, 3)), (-m(3, 2)).atan2(m(1, 2).hypot(m(2, 2))), m(1, 2).atan2(m(2, 2))]
+            }
+            Self::AzimuthTiltSwing => [
+                (-m(3, 1)).atan2(-m(3, 2)),
+                m(3, 1).hypot(m(3, 2)).atan2(m(3, 3)),
+                (-m(1, 3)).atan2(-m(2, 3)),
+            ],
+            Self::YawPitchRoll(boresight) => {
+                let body = level_axes() * a * boresight;
+                let r = |i: usize, j: usize| body[(i - 1, j - 1)];
+                [r(2, 1).atan2(r(1, 1)), (-r(3, 1)).atan2(r(1, 1).hypot(r(2, 1))), r(3, 2).atan2(r(3, 3))]
+            }
+            Self::RotationVector => rotation_angle_axis(a).into(),
+            Self::RotationVectorToPhoto => rotation_angle_axis(&a.transpose()).into(),
+            Self::RotationVectorToVision => rotation_angle_axis(&(vision_axes() * a.transpose())).into(),
+        }
+    }
+
+    /// K, with rho = K d(numbers).
+    pub fn rates(&self, numbers: [f64; 3]) -> Matrix3 {
+        let [_, q, r] = numbers;
+        let inverse = |rates: Matrix3| rates.try_inverse().unwrap_or_else(|| Matrix3::repeat(f64::NAN));
+        match self {
+            Self::OmegaPhiKappa(RotationSense::GroundToPhoto) => omega_phi_kappa(numbers),
+            Self::OmegaPhiKappa(RotationSense::PhotoToGround) => {
+                -rotation(numbers).tr_mul(&omega_phi_kappa(numbers))
+            }
+            Self::PhiOmegaKappa => {
+                let turned = turn(2, r);
+                Matrix3::from_columns(&[
+                    turned * turn(0, q) * Vector3::y(),
+                    turned.column(0).into(),
+                    Vector3::z(),
+                ])
+            }
+            Self::AzimuthTiltSwing => {
+                let turned = turn(2, r + PI);
+                Matrix3::from_columns(&[
+                    -(turned * turn(0, q) * Vector3::z()),
+                    turned.column(0).into(),
+                    Vector3::z(),
+                ])
+            }
+            Self::YawPitchRoll(boresight) => {
+                let ((sq, cq), (sr, cr)) = (q.sin_cos(), r.sin_cos());
+                boresight * Matrix3::new(-sq, 0.0, 1.0, sr * cq, cr, 0.0, cr * cq, -sr, 0.0)
+            }
+            Self::RotationVector => inverse(right_jacobian_inverse(&numbers.into())),
+            Self::RotationVectorToPhoto => -inverse(right_jacobian_inverse(&-Vector3::from(numbers))),
+            Self::RotationVectorToVision => {
+                -(vision_axes() * inverse(right_jacobian_inverse(&-Vector3::from(numbers))))
+            }
+        }
+    }
+
+    /// Whether the numbers are undetermined to eight digits: the middle angle within 1e-8 of where the other two turn about one axis.
+    pub fn is_singular(&self, numbers: [f64; 3]) -> bool {
+        const NEAR: f64 = 1e-8;
+        match self {
+            Self::OmegaPhiKappa(_) | Self::PhiOmegaKappa | Self::YawPitchRoll(_) => {
+                numbers[1].cos().abs() < NEAR
+            }
+            Self::AzimuthTiltSwing => numbers[1].sin().abs() < NEAR,
+            Self::RotationVector | Self::RotationVectorToPhoto | Self::RotationVectorToVision => false,
+        }
+    }
+
+    /// Cofactors of the numbers from those of the rotation step, K^-1 Q K^-T; None at a singular attitude.
+    pub fn cofactors(&self, numbers: [f64; 3], of_step: &Matrix3) -> Option<Matrix3> {
+        let inverse = self.rates(numbers).try_inverse().filter(|_| !self.is_singular(numbers))?;
+        Some(inverse * of_step * inverse.transpose())
+    }
+}
+
+/// An angle within half a turn of zero.
+fn wrapped(angle: f64) -> f64 {
+    angle - 2.0 * PI * (angle / (2.0 * PI)).round()
+}
+
+/// The partials of the unit quaternion w, x, y, z of A with respect to rho: dq = 1/2 q (0, rho), as the rows of w, x, y, z.
+pub fn quaternion_by_step([w, x, y, z]: [f64; 4]) -> [Vector3; 4] {
+    [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]].map(|row| 0.5 * Vector3::from(row))
+}

@@ -1,0 +1,120 @@
+//! The camera of Bundler and of "Bundle Adjustment in the Large" (Agarwal, Snavely, Seitz and Szeliski 2010).
+
+use super::{CameraModel, Image};
+use crate::geometry::Vector3;
+
+/// Radial distortion, forward: a function of ideal coordinates.
+///
+/// ```text
+/// p = -(u1, u2) / u3,    image = f (1 + k1 |p|^2 + k2 |p|^4) p
+/// ```
+///
+/// Image coordinates are pixels counted from the principal point, x to the right and y up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bal {
+    /// f in pixels.
+    pub focal_length: f64,
+    /// k1, k2.
+    pub radial: [f64; 2],
+}
+
+/// Steps of Newton's method at the most.
+const STEPS: usize = 50;
+
+impl Bal {
+    /// 1 + k1 q + k2 q^2, q being |p|^2.
+    fn radial_factor(&self, square: f64) -> f64 {
+        1.0 + square * (self.radial[0] + square * self.radial[1])
+    }
+
+    /// d (r times the radial factor) / dr = 1 + 3 k1 q + 5 k2 q^2: positive while the model is one-to-one.
+    fn slope(&self, square: f64) -> f64 {
+        1.0 + square * (3.0 * self.radial[0] + 5.0 * square * self.radial[1])
+    }
+
+    /// |p| up to which the model is one-to-one: the root of the slope.
+    fn domain(&self) -> f64 {
+        let [k1, k2] = self.radial;
+        // 1 + 3 k1 q + 5 k2 q^2 = 0 as q = 2 / (-b + root): the smallest positive root, also where k2 = 0.
+        let (b, discriminant) = (3.0 * k1, 9.0 * k1 * k1 - 20.0 * k2);
+        let root = discriminant.sqrt();
+        let candidates = [2.0 / (-b + root), 2.0 / (-b - root)];
+        let positive = candidates.into_iter().filter(|q| *q > 0.0);
+        positive.fold(f64::INFINITY, f64::min).sqrt()
+    }
+}
+
+impl CameraModel for Bal {
+    type Parameters = [f64; 3];
+
+    fn with_parameters([focal_length, k1, k2]: [f64; 3]) -> Self {
+        Self { focal_length, radial: [k1, k2] }
+    }
+
+    fn parameters(&self) -> [f64; 3] {
+        [self.focal_length, self.radial[0], self.radial[1]]
+    }
+
+    fn scale(&self) -> f64 {
+        self.focal_length.abs()
+    }
+
+    #[inline]
+    fn image(&self, u: &Vector3) -> [f64; 2] {
+        let p = [u.x / -u.z, u.y / -u.z];
+        let square = p[0] * p[0] + p[1] * p[1];
+        p.map(|value| self.focal_length * self.radial_factor(square) * value)
+    }
+
+    #[inline(always)]
+    fn linearize(&self, u: &Vector3) -> Image<[f64; 3]> {
+        let depth = -u.z;
+        let f = self.focal_length;
+        let p = [u.x / depth, u.y / depth];
+        let square = p[0] * p[0] + p[1] * p[1];
+        let radial = self.radial_factor(square);
+        let slope = 2.0 * (self.radial[0] + 2.0 * square * self.radial[1]);
+        let row = |own: usize| {
+            // With respect to p, then to u; depth falls as u3 rises.
+            let mut by_p = [f * slope * p[own] * p[0], f * slope * p[own] * p[1]];
+            by_p[own] += f * radial;
+            let along = by_p[0] * p[0] + by_p[1] * p[1];
+            Vector3::new(by_p[0], by_p[1], along) / depth
+        };
+        Image {
+            xy: p.map(|value| f * radial * value),
+            by_u: [row(0), row(1)],
+            by_parameters: p.map(|value| [radial * value, f * square * value, f * square * square * value]),
+        }
+    }
+
+    /// Newton's method for the radius, kept within the domain where the model is one-to-one.
+    fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
+        let distorted = xy.map(|value| value / self.focal_length);
+        let radius = distorted[0].hypot(distorted[1]);
+        let (mut low, mut high) = (0.0, self.domain());
+        if !radius.is_finite() || radius >= high * self.radial_factor(high * high) {
+            return None;
+        }
+        let mut ideal = radius.min(high);
+        for _ in 0..STEPS {
+            let square = ideal * ideal;
+            let excess = ideal * self.radial_factor(square) - radius;
+            if excess > 0.0 {
+                high = ideal
+            } else {
+                low = ideal
+            }
+            let next = ideal - excess / self.slope(square);
+            let inside = next >= low && next <= high;
+            let next = if inside { next } else { 0.5 * (low + high) };
+            let change = (next - ideal).abs();
+            ideal = next;
+            if change <= 4.0 * f64::EPSILON * ideal {
+                break;
+            }
+        }
+        let ratio = if radius > 0.0 { ideal / radius } else { 1.0 };
+        Some(Vector3::new(ratio * distorted[0], ratio * distorted[1], -1.0).normalize())
+    }
+}

@@ -1,0 +1,92 @@
+//! The object space: coordinates of points and photos, and the cartesian positions that they stand for.
+
+use super::ellipsoid::Ellipsoid;
+use super::{Matrix3, Vector3};
+
+/// The coordinates in which positions of photos and points are given and adjusted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ObjectSpace {
+    /// X, Y, Z.
+    Rectangular,
+    /// Longitude, latitude (radians) and height; attitudes refer to the local vertical frame at each station.
+    Geographic(Ellipsoid),
+}
+
+impl ObjectSpace {
+    /// The coordinates of a cartesian position.
+    pub fn coordinates(self, position: Vector3) -> [f64; 3] {
+        match self {
+            ObjectSpace::Rectangular => position.into(),
+            ObjectSpace::Geographic(ellipsoid) => ellipsoid.geographic(position),
+        }
+    }
+
+    /// The cartesian position of given coordinates.
+    pub fn cartesian(self, coordinates: [f64; 3]) -> Vector3 {
+        match self {
+            ObjectSpace::Rectangular => coordinates.into(),
+            ObjectSpace::Geographic(ellipsoid) => ellipsoid.geocentric(coordinates),
+        }
+    }
+
+    /// The cartesian position and, as columns, its partials with respect to the coordinates.
+    #[inline]
+    pub fn cartesian_with_partials(self, coordinates: [f64; 3]) -> (Vector3, Matrix3) {
+        match self {
+            ObjectSpace::Rectangular => (coordinates.into(), Matrix3::identity()),
+            ObjectSpace::Geographic(ellipsoid) => ellipsoid.geocentric_with_partials(coordinates),
+        }
+    }
+}
+
+/// A point: its cartesian position and the partials of that with respect to the three unknown coordinates.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    position: Vector3,
+    partials: Matrix3,
+}
+
+impl Point {
+    /// The point with the given coordinates of the object space.
+    #[inline]
+    pub fn new(space: ObjectSpace, coordinates: [f64; 3]) -> Self {
+        let (position, partials) = space.cartesian_with_partials(coordinates);
+        Self { position, partials }
+    }
+
+    /// The cartesian position.
+    #[inline]
+    pub fn position(&self) -> Vector3 {
+        self.position
+    }
+
+    /// Partials of the cartesian position with respect to the three coordinates, as columns.
+    #[inline]
+    pub fn partials(&self) -> &Matrix3 {
+        &self.partials
+    }
+
+    /// The point where the lift puts it.
+    pub fn lifted(&self, lift: &Lift) -> Self {
+        Self { position: self.position + lift.vector, partials: self.partials + lift.by_point }
+    }
+}
+
+/// By how much one photo sees a point away from its place (see [`super::refraction`]): a cartesian vector, and its partials
+/// as columns.
+#[derive(Debug, Clone, Copy)]
+pub struct Lift {
+    /// From the point to where it is seen.
+    pub vector: Vector3,
+    /// With respect to the position of the photo.
+    pub by_photo: Matrix3,
+    /// With respect to the coordinates of the point.
+    pub by_point: Matrix3,
+}
+
+impl Lift {
+    /// The point is seen where it is.
+    pub fn none() -> Self {
+        Self { vector: Vector3::zeros(), by_photo: Matrix3::zeros(), by_point: Matrix3::zeros() }
+    }
+}

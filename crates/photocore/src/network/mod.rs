@@ -1,0 +1,278 @@
+//! Networks of photos: poses, cameras, points and images adjusted together.
+//!
+//! Unknowns are the pose of every photo, the parameters of its camera unless they are held, and the coordinates of every point,
+//! each weighted from free to fixed; observations are image coordinates. A block of aerial photographs (GIANT guide, sections 4 to 9)
+//! has cameras that are held, and poses in angles; a collection "in the large" (Agarwal, Snavely, Seitz and Szeliski 2010) has a
+//! camera of its own for every photo, and poses in vectors. Positions are X, Y, Z or longitude, latitude, height.
+//!
+//! Two photos over four control points:
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! use photocore::geometry::{self, ObjectSpace, Perspective, PoseNumbers, RotationSense};
+//! use photocore::network::{Camera, Image, Network, Options, Photo, Point};
+//!
+//! let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
+//! let camera = Perspective { principal_distance: -150.0 };
+//! let corners = [[0.0, 0.0, 0.0], [900.0, 0.0, 40.0], [0.0, 900.0, 70.0], [900.0, 900.0, 10.0]];
+//! let stations = [[200.0, 450.0, 1500.0], [700.0, 450.0, 1500.0]];
+//! let mut images = vec![];
+//! for (point, corner) in corners.into_iter().enumerate() {
+//!     for (photo, station) in stations.into_iter().enumerate() {
+//!         let seen = geometry::Photo::new(space, sense, station, [0.01, -0.02, 0.1], -150.0);
+//!         let xy = seen.project(&geometry::Point::new(space, corner));
+//!         images.push(Image { photo, point, xy, sd: [0.005; 2] });
+//!     }
+//! }
+//! // Poses are known to some metres and degrees.
+//! let photo = |[x, y, z]: [f64; 3]| {
+//!     let pose = [x + 5.0, y - 4.0, z + 9.0, 0.0, 0.0, 0.0];
+//!     Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 }
+//! };
+//! let network = Network {
+//!     space,
+//!     poses: PoseNumbers::Angles(sense),
+//!     refraction: None,
+//!     cameras: vec![Camera::held(camera.into())],
+//!     photos: stations.map(photo).to_vec(),
+//!     points: corners.map(|coordinates| Point { coordinates, sd: [0.02; 3] }).to_vec(),
+//!     images,
+//! };
+//! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+//! let solution = network.adjust(&Options::default(), &pool, &mut |_| ControlFlow::Continue(()))?;
+//! let photo = &solution.photos[1];
+//! assert!((photo.pose[0] - 700.0).abs() < 1e-6 && (photo.pose[5] - 0.1).abs() < 1e-9);
+//! // Four points seen twice, and their coordinates, less twelve unknowns of the photos and twelve of the points.
+//! assert_eq!(solution.degrees_of_freedom, 16 + 12 - 12 - 12);
+//! assert!(photo.cofactors[0].sqrt() < 1.0, "standard deviation of the station's X in metres");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod error;
+mod model;
+mod neighbourhood;
+mod precision;
+mod problem;
+mod screening;
+mod solution;
+mod start;
+
+use std::ops::ControlFlow;
+
+use rayon::ThreadPool;
+
+use crate::adjustment::{self, Adjustment, Event};
+use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
+use crate::normals::Ordering;
+
+pub use error::NetworkError;
+pub use precision::Coarse;
+pub use screening::{Dropped, Reason};
+pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+
+/// A photo as it is known beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct Photo {
+    /// Initial values of the six unknowns of its pose (see [`PoseNumbers`]); those of fixed ones.
+    pub pose: [f64; 6],
+    /// Observed values; those count that are weighted. Angles, and longitudes, may be whole turns apart.
+    pub observed: [f64; 6],
+    /// Standard deviations: infinite free, zero fixed.
+    pub sd: [f64; 6],
+    /// Index of its camera.
+    pub camera: usize,
+}
+
+/// A camera as it is known beforehand.
+#[derive(Debug, Clone)]
+pub struct Camera {
+    /// The camera with its initial (and, where weighted, observed) parameters.
+    pub camera: geometry::Camera,
+    /// Standard deviations of the parameters: infinite free, zero fixed. A camera with other ones than zeros belongs to one photo.
+    pub sd: Vec<f64>,
+}
+
+impl Camera {
+    /// A camera whose parameters are known.
+    pub fn held(camera: geometry::Camera) -> Self {
+        Self { camera, sd: vec![0.0; camera.parameter_names().len()] }
+    }
+
+    /// Whether its parameters are known.
+    pub fn is_held(&self) -> bool {
+        self.sd.iter().all(|&sd| sd == 0.0)
+    }
+}
+
+/// A point as it is known beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    /// Coordinates in the object space; NaN where unknown.
+    pub coordinates: [f64; 3],
+    /// Standard deviations: finite for held components (zero fixed), infinite for all others.
+    pub sd: [f64; 3],
+}
+
+impl Point {
+    /// Which components are held.
+    pub fn held(&self) -> [bool; 3] {
+        self.sd.map(f64::is_finite)
+    }
+}
+
+/// An image point.
+#[derive(Debug, Clone, Copy)]
+pub struct Image {
+    /// Index of its photo.
+    pub photo: usize,
+    /// Index of its point.
+    pub point: usize,
+    /// Image coordinates in the unit of the camera.
+    pub xy: [f64; 2],
+    /// Their standard deviations.
+    pub sd: [f64; 2],
+}
+
+/// A network of photos.
+#[derive(Debug, Clone)]
+pub struct Network {
+    /// Coordinates of positions and points.
+    pub space: ObjectSpace,
+    /// What the six unknowns of a pose are.
+    pub poses: PoseNumbers,
+    /// What bends the rays, applied in every iteration; None for images that are free of it.
+    pub refraction: Option<Refraction>,
+    /// Its cameras.
+    pub cameras: Vec<Camera>,
+    /// Its photos.
+    pub photos: Vec<Photo>,
+    /// Its points.
+    pub points: Vec<Point>,
+    /// Its image points.
+    pub images: Vec<Image>,
+}
+
+/// What the variance of unit weight is based on (GIANT guide, Appendix E).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum UnitVariance {
+    /// Photos completely free: image coordinates and ground control count, weights of poses and cameras do not.
+    Free,
+    /// Photos constrained: every weighted quantity counts.
+    #[default]
+    Constrained,
+    /// Set to one.
+    Unity,
+}
+
+/// Where points start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Start {
+    /// Where their (straight) rays meet, but for the components that are held.
+    #[default]
+    Intersected,
+    /// Their given coordinates where these are known, otherwise as above.
+    Given,
+}
+
+/// How to adjust a network.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// When to stop, and what to compute.
+    pub adjustment: adjustment::Options,
+    /// How to order the photos.
+    pub ordering: Ordering,
+    /// What the variance of unit weight is based on.
+    pub unit_variance: UnitVariance,
+    /// Where points start from.
+    pub start: Start,
+    /// Whether photos without images stay as they are; otherwise their unknowns are unknowns, and determined only if they are weighted.
+    pub hold_unused: bool,
+    /// Bytes that the adjustment may take (see [`crate::normals::System::memory`]); None for any number.
+    pub memory: Option<usize>,
+}
+
+impl Default for Options {
+    /// Strict least squares of constrained photos, points from where their rays meet.
+    fn default() -> Self {
+        Self {
+            adjustment: adjustment::Options::default(),
+            ordering: Ordering::Auto,
+            unit_variance: UnitVariance::default(),
+            start: Start::default(),
+            hold_unused: false,
+            memory: None,
+        }
+    }
+}
+
+impl Network {
+    /// Adjusts the network by least squares.
+    ///
+    /// Points that their image points cannot determine are left out first (see [`Dropped`]). So are points that run into the station
+    /// of a photo: the adjustment goes on without them from where it was. `watch` is called on the calling thread; when it breaks, the
+    /// adjustment stops.
+    ///
+    /// # Errors
+    /// A network that contradicts itself, has nothing to adjust, or leaves unknowns undetermined; an interruption.
+    pub fn adjust(
+        &self,
+        options: &Options,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solution, NetworkError> {
+        self.check()?;
+        let mut left_out = vec![false; self.points.len()];
+        let mut before: Option<(Adjustment, problem::Reached)> = None;
+        loop {
+            let screened = self.screen(&left_out);
+            if screened.points.is_empty() {
+                return Err(NetworkError::Empty);
+            }
+            let reached = before.as_ref().map(|(_, reached)| reached);
+            let assembled = pool.install(|| self.assemble(options, screened, reached))?;
+            let problem = &assembled.problem;
+            let needed = problem.system.memory();
+            if let Some(available) = options.memory.filter(|&available| needed > available) {
+                return Err(NetworkError::Memory { needed, available });
+            }
+            let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
+            let mut own = options.adjustment;
+            own.max_iterations = own.max_iterations.saturating_sub(done);
+            let adjusted = adjustment::adjust(problem, &own, pool, watch);
+            let mut adjusted = adjusted.map_err(|error| NetworkError::new(error, &assembled.points))?;
+            let earlier = before.take();
+            adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
+            if adjusted.collapsed.is_empty() {
+                let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
+                return Ok(Solution::new(self, options, &assembled, adjusted, collapsed));
+            }
+            adjusted.collapsed.iter().for_each(|&local| left_out[assembled.points[local]] = true);
+            let reached = assembled.reached(&adjusted.unknowns, self.points.len());
+            before = Some((adjusted, reached));
+        }
+    }
+
+    /// Refuses a network that contradicts itself.
+    fn check(&self) -> Result<(), NetworkError> {
+        let counts = (self.photos.len(), self.points.len());
+        let outside = |image: &Image| image.photo >= counts.0 || image.point >= counts.1;
+        if let Some(bad) = self.images.iter().position(outside) {
+            return Err(NetworkError::Index(bad));
+        }
+        let mut users = vec![0_usize; self.cameras.len()];
+        for (index, photo) in self.photos.iter().enumerate() {
+            *users.get_mut(photo.camera).ok_or(NetworkError::NoCamera(index))? += 1;
+        }
+        for (index, (camera, users)) in self.cameras.iter().zip(users).enumerate() {
+            if camera.sd.len() != camera.camera.parameter_names().len() {
+                return Err(NetworkError::CameraDeviations(index));
+            }
+            if users > 1 && !camera.is_held() {
+                return Err(NetworkError::SharedCamera(index));
+            }
+        }
+        let cartesian = self.space == ObjectSpace::Rectangular && self.refraction.is_none();
+        if self.poses == PoseNumbers::Vectors && !cartesian { Err(NetworkError::Vectors) } else { Ok(()) }
+    }
+}

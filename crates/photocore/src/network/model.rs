@@ -1,0 +1,263 @@
+//! The observation equations of a network.
+
+use rayon::prelude::*;
+
+use super::{Image, Point};
+use crate::adjustment::Model;
+use crate::geometry::camera::each_camera;
+use crate::geometry::{
+    self, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction, Vertical,
+};
+use crate::normals::GroupRows;
+
+/// Images of points by photos: the local blocks are the points, the kept blocks the photos with their pose and, unless it is held,
+/// their camera.
+#[derive(Debug)]
+pub struct Bundle {
+    pub space: ObjectSpace,
+    pub poses: PoseNumbers,
+    /// None where images are free of refraction.
+    pub refraction: Option<Refraction>,
+    /// Of each photo, with the parameters that it starts from.
+    pub cameras: Vec<Camera>,
+    /// The unknowns of photo i are `first[i]..first[i + 1]` of the kept ones: six of the pose, then those of the camera.
+    pub first: Vec<usize>,
+    /// The points; coordinates counted from the local origin.
+    pub points: Vec<Point>,
+    /// The images, point by point: the groups of observations.
+    pub images: Vec<Image>,
+    /// The images of point i are `images[start[i]..start[i + 1]]`.
+    pub start: Vec<usize>,
+    /// Index of each of them in the network.
+    pub order: Vec<usize>,
+    /// How many images each photo has.
+    pub images_on: Vec<usize>,
+    /// Whether the position of anything is weighted or fixed: then the datum is the user's.
+    pub placed: bool,
+}
+
+/// Photos and points at given values of the unknowns.
+#[derive(Debug)]
+pub struct Stations {
+    pub photos: Vec<Station>,
+    pub points: Vec<geometry::Point>,
+    refracted: Option<Refracted>,
+}
+
+/// A photo at given values of its unknowns.
+#[derive(Debug, Clone, Copy)]
+pub struct Station {
+    pub orientation: Orientation,
+    pub camera: Camera,
+}
+
+impl Station {
+    /// The ray of an image position; None where no direction has it.
+    pub fn ray(&self, xy: [f64; 2]) -> Option<Ray> {
+        self.camera.direction(xy).map(|direction| self.orientation.ray(&direction))
+    }
+}
+
+/// What refraction needs besides.
+#[derive(Debug)]
+struct Refracted {
+    refraction: Refraction,
+    at_photos: Vec<Vertical>,
+    at_points: Vec<Vertical>,
+}
+
+impl Refracted {
+    /// Out of line, so that images without refraction do not pay for it.
+    #[inline(never)]
+    fn write(&self, stations: &Stations, image: &Image, local: usize, rows: &mut GroupRows<'_>) {
+        let Station { orientation, camera } = &stations.photos[image.photo];
+        let (from, to) = (&self.at_photos[image.photo], &self.at_points[local]);
+        let point = &stations.points[local];
+        let lift = self.refraction.lift(orientation, from, point, to);
+        let (lifted, point) = (orientation.under(&lift), point.lifted(&lift));
+        each_camera!(camera, camera => write(&lifted, camera, &point, image, rows));
+    }
+}
+
+/// The two equations of an image: observed minus computed, and the partials of the computed.
+#[inline(always)]
+fn write<C: CameraModel>(
+    orientation: &Orientation,
+    camera: &C,
+    point: &geometry::Point,
+    image: &Image,
+    rows: &mut GroupRows<'_>,
+) {
+    let u = orientation.sight(point);
+    let projection = orientation.projection(&u, &camera.linearize(&u), point);
+    let width = rows.kept.len() / 2;
+    for row in 0..2 {
+        rows.constant[row] = image.xy[row] - projection.xy[row];
+        rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
+        rows.kept[width * row..][..6].copy_from_slice(&projection.photo[row]);
+        if width > 6 {
+            rows.kept[width * row + 6..][..width - 6].copy_from_slice(projection.camera[row].as_ref());
+        }
+    }
+}
+
+/// A point has run into a station when its share in what the station learns is so many times that of the others in the mean: it is
+/// ten thousand times nearer than they are, and rounding leaves eight digits of what they say.
+const NEAR: f64 = 1e8;
+/// A point a hundred times nearer than the others is on its way there,
+const ON_ITS_WAY: f64 = 1e4;
+/// when no other photo tells it from the station: their images there, before and after a step, are closer than so many standard
+/// deviations.
+const SAME_PLACE: f64 = 3.0;
+
+/// A point much nearer to a station than the others.
+struct Approach {
+    point: usize,
+    photo: usize,
+    /// Its share in what the station learns, in those of the others in the mean.
+    share: f64,
+}
+
+impl Bundle {
+    /// The photos at given values of their unknowns.
+    pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
+        let photo = |photo: usize| {
+            let (pose, camera) = unknowns[self.first[photo]..self.first[photo + 1]].split_at(6);
+            let pose = std::array::from_fn(|k| pose[k]);
+            let own = self.cameras[photo];
+            Station {
+                orientation: Orientation::new(self.poses, self.space, &pose),
+                camera: own.with_parameters(camera).unwrap_or(own),
+            }
+        };
+        (0..self.cameras.len()).map(photo).collect()
+    }
+
+    /// The images of a point.
+    pub fn images_of(&self, point: usize) -> &[Image] {
+        &self.images[self.start[point]..self.start[point + 1]]
+    }
+
+    /// Points much nearer to a station than the others that it sees.
+    ///
+    /// The image of a point turns by 1 / distance when point or station move; what its station learns from it, and loses again when
+    /// the point is eliminated, is the square of that.
+    fn approaches(&self, stations: &Stations) -> Vec<Approach> {
+        let share = |point: usize, image: &Image| {
+            let centre = stations.photos[image.photo].orientation.centre();
+            (stations.points[point].position() - centre).norm_squared().recip()
+        };
+        let mut shares = vec![0.0; stations.photos.len()];
+        for point in 0..self.points.len() {
+            self.images_of(point).iter().for_each(|image| shares[image.photo] += share(point, image));
+        }
+        let approach = |point: usize, image: &Image| {
+            let own = share(point, image);
+            let others =
+                (shares[image.photo] - own).max(0.0) / (self.images_on[image.photo] as f64 - 1.0).max(1.0);
+            let near = others > 0.0 && own > ON_ITS_WAY * others;
+            near.then(|| Approach { point, photo: image.photo, share: own / others })
+        };
+        let of_point = |point| self.images_of(point).iter().filter_map(move |image| approach(point, image));
+        (0..self.points.len()).flat_map(of_point).collect()
+    }
+
+    /// Whether nothing but its image on that photo tells a point from the station it is near to, a step having changed nothing in that.
+    fn is_same_place(&self, near: &Approach, before: &Stations, after: &Stations) -> bool {
+        let is_same = |image: &Image| {
+            let images = [before, after].map(|stations| {
+                let station = stations.photos[near.photo].orientation.centre();
+                let Station { orientation, camera } = &stations.photos[image.photo];
+                [stations.points[near.point].position(), station]
+                    .map(|place| camera.image(&orientation.pose().sight(&place)))
+            });
+            let [.., station] = images[1];
+            let is_close =
+                |xy: &[f64; 2]| (0..2).all(|k| (xy[k] - station[k]).abs() < SAME_PLACE * image.sd[k]);
+            images.as_flattened().iter().all(is_close)
+        };
+        let mut elsewhere =
+            self.images_of(near.point).iter().filter(|image| image.photo != near.photo).peekable();
+        let free = self.points[near.point].held() == [false; 3];
+        free && elsewhere.peek().is_some() && elsewhere.all(is_same)
+    }
+}
+
+impl Model for Bundle {
+    type Prepared = Stations;
+
+    fn prepare(&self, unknowns: &[f64]) -> Stations {
+        let (points, photos) = unknowns.split_at(3 * self.points.len());
+        let coordinates = points.as_chunks().0;
+        let refracted = self.refraction.map(|refraction| Refracted {
+            refraction,
+            at_photos: verticals(
+                &refraction,
+                self.space,
+                self.first[..self.cameras.len()].iter().map(|&i| &photos[i..]),
+            ),
+            at_points: verticals(&refraction, self.space, points.chunks(3)),
+        });
+        let points = coordinates.par_iter().with_min_len(1024);
+        let points = points.map(|&coordinates| geometry::Point::new(self.space, coordinates)).collect();
+        Stations { photos: self.photos(photos), points, refracted }
+    }
+
+    /// Intersects the points anew.
+    fn relocate(&self, unknowns: &mut [f64]) -> bool {
+        let (points, photos) = unknowns.split_at_mut(3 * self.points.len());
+        let Ok(coordinates) = self.intersect(&self.photos(photos)) else { return false };
+        points.copy_from_slice(coordinates.as_flattened());
+        true
+    }
+
+    #[inline(always)]
+    fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let image = &self.images[group];
+        match &stations.refracted {
+            None => {
+                let Station { orientation, camera } = &stations.photos[image.photo];
+                let point = &stations.points[local];
+                each_camera!(camera, camera => write(orientation, camera, point, image, rows));
+            }
+            Some(refracted) => refracted.write(stations, image, local, rows),
+        }
+    }
+
+    /// Points that have run into a station, or are on their way there: two rays that meet there ask for it.
+    fn collapsed(&self, before: &[f64], after: &[f64]) -> Vec<usize> {
+        let stations = self.prepare(after);
+        let mut near = self.approaches(&stations);
+        if !near.is_empty() {
+            let stations_before = self.prepare(before);
+            near.retain(|near| near.share > NEAR || self.is_same_place(near, &stations_before, &stations));
+        }
+        near.dedup_by_key(|near| near.point);
+        near.iter().map(|near| near.point).collect()
+    }
+
+    /// The pose of the first photo, and the component of another's position or translation that changes most when the scale does.
+    fn datum(&self, unknowns: &[f64]) -> Vec<usize> {
+        let locals = 3 * self.points.len();
+        let photos = self.photos(&unknowns[locals..]);
+        let with_images = || (0..photos.len()).filter(|&photo| self.images_on[photo] > 0);
+        let (false, Some(first)) = (self.placed, with_images().next()) else { return vec![] };
+        let centre = photos[first].orientation.centre();
+        let shifts = with_images().filter(|&photo| photo != first).flat_map(|photo| {
+            let shift = photos[photo].orientation.shifts_along(&centre);
+            shift.map(|(number, change)| (change.abs(), self.first[photo] + number))
+        });
+        let scale = shifts.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, unknown)| unknown);
+        let pose = self.first[first]..self.first[first] + 6;
+        pose.chain(scale).map(|unknown| locals + unknown).collect()
+    }
+}
+
+/// The verticals at positions, the first three unknowns of each.
+fn verticals<'a>(
+    refraction: &Refraction,
+    space: ObjectSpace,
+    unknowns: impl Iterator<Item = &'a [f64]>,
+) -> Vec<Vertical> {
+    unknowns.map(|values| refraction.vertical(space, std::array::from_fn(|k| values[k]))).collect()
+}

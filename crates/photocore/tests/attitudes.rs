@@ -1,0 +1,344 @@
+//! Poses, attitudes in every representation, and cameras: round trips, partials by complex steps, golden data where they are at hand.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use num_complex::Complex64 as C;
+use photocore::geometry::angle_axis::{
+    angle_axis_rotation, quaternion, quaternion_rotation, right_jacobian_inverse, rotation_angle_axis,
+};
+use photocore::geometry::attitude::{quaternion_by_step, vision_axes};
+use photocore::geometry::{
+    AttitudeNumbers, Bal, Camera, CameraModel, Image, Matrix3, ObjectSpace, Orientation, Perspective, Point,
+    Pose, PoseNumbers, RotationSense, Vector3,
+};
+use proptest::prelude::*;
+use serde_json::Value;
+
+const ALL: [fn() -> AttitudeNumbers; 9] = [
+    || AttitudeNumbers::OmegaPhiKappa(RotationSense::GroundToPhoto),
+    || AttitudeNumbers::OmegaPhiKappa(RotationSense::PhotoToGround),
+    || AttitudeNumbers::PhiOmegaKappa,
+    || AttitudeNumbers::AzimuthTiltSwing,
+    || AttitudeNumbers::YawPitchRoll(AttitudeNumbers::nadir_boresight(0)),
+    || AttitudeNumbers::YawPitchRoll(AttitudeNumbers::nadir_boresight(3)),
+    || AttitudeNumbers::RotationVector,
+    || AttitudeNumbers::RotationVectorToPhoto,
+    || AttitudeNumbers::RotationVectorToVision,
+];
+
+fn any_attitude() -> impl Strategy<Value = Matrix3> {
+    (prop::array::uniform3(-1.0..1.0f64), prop_oneof![0.0..PI, Just(0.0), (PI - 1e-6)..PI]).prop_map(
+        |(axis, angle)| {
+            angle_axis_rotation(&(Vector3::from(axis).try_normalize(1e-3).unwrap_or(Vector3::x()) * angle))
+        },
+    )
+}
+
+/// Differences of the numbers of A Exp(rho) over those of A Exp(-rho): rho = K d(numbers).
+fn numeric_step(numbers: AttitudeNumbers, attitude: &Matrix3) -> Matrix3 {
+    const STEP: f64 = 1e-5;
+    Matrix3::from_columns(&[0, 1, 2].map(|k| {
+        let ends = [STEP, -STEP].map(|step| {
+            let rho = Vector3::ith(k, step);
+            let found = numbers.numbers(&(attitude * angle_axis_rotation(&rho)));
+            Vector3::from(found)
+        });
+        (ends[0] - ends[1]).map(|change| change - 2.0 * PI * (change / (2.0 * PI)).round()) / (2.0 * STEP)
+    }))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn every_representation_gives_its_matrix_back(attitude in any_attitude()) {
+        for numbers in ALL.map(|make| make()) {
+            let found = numbers.numbers(&attitude);
+            let back = numbers.attitude(found);
+            prop_assert!((back - attitude).amax() < 2e-8, "{numbers:?} {found:?}");
+            if !numbers.is_singular(found) {
+                prop_assert!((back - attitude).amax() < 1e-14, "{numbers:?} {found:?}: {:e}", (back - attitude).amax());
+            }
+        }
+        let q = quaternion(&attitude);
+        prop_assert!((quaternion_rotation(q) - attitude).amax() < 1e-14 && q[0] >= 0.0);
+    }
+
+    #[test]
+    fn rates_are_those_of_small_steps(attitude in any_attitude()) {
+        for numbers in ALL.map(|make| make()) {
+            let found = numbers.numbers(&attitude);
+            let Some(inverse) = numbers.rates(found).try_inverse() else { continue };
+            // Near a singular attitude, and where a rotation vector jumps at half a turn, differences say nothing.
+            let vector = Vector3::from(found).norm();
+            let jumps = format!("{numbers:?}").starts_with("RotationVector") && vector > PI - 1e-3;
+            if inverse.amax() < 30.0 && !jumps {
+                let expected = numeric_step(numbers, &attitude);
+                prop_assert!((inverse - expected).amax() < 1e-5 * inverse.amax().powi(3).max(1.0), "{numbers:?} {found:?}\n{inverse} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pose_steps_about_its_own_axes(
+        attitude in any_attitude(),
+        rho in prop::array::uniform3(-1e-7..1e-7f64),
+        shift in prop::array::uniform3(-1e-7..1e-7f64),
+        point in prop::array::uniform3(-1.0..1.0f64),
+    ) {
+        let (rho, shift, point) = (Vector3::from(rho), Vector3::from(shift), Vector3::from(point));
+        let pose = Pose { position: Vector3::new(0.3, -0.2, 5.0), attitude };
+        let stepped = pose.step(&shift, &rho);
+        let u = pose.sight(&point);
+        let expected = u.cross(&rho) - attitude.tr_mul(&shift);
+        prop_assert!((stepped.sight(&point) - u - expected).amax() < 1e-12);
+        prop_assert!((stepped.attitude.tr_mul(&stepped.attitude) - Matrix3::identity()).amax() < 1e-15);
+        prop_assert!((stepped.depth(&point) + stepped.sight(&point).z).abs() < 1e-15);
+    }
+
+    #[test]
+    fn cameras_see_directions_only(
+        u in (prop::array::uniform2(-0.6..0.6f64), -8.0..-1.0f64),
+        c in prop_oneof![-200.0..-50.0f64, 50.0..200.0f64],
+        f in 300.0..3000.0f64,
+        k in prop::array::uniform2(-0.1..0.1f64),
+    ) {
+        let u = Vector3::new(-u.1 * u.0[0], -u.1 * u.0[1], u.1);
+        for camera in [Camera::from(Perspective { principal_distance: c }), Bal { focal_length: f, radial: k }.into()] {
+            let partials = match camera {
+                Camera::Perspective(camera) => gradients(&camera.linearize(&u)),
+                Camera::Bal(camera) => gradients(&camera.linearize(&u)),
+            };
+            let expected = complex_gradients(&camera, &u);
+            for (row, (by_u, by_parameters)) in partials.iter().enumerate() {
+                prop_assert!(by_u.dot(&u).abs() < 1e-13 * by_u.norm() * u.norm());
+                let found = by_u.iter().chain(by_parameters);
+                let scale = by_u.norm().max(1.0);
+                for (found, expected) in found.zip(&expected[row]) {
+                    prop_assert!((found - expected).abs() < 1e-10 * scale, "{camera:?} {found} {expected}");
+                }
+            }
+            let direction = camera.direction(camera.image(&u));
+            let back = direction.map(|direction| (direction - u.normalize()).amax());
+            prop_assert!(back.is_some_and(|apart| apart < 1e-13), "{camera:?}: {direction:?}");
+            let again = camera.with_parameters(&camera.parameters());
+            prop_assert_eq!(again, Some(camera));
+            prop_assert_eq!(camera.parameter_names().len(), camera.parameters().len());
+        }
+    }
+
+    #[test]
+    fn both_sets_of_pose_numbers_move_what_is_seen_as_differences_do(
+        attitude in prop::array::uniform3(-1.3..1.3f64),
+        position in prop::array::uniform3(-3.0..3.0f64),
+        point in prop::array::uniform3(-1.0..1.0f64),
+        g in prop::array::uniform3(-1.0..1.0f64),
+    ) {
+        let point = Point::new(ObjectSpace::Rectangular, point);
+        let g = Vector3::from(g);
+        let [a, b, c] = attitude;
+        let [x, y, z] = position;
+        let values = [x, y, z, a, b, c];
+        for numbers in [
+            PoseNumbers::Angles(RotationSense::GroundToPhoto), PoseNumbers::Angles(RotationSense::PhotoToGround), PoseNumbers::Vectors,
+        ] {
+            let place = |values: &[f64; 6]| Orientation::new(numbers, ObjectSpace::Rectangular, values);
+            let placed = place(&values);
+            let (partials, _) = placed.chain(&placed.sight(&point), &g, &point);
+            for k in 0..6 {
+                let ends = [1e-5, -1e-5].map(|step| {
+                    let mut moved = values;
+                    moved[k] += step;
+                    place(&moved).sight(&point).dot(&g)
+                });
+                let expected = (ends[0] - ends[1]) / 2e-5;
+                prop_assert!((partials[k] - expected).abs() < 1e-8, "{numbers:?} {k}: {} {expected}", partials[k]);
+            }
+        }
+    }
+}
+
+fn gradients<P: AsRef<[f64]>>(image: &Image<P>) -> Vec<(Vector3, Vec<f64>)> {
+    (0..2).map(|row| (image.by_u[row], image.by_parameters[row].as_ref().to_vec())).collect()
+}
+
+/// The image written out once more for complex arguments: partials with respect to u, then to the parameters.
+fn complex_gradients(camera: &Camera, u: &Vector3) -> [Vec<f64>; 2] {
+    const STEP: f64 = 1e-100;
+    let values: Vec<f64> = u.iter().copied().chain(camera.parameters()).collect();
+    let image = |v: &[C]| -> [C; 2] {
+        match camera {
+            Camera::Perspective(_) => [v[3] * v[0] / v[2], v[3] * v[1] / v[2]],
+            Camera::Bal(_) => {
+                let p = [-v[0] / v[2], -v[1] / v[2]];
+                let q = p[0] * p[0] + p[1] * p[1];
+                p.map(|p| v[3] * (1.0 + v[4] * q + v[5] * q * q) * p)
+            }
+        }
+    };
+    let mut rows = [vec![], vec![]];
+    for k in 0..values.len() {
+        let mut stepped: Vec<C> = values.iter().map(|&value| C::new(value, 0.0)).collect();
+        stepped[k].im = STEP;
+        let found = image(&stepped);
+        (0..2).for_each(|row| rows[row].push(found[row].im / STEP));
+    }
+    rows
+}
+
+#[test]
+fn a_lens_beyond_which_nothing_is_seen_says_so() {
+    let barrel = Bal { focal_length: 1000.0, radial: [-0.3, 0.0] };
+    // r (1 - 0.3 r^2) rises to r = 1.054.
+    let edge = 1000.0 * (1.0f64 / 0.9).sqrt() * 2.0 / 3.0;
+    assert!(barrel.direction([edge - 1.0, 0.0]).is_some());
+    assert!(barrel.direction([edge + 1.0, 0.0]).is_none());
+    assert!(barrel.direction([f64::NAN, 0.0]).is_none());
+    assert_eq!(barrel.direction([0.0, 0.0]), Some(-Vector3::z()));
+}
+
+#[test]
+fn at_phi_of_ninety_degrees_only_the_report_in_angles_notices() {
+    for sense in [RotationSense::GroundToPhoto, RotationSense::PhotoToGround] {
+        let numbers = AttitudeNumbers::OmegaPhiKappa(sense);
+        let attitude = numbers.attitude([0.4, FRAC_PI_2, 0.3]);
+        let found = numbers.numbers(&attitude);
+        assert!(numbers.is_singular(found) && found[2] == 0.0);
+        assert!((found[0] - 0.7).abs() < 1e-14 && (found[1] - FRAC_PI_2).abs() < 1e-14);
+        assert!((numbers.attitude(found) - attitude).amax() < 1e-15);
+        assert!(numbers.cofactors(found, &Matrix3::identity()).is_none());
+        assert!(!numbers.is_singular([0.0, PI, 0.0]));
+    }
+}
+
+/// A file of the golden data; None, visibly, where they are not at hand.
+fn golden(name: &str) -> Option<Value> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/network/");
+    match std::fs::read_to_string(format!("{path}{name}")) {
+        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
+        Err(error) => {
+            eprintln!("skipped: {path}{name}: {error}");
+            None
+        }
+    }
+}
+
+fn list(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+}
+
+fn rows(value: &Value) -> Vec<Vec<f64>> {
+    value.as_array().unwrap().iter().map(list).collect()
+}
+
+fn matrix(value: &Value) -> Matrix3 {
+    Matrix3::from_row_iterator(rows(value).into_iter().flatten())
+}
+
+#[test]
+fn attitudes_agree_with_the_golden_data() {
+    let Some(data) = golden("attitudes.json") else { return };
+    let names = [
+        ("omega_phi_kappa", ALL[0]),
+        ("omega_phi_kappa_photo_to_ground", ALL[1]),
+        ("phi_omega_kappa", ALL[2]),
+        ("azimuth_tilt_swing", ALL[3]),
+        ("yaw_pitch_roll_ned_nadir", ALL[4]),
+        ("rotation_vector_photo_to_object", ALL[6]),
+        ("rotation_vector_object_to_photo_bal", ALL[7]),
+        ("rotation_vector_vision_from_object", ALL[8]),
+    ];
+    for (case, entry) in data["cases"].as_array().unwrap().iter().enumerate() {
+        let attitude = matrix(&entry["matrix_photo_to_object"]);
+        let of_step = matrix(&entry["cofactors_rotation_step"]);
+        for (name, make) in names {
+            let (numbers, golden) = (make(), &entry["representations"][name]);
+            let values: [f64; 3] = list(&golden["values"]).try_into().unwrap();
+            let singular = golden["singular"].as_bool().unwrap();
+            let near = if singular { 1e-8 } else { 1e-14 };
+            let apart = (numbers.attitude(values) - attitude).amax();
+            assert!(apart < near, "{case} {name}: matrix {apart:e}");
+            let found = numbers.numbers(&attitude);
+            assert_eq!(numbers.is_singular(found), singular, "{case} {name}");
+            let near = if [11, 19].contains(&case) { 1e-8 } else { 1e-13 };
+            let vector = name.starts_with("rotation_vector");
+            // Near half a turn either sign of a rotation vector will do.
+            let flipped = vector
+                && Vector3::from(values).norm() > PI - 1e-6
+                && Vector3::from(found).dot(&Vector3::from(values)) < 0.0;
+            for k in 0..3 {
+                let apart = found[k] - values[k];
+                let apart = if vector { apart.abs() } else { (0.5 * apart).sin().abs() };
+                assert!(flipped || apart < near, "{case} {name} {k}: {found:?} {values:?}");
+            }
+            match numbers.cofactors(values, &of_step) {
+                None => assert!(singular, "{case} {name}"),
+                Some(cofactors) => {
+                    let expected = matrix(&golden["cofactors"]);
+                    let rates = numbers.rates(values);
+                    let condition = rates.norm() * rates.try_inverse().unwrap().norm();
+                    let near = if condition < 1e4 { 1e-9 } else { 1e-5 };
+                    assert!((cofactors - expected).amax() < near * expected.amax(), "{case} {name}");
+                }
+            }
+        }
+        quaternions_agree(&attitude, &of_step, &entry["representations"]["quaternion_photo_to_object_wxyz"]);
+        let seen = vision_axes() * attitude.transpose();
+        let golden = list(&entry["representations"]["quaternion_vision_from_object_wxyz"]["values"]);
+        let sign: f64 = quaternion(&seen).iter().zip(&golden).map(|(a, b)| a * b).sum();
+        assert!((sign.abs() - 1.0).abs() < 1e-13, "{case}");
+    }
+}
+
+fn quaternions_agree(attitude: &Matrix3, of_step: &Matrix3, golden: &Value) {
+    let values = list(&golden["values"]);
+    let found = quaternion(attitude);
+    let sign = found.iter().zip(&values).map(|(a, b)| a * b).sum::<f64>().signum();
+    let expected = rows(&golden["cofactors"]);
+    let largest = expected.iter().flatten().fold(0.0f64, |most, value| most.max(value.abs()));
+    let by_step = quaternion_by_step(found);
+    for i in 0..4 {
+        assert!((found[i] - sign * values[i]).abs() < 1e-13, "{found:?} {values:?}");
+        for j in 0..4 {
+            let cofactor = by_step[i].dot(&(of_step * by_step[j]));
+            assert!((cofactor - expected[i][j]).abs() < 1e-9 * largest);
+        }
+    }
+}
+
+#[test]
+fn the_logarithm_undoes_the_exponential_to_first_order() {
+    for r in [Vector3::new(0.3, -0.2, 0.9), Vector3::new(1e-5, 0.0, 2e-6), Vector3::new(-1.2, 2.0, 0.4)] {
+        let jacobian = right_jacobian_inverse(&r);
+        for k in 0..3 {
+            let ends = [1e-6, -1e-6].map(|step| {
+                rotation_angle_axis(&(angle_axis_rotation(&r) * angle_axis_rotation(&Vector3::ith(k, step))))
+            });
+            assert!(((ends[0] - ends[1]) / 2e-6 - jacobian.column(k)).amax() < 1e-8, "{r:?}");
+        }
+    }
+}
+
+#[test]
+fn the_bal_camera_agrees_with_the_golden_data() {
+    let Some(data) = golden("camera_models.json") else { return };
+    let bal = &data["bal"];
+    let camera = Bal::with_parameters(list(&bal["values"]).try_into().unwrap());
+    for ray in bal["rays"].as_array().unwrap() {
+        let u = Vector3::from_row_slice(&list(&ray["ray_photo_axes"]));
+        let image = camera.linearize(&u);
+        let (xy, by_ray, by_parameters) =
+            (list(&ray["image"]), rows(&ray["d_image_d_ray"]), rows(&ray["d_image_d_params"]));
+        for row in 0..2 {
+            assert!((image.xy[row] - xy[row]).abs() < 1e-9);
+            let largest = by_ray[row].iter().fold(0.0f64, |most, value| most.max(value.abs()));
+            (0..3).for_each(|k| assert!((image.by_u[row][k] - by_ray[row][k]).abs() < 1e-10 * largest));
+            let largest = by_parameters[row].iter().fold(0.0f64, |most, value| most.max(value.abs()));
+            (0..3).for_each(|k| {
+                assert!((image.by_parameters[row][k] - by_parameters[row][k]).abs() < 1e-10 * largest);
+            });
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! The examples run, and come out as they should.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, dead_code)]
+
+use std::fs;
+use std::path::Path;
+
+use photocore::adjustment::Status;
+
+#[path = "../examples/block.rs"]
+mod block;
+#[path = "../examples/collection.rs"]
+mod collection;
+#[path = "../examples/comparator.rs"]
+mod comparator;
+
+#[test]
+fn the_stations_of_the_block_come_out_within_their_standard_deviations() {
+    let solution = block::adjusted().unwrap();
+    assert_eq!(solution.adjustment.status, Status::Converged);
+    assert!(solution.points.iter().all(Option::is_some));
+    for (index, photo) in solution.photos.iter().enumerate() {
+        let truth = [600.0 * (index % 4) as f64, 900.0 * (index / 4) as f64, 1500.0, 0.0, 0.0, 0.1];
+        for (k, (found, truth)) in photo.pose.iter().zip(truth).enumerate() {
+            assert!(
+                (found - truth).abs() < 4.0 * photo.cofactors[7 * k].sqrt(),
+                "photo {index}, unknown {k}"
+            );
+        }
+    }
+    block::main().unwrap();
+}
+
+#[test]
+fn the_comparator_comes_out_within_its_standard_deviations() {
+    let solution = comparator::adjusted().unwrap();
+    let ([x, y], angle) = comparator::TRUTH;
+    for (k, truth) in [x, y, angle].into_iter().enumerate() {
+        assert!((solution.comparator[k] - truth).abs() < 4.0 * solution.comparator_cofactors[4 * k].sqrt());
+    }
+    comparator::main().unwrap();
+}
+
+#[test]
+fn a_file_of_bundle_adjustment_in_the_large_is_adjusted() {
+    let packaged = "../../python/photogram/examples/collection/ring.txt";
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(packaged);
+    let text = fs::read_to_string(file).expect("the example of the Python package");
+    let solution = collection::adjusted(&collection::read(&text).unwrap()).unwrap();
+    assert_eq!(solution.adjustment.status, Status::Converged);
+    assert_eq!(solution.datum.len(), 7);
+    assert!(solution.photos.iter().all(|photo| photo.camera[0] > 0.0 && photo.cofactors[60] > 0.0));
+    assert!(collection::read("8 60 379 0 0").is_err());
+}
