@@ -20,6 +20,8 @@ const STEPS: usize = 100;
 const ARRIVED: f64 = 1e-13;
 /// Rotations whose elements differ by less are one minimum.
 const SAME: f64 = 1e-6;
+/// A descent that comes so near to a minimum ends there.
+const NEAR: f64 = 1e-3;
 /// Values of S are good to this fraction of its largest terms.
 const ROUNDING: f64 = 1e-14;
 /// Steps of the eigenvalue iteration at the most.
@@ -89,18 +91,19 @@ impl Moments {
         for index in 0..108 {
             let (omega, phi, kappa) = (index / 18, index / 6 % 3, index % 6);
             let angles = [omega as f64, phi as f64 - 1.0, kappa as f64].map(|sixths| SIXTH * sixths);
-            let Some(found) = self.descend(&rotation(angles)) else { continue };
-            if !minima.iter().any(|other| same(&other.rotation, &found.rotation)) {
+            let Some(found) = self.descend(&rotation(angles), &minima) else { continue };
+            if !minima.iter().any(|other| closer(&other.rotation, &found.rotation, SAME)) {
                 minima.push(found);
             }
         }
         Ok(minima)
     }
 
-    /// The minimum that a descent from a rotation leads to; None when the model would be a mirror image there.
+    /// The minimum that a descent from a rotation leads to; None when the model would be a mirror image there, or when it comes near
+    /// one of the `known` minima.
     ///
     /// Gauss-Newton with damping (Levenberg-Marquardt) on three small rotations; the scale is eliminated.
-    pub fn descend(&self, from: &Matrix3) -> Option<Similarity> {
+    pub fn descend(&self, from: &Matrix3, known: &[Similarity]) -> Option<Similarity> {
         let mut at = *from;
         let (mut damping, mut value) = (1e-3, self.value(&at));
         let (mut normal, mut gradient) = self.linearize(&at);
@@ -113,6 +116,9 @@ impl Moments {
                 (at, value, damping) = (next, next_value, damping / 10.0);
                 if step.iter().all(|angle| angle.abs() < ARRIVED) {
                     break;
+                }
+                if known.iter().any(|minimum| closer(&minimum.rotation, &at, NEAR)) {
+                    return None;
                 }
                 (normal, gradient) = self.linearize(&at);
             } else {
@@ -183,6 +189,6 @@ impl Moments {
     }
 }
 
-fn same(a: &Matrix3, b: &Matrix3) -> bool {
-    (a - b).amax() < SAME
+fn closer(a: &Matrix3, b: &Matrix3, limit: f64) -> bool {
+    (a - b).amax() < limit
 }

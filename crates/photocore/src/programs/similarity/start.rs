@@ -58,7 +58,7 @@ pub fn choose(stations: &[Station], start: Start) -> Result<Chosen, SimilarityEr
             };
             let rounding = (ROUNDING * spread(stations)).powi(2);
             let as_well = |similarity: &Similarity| sum(similarity) <= AS_WELL * sum(&best) + rounding;
-            let reached = report.and_then(|r| moments.descend(&r.rotation)).filter(&as_well);
+            let reached = report.and_then(|r| moments.descend(&r.rotation, &[])).filter(&as_well);
             let goal = reached.unwrap_or(best);
             let (similarity, started) = match report {
                 Some(report) if apart(&report, &goal) < CLOSE => (report, Started::Report),
