@@ -108,7 +108,7 @@ pub fn local_vertical(longitude: f64, latitude: f64) -> Matrix3 {
     Matrix3::new(-sl, cl, 0.0, -sp * cl, -sp * sl, cp, cp * cl, cp * sl, sp)
 }
 
-/// The vectors w about which R turns with longitude and latitude, dR/dq = [w]x R, in the local vertical frame.
+/// The vectors w about which R turns with longitude and latitude, `dR/dq = [w]x R`, in the local vertical frame.
 pub fn local_vertical_turns(latitude: f64) -> [Vector3; 2] {
     let (sp, cp) = latitude.sin_cos();
     [Vector3::new(0.0, -cp, -sp), Vector3::x()]

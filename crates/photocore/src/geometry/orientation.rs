@@ -15,7 +15,7 @@ pub enum PoseNumbers {
     Vectors,
 }
 
-/// A pose with its partials: du = [w]x (u - s) dq + S dq, where every unknown may turn (w) about a pivot s, and three of them
+/// A pose with its partials: `du = [w]x (u - s) dq + S dq`, where every unknown may turn (w) about a pivot s, and three of them
 /// shift (S), all in the photo's axes.
 #[derive(Debug, Clone, Copy)]
 pub struct Orientation {
@@ -120,7 +120,7 @@ impl Orientation {
     }
 
     /// Partials of one image coordinate with respect to the six unknowns and to the coordinates of the point, given its gradient g
-    /// with respect to u: g . ([w]x u) = (u x g) . w, and du/dP = A^T.
+    /// with respect to u: `g . ([w]x u) = (u x g) . w`, and du/dP = A^T.
     #[inline(always)]
     pub fn chain(&self, u: &Vector3, g: &Vector3, point: &Point) -> ([f64; 6], [f64; 3]) {
         let by_point = point.partials().tr_mul(&(self.pose.attitude * g));
