@@ -29,6 +29,9 @@ pub enum Criterion {
     Decrease(f64),
 }
 
+/// Damping of the first step of [`Criterion::Decrease`].
+pub(super) const FIRST_DAMPING: f64 = 1e-4;
+
 /// How to adjust. By default: squares, to a hundred-thousandth of the standard deviations, with cofactors.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {

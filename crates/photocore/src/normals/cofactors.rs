@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use super::equations::{Equations, Prior};
 use super::incidence::Stacks;
-use super::invert::SelectedInverse;
 use super::layout::Layout;
+use super::selected::SelectedInverse;
 use super::stack::{Slot, Stack, dot};
 use super::system::System;
 use super::tie_equations::TieEquations;

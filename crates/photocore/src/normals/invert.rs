@@ -13,42 +13,10 @@ use super::dense::invert_front;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::panels::{Handover, Panels, lock};
+use super::selected::SelectedInverse;
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::watch::{Between, Control, Stopped, watched};
-
-/// The blocks of N^-1 inside the pattern of the factor: every kept block's own, and those of every two kept blocks that
-/// share a local block.
-#[derive(Debug)]
-pub struct SelectedInverse {
-    panels: Panels,
-}
-
-impl SelectedInverse {
-    /// Block (row, column) of the inverse, row by row; None outside the pattern. Kept blocks are counted as in the layout, the
-    /// border is the block after the last.
-    pub fn block(&self, row: usize, column: usize) -> Option<Vec<f64>> {
-        let symbolic = &*self.panels.symbolic;
-        let (p, q) = (symbolic.position(row), symbolic.position(column));
-        let (first, last) = (p.min(q), p.max(q));
-        let supernode = symbolic.supernode_of(first);
-        let at = symbolic.panel_row(supernode, last)?;
-        let height = symbolic.supernodes()[supernode].height();
-        let left = symbolic.range(first).start - symbolic.first_unknown(supernode);
-        let panel = self.panels.panel(supernode);
-        // The lower triangle, that is the row later in the order of elimination, carries the values.
-        let value = |i: usize, j: usize| {
-            let (high, low) = if p > q { (at + i, left + j) } else { (at + j, left + i) };
-            if first == last {
-                panel[low.min(high) * height + low.max(high)]
-            } else {
-                panel[low * height + high]
-            }
-        };
-        let columns = symbolic.dim(q);
-        Some((0..symbolic.dim(p) * columns).map(|k| value(k / columns, k % columns)).collect())
-    }
-}
 
 /// Cofactors with the selected inverse that they come from.
 #[derive(Debug)]

@@ -3,8 +3,7 @@
 
 use faer::{Mat, MatRef};
 
-use super::model::{Partials, Root, Rows, Sight, StarImages};
-use super::published::Tolerances;
+use super::model::{Partials, Root, Rows, Sight, StarImages, Tolerances};
 use super::solution::{Observations, Tested};
 use super::{COMMON, Calibration, StellarError};
 

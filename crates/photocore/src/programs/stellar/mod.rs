@@ -25,8 +25,8 @@ use crate::normals::{Layout, LayoutError, Ordering, System};
 use model::{Partials, StarImages};
 
 pub use camera::{Attitude, Camera, Decentering, Form, INTERIOR, Kind, PlateImage};
-pub use model::Rows;
-pub use published::{Correction, PublishedRows, Tolerances};
+pub use model::{Rows, Tolerances};
+pub use published::{Correction, PublishedRows};
 pub use solution::{Observations, ParameterCofactors, Solution, Tested};
 
 /// Number of coefficients of refraction.

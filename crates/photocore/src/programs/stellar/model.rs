@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::published::Tolerances;
 use super::{Attitude, COMMON, Calibration, Camera, INTERIOR, Image, PlateImage, StellarError, TAU, Weights};
 use crate::adjustment::Model;
 use crate::geometry::Standard;
@@ -18,6 +17,17 @@ pub enum Tied {
     Axis(Root),
     /// A row of the root of the parameters' weight matrix.
     Parameters(usize),
+}
+
+/// Tolerances of the inner iterations of the report's program.
+#[derive(Debug, Clone, Copy)]
+pub struct Tolerances {
+    /// Of refraction, in radians.
+    pub refraction: f64,
+    /// Of distortion, in the unit of the plate coordinates.
+    pub distortion: f64,
+    /// Passes of the distortion at the most.
+    pub passes: usize,
 }
 
 /// Which discrepancies and partials images have.

@@ -5,21 +5,10 @@
 
 use rayon::ThreadPool;
 
-use super::model::{Partials, Rows, Sight};
+use super::model::{Partials, Rows, Sight, Tolerances};
 use super::{Attitude, COMMON, Calibration, Camera, StellarError, of_parameters, parameters_of};
 use crate::adjustment::AdjustError;
 use crate::geometry::Displacement;
-
-/// Tolerances of the inner iterations.
-#[derive(Debug, Clone, Copy)]
-pub struct Tolerances {
-    /// Of refraction, in radians.
-    pub refraction: f64,
-    /// Of distortion, in the unit of the plate coordinates.
-    pub distortion: f64,
-    /// Passes of the distortion at the most.
-    pub passes: usize,
-}
 
 /// The equations of an image as published.
 #[derive(Debug, Clone, Copy)]
