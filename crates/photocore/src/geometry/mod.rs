@@ -15,6 +15,18 @@
 //! Vectors and matrices in cartesian axes are those of `nalgebra`; three numbers whose units or meanings differ (coordinates of
 //! the object space, angles, standard deviations) are arrays. Angles are radians, lengths the linear unit of the object space, image
 //! coordinates the unit of the camera.
+//!
+//! ```
+//! use photocore::geometry::{ObjectSpace, Photo, Point, RotationSense};
+//!
+//! // A vertical photo, 150 mm, from 1,000 m above the ground: 100 m there are 15 mm here.
+//! let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
+//! let photo = Photo::new(space, sense, [0.0, 0.0, 1000.0], [0.0; 3], -150.0);
+//! let image = photo.linearize(&Point::new(space, [100.0, 50.0, 0.0]));
+//! assert!((image.xy[0] - 15.0).abs() < 1e-12 && (image.xy[1] - 7.5).abs() < 1e-12);
+//! assert!((image.point[0][0] - 0.15).abs() < 1e-12, "dx/dX in millimetres a metre");
+//! assert_eq!(image.photo[0][0], -image.point[0][0], "a station moves what it sees the other way");
+//! ```
 
 pub mod angle_axis;
 pub mod atmosphere;

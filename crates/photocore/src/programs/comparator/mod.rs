@@ -3,6 +3,38 @@
 //! Unknowns are the coordinates of the grid points (each weighted from free to fixed), rotation and translation of every case, and
 //! the comparator itself: two scales, lack of orthogonality, and two polynomials (NOAA TR NOS 57, equations 36 and 59, without the
 //! terms of first and zeroth degree, which those of the linear transformation repeat). Observations are measured coordinates.
+//!
+//! Nine points of a plate, measured in two placements by a comparator whose x is too short by ten millionths:
+//!
+//! ```
+//! use photocore::adjustment::{Options, on_all_processors};
+//! use photocore::programs::comparator::{
+//!     Basis, Calibration, Case, Comparator, GridPoint, Measurement, Placement,
+//! };
+//!
+//! let comparator = |x_scale: f64| Comparator {
+//!     scale: [x_scale, 1.0],
+//!     nonorthogonality: 0.0,
+//!     basis: Basis { degree: 1, centre: [0.0; 2], half_range: [1e5; 2] },
+//!     coefficients: [vec![], vec![]],
+//! };
+//! let placements = [0.0, 1.5].map(|rotation| Placement { rotation, translation: [0.0; 2] });
+//! let xy = |i: usize| [1e5 * (i % 3) as f64 - 1e5, 1e5 * (i / 3) as f64 - 1e5];
+//! let measured = |(case, point): (usize, usize)| {
+//!     let xy = comparator(1.0 + 10e-6).measure(xy(point), &placements[case]).xy;
+//!     Measurement { case, point, xy, sd: [1.0; 2] }
+//! };
+//! let calibration = Calibration {
+//!     comparator: comparator(1.0),
+//!     coefficient_sd: [vec![], vec![]],
+//!     cases: placements.map(|placement| Case { placement, left_handed: false }).to_vec(),
+//!     points: (0..9).map(|i| GridPoint { xy: xy(i), sd: [0.25; 2] }).collect(),
+//!     measurements: (0..18).map(|i| measured((i / 9, i % 9))).collect(),
+//! };
+//! let solution = on_all_processors(|pool, watch| calibration.adjust(&Options::default(), pool, watch))??;
+//! assert!((solution.comparator[0] - 1.0 - 10e-6).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod measure;
 mod model;

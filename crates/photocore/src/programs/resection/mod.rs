@@ -3,6 +3,35 @@
 //! Unknowns are the position and attitude of the photo and the coordinates of the control points, each weighted from free
 //! (the photo) to fixed; observations are image coordinates. Positions are X, Y, Z or longitude, latitude, height. Without
 //! initial values the adjustment starts from poses that three points give directly ([`three_points`]).
+//!
+//! ```
+//! use photocore::adjustment::{Options, on_all_processors};
+//! use photocore::geometry::{ObjectSpace, Photo, Point, RotationSense};
+//! use photocore::programs::resection::{ControlPoint, Known, Partials, Resection};
+//!
+//! let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
+//! let truth = Photo::new(space, sense, [520.0, 480.0, 1600.0], [0.05, -0.03, 2.0], -150.0);
+//! let control = [[0.0, 0.0, 20.0], [1000.0, 0.0, 90.0], [1000.0, 1000.0, 0.0], [0.0, 1000.0, 60.0], [500.0, 300.0, 140.0]];
+//! let point = |coordinates| {
+//!     let xy = truth.project(&Point::new(space, coordinates));
+//!     ControlPoint { coordinates, sd: [0.0; 3], xy, xy_sd: [0.01; 2] }
+//! };
+//! let unknown = Known { value: [f64::NAN; 3], sd: [f64::INFINITY; 3] };
+//! let resection = Resection {
+//!     space,
+//!     sense,
+//!     principal_distance: -150.0,
+//!     points: control.map(point).to_vec(),
+//!     position: unknown,
+//!     attitude: unknown,
+//!     start: None,
+//!     partials: Partials::AtComputed,
+//! };
+//! let solution = on_all_processors(|pool, watch| resection.adjust(&Options::default(), pool, watch))??;
+//! assert!((solution.pose.position[2] - 1600.0).abs() < 1e-6);
+//! assert_eq!(solution.degrees_of_freedom, 4);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod degenerate;
 mod model;

@@ -4,6 +4,30 @@
 //! as in the bulletin; control coordinates are unknowns of their own, fixed where they are known exactly, weighted where they have
 //! standard deviations, free where they are missing. Eliminating the free ones leaves the misclosures
 //! u = s X - A^T (x - B) of the known components: the form that is right for any mix of full, horizontal and height control.
+//!
+//! ```
+//! use photocore::adjustment::on_all_processors;
+//! use photocore::geometry::Vector3;
+//! use photocore::programs::similarity::{Method, Options, Start, Station, orient};
+//!
+//! // A model at 1:2, shifted; the last station has only its elevation.
+//! let control = [[0.0, 0.0, 10.0], [800.0, 0.0, 30.0], [800.0, 600.0, 0.0], [f64::NAN, f64::NAN, 50.0]];
+//! let model = [[7.0, 0.0, 5.0], [407.0, 0.0, 15.0], [407.0, 300.0, 0.0], [107.0, 200.0, 25.0]];
+//! let station = |i: usize| Station {
+//!     control: Vector3::from(control[i]),
+//!     control_sd: [0.0; 3],
+//!     model: Vector3::from(model[i]),
+//!     model_sd: [0.01; 3],
+//! };
+//! let stations: Vec<Station> = (0..4).map(station).collect();
+//! let options =
+//!     Options { method: Method::Rigorous, start: Start::Auto, max_iterations: 50, tolerance: 1e-5, trace: false };
+//! let solution = on_all_processors(|pool, watch| orient(&stations, &options, pool, watch))??;
+//! let parameters = solution.similarity.parameters();
+//! assert!((parameters.scale - 0.5).abs() < 1e-9);
+//! assert!((parameters.translation.x - 7.0).abs() < 1e-6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod crout;
 mod determinacy;
