@@ -255,6 +255,15 @@ def test_control_around_the_block_and_chains_of_heights():
     assert np.isnan(block.point_positions[kinds == "P"]).all()
 
 
+def test_control_of_a_block_of_many_short_strips_is_nearest_to_its_places():
+    simulation = simulate(strips=40, photos_per_strip=3, control_spacing=4, points_per_photo=9, seed=5)
+    places = simulation.truth.point_positions
+    full = np.isfinite(simulation.block.point_sd).all(axis=1)
+    x, y, _ = np.abs(places[full]).T
+    assert full.sum() > 10
+    assert ((x > 0.5 * x.max()) | (y > 0.9 * y.max())).all()
+
+
 def test_other_control_patterns():
     corners = simulate(control="corners", control_sd=0.0).block
     assert np.isfinite(corners.point_sd).sum() == 12

@@ -147,6 +147,13 @@ def test_one_star_does_not_make_a_camera(night, result):
         calibrate_exposures([few], night.camera, night.site, night.catalogue)
 
 
+def test_variances_beyond_double_precision_are_refused(night, result):
+    with pytest.raises(AdjustmentError, match="beyond double precision"):
+        calibrate_exposures(
+            result.exposures, night.camera, night.site, night.catalogue, pixel_sd=1e154, earth=night.earth
+        )
+
+
 def test_the_pole_agrees_with_erfa(night):
     """At ten times the size that poles have, so that it shows."""
     bright = Catalogue.hipparcos().brighter(3.0)

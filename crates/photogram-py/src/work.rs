@@ -3,11 +3,12 @@
 use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use photocore::adjustment::{Event, Phase};
 use pyo3::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::{ThreadBuilder, ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::memory;
 use crate::solution::iteration_row;
@@ -49,17 +50,6 @@ pub fn watched<T: Send, E: Send>(
     work: impl FnOnce(&ThreadPool, Watch<'_>) -> Result<T, E> + Send,
 ) -> PyResult<Result<T, E>> {
     memory::arm()?;
-    let (own, started);
-    let pool: &ThreadPool = match workers {
-        Workers::Caller => {
-            own = calling_thread()?;
-            own
-        }
-        Workers::Threads(threads) => {
-            started = start(threads)?;
-            &started
-        }
-    };
     let mut raised = None;
     let mut last = Instant::now();
     let mut watch = |event: Event| {
@@ -79,7 +69,22 @@ pub fn watched<T: Send, E: Send>(
             }
         }
     };
-    let done = py.detach(|| work(pool, &mut watch));
+    let done = match workers {
+        Workers::Caller => {
+            let pool = calling_thread()?;
+            py.detach(|| work(pool, &mut watch))
+        }
+        Workers::Threads(threads) => {
+            let (pool, handles) = start(threads)?;
+            py.detach(|| {
+                let done = work(&pool, &mut watch);
+                drop(pool);
+                // Threads keep buffers until they have ended, and the next ones may need the room. A panic has reached the caller.
+                handles.into_iter().for_each(|thread| drop(thread.join()));
+                done
+            })
+        }
+    };
     match raised {
         Some(error) => Err(error),
         None if done.is_err() && memory::failed() => Err(memory::failure()),
@@ -99,21 +104,28 @@ fn calling_thread() -> PyResult<&'static ThreadPool> {
     if let Some(pool) = POOL.get() {
         return Ok(pool);
     }
-    let pool = Box::leak(Box::new(built(ThreadPoolBuilder::new().num_threads(1).use_current_thread())?));
+    let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+    let pool = Box::leak(Box::new(pool.map_err(not_started)?));
     POOL.set(Some(pool));
     Ok(pool)
 }
 
-/// So many new threads, and no more than are of use; 0 for all processors.
-fn start(threads: usize) -> PyResult<ThreadPool> {
+/// So many new threads, and no more than are of use; 0 for all processors. With them, how to wait for their end.
+fn start(threads: usize) -> PyResult<(ThreadPool, Vec<JoinHandle<()>>)> {
     static PROCESSORS: OnceLock<usize> = OnceLock::new();
-    let processors = *PROCESSORS.get_or_init(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let threads = if threads == 0 { processors } else { threads.min(THREADS_EACH * processors) };
-    built(ThreadPoolBuilder::new().num_threads(threads))
+    let processors = *PROCESSORS.get_or_init(|| thread::available_parallelism().map_or(1, usize::from));
+    let count = if threads == 0 { processors } else { threads.min(THREADS_EACH * processors) };
+    let mut handles = vec![];
+    let spawn = |own: ThreadBuilder| {
+        handles.push(thread::Builder::new().spawn(|| own.run())?);
+        Ok(())
+    };
+    let pool = ThreadPoolBuilder::new().num_threads(count).spawn_handler(spawn).build();
+    Ok((pool.map_err(not_started)?, handles))
 }
 
-fn built(builder: ThreadPoolBuilder) -> PyResult<ThreadPool> {
-    builder.build().map_err(|error| memory::exhausted(&format!("threads cannot be started: {error}")))
+fn not_started(error: ThreadPoolBuildError) -> PyErr {
+    memory::exhausted(&format!("threads cannot be started: {error}"))
 }
 
 fn tell(py: Python<'_>, progress: Option<&Py<PyAny>>, event: Event) -> PyResult<()> {

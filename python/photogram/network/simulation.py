@@ -511,11 +511,13 @@ def _control(plan: _Plan, terrain: Floats, pattern: str, spacing: int) -> NDArra
     if pattern == "perimeter":
         overlaps = np.linspace(-top, top, plan.strips + 1)[1:-1]
         height = [(x, y) for x in xs[1:-1] for y in overlaps]
-    order = np.argsort(terrain[:, 0])
-    sorted_x = terrain[order, 0]
+    # Along the longer side few points are near a place.
+    axis = int(top > right)
+    order = np.argsort(terrain[:, axis])
+    along_axis = terrain[order, axis]
     for places, components in ((height, slice(2, 3)), (full, slice(0, 3))):
         for place in places:
-            low, high = np.searchsorted(sorted_x, [place[0] - plan.reach, place[0] + plan.reach])
+            low, high = np.searchsorted(along_axis, [place[axis] - plan.reach, place[axis] + plan.reach])
             near = order[low:high]
             held[near[np.argmin(((terrain[near, :2] - place) ** 2).sum(axis=1))], components] = True
     return held

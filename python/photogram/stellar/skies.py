@@ -364,10 +364,15 @@ def _result(found: dict[str, Any], images: _Images, count: int, freedom: int) ->
     held = ~images.weighted[:, None]
     place, variance = list(BROWN_PLACE), mean_error**2
     parameters = found["parameters"]
+    with np.errstate(over="ignore"):
+        covariance = variance * found["common_cofactors"][np.ix_(place, place)]
+    if not np.isfinite(covariance).all():
+        raise AdjustmentError(
+            "the variances of the camera are beyond double precision: images lie too far from their stars, or"
+            " standard deviations cannot be right"
+        )
     return SkyCalibration(
-        camera=BrownCamera(
-            parameters[3 * count :][place], variance * found["common_cofactors"][np.ix_(place, place)]
-        ),
+        camera=BrownCamera(parameters[3 * count :][place], covariance),
         attitudes=parameters[: 3 * count].reshape(count, 3),
         attitude_covariances=variance * found["pointing_cofactors"],
         cross_covariances=variance * np.take(found["cross_cofactors"], place, axis=2),
