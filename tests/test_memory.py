@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -180,3 +182,14 @@ def test_a_limit_of_addresses_is_divided_among_fewer_threads(machine, monkeypatc
     limit = own // 2
     assert memory.threads_that_fit(4, tmp_path) == 1
     assert memory.available_memory(tmp_path) == 0
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="this system does not list threads")
+def test_threads_have_ended_when_an_adjustment_returns():
+    """Until they have, they keep buffers that those of the next adjustment may need."""
+    block = simulate(strips=1, photos_per_strip=3, points_per_photo=8, seed=1).block
+    adjust(block, threads=1)
+    before = set(os.listdir("/proc/self/task"))
+    for _ in range(20):
+        adjust(block, threads=3)
+        assert set(os.listdir("/proc/self/task")) <= before

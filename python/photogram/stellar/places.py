@@ -90,6 +90,11 @@ def apparent_places(catalogue: Catalogue, utc: str) -> Floats:
     Returns
     -------
     (N, 2) right ascension and declination, radians.
+
+    Raises
+    ------
+    InputError
+        Proper motions or parallaxes that cannot be.
     """
     import erfa
 
@@ -101,17 +106,24 @@ def apparent_places(catalogue: Catalogue, utc: str) -> Floats:
     with warnings.catch_warnings():
         # Parallaxes of zero stand for stars that are far; erfa remarks on each.
         warnings.simplefilter("ignore", erfa.ErfaWarning)
-        moved = erfa.pmsafe(
-            ra,
-            dec,
-            pm_ra,
-            catalogue.proper_motions[:, 1],
-            catalogue.parallaxes / ARCSEC,
-            0.0,
-            *epoch,
-            2451545.0,
-            0.0,
-        )
+        try:
+            moved = erfa.pmsafe(
+                ra,
+                dec,
+                pm_ra,
+                catalogue.proper_motions[:, 1],
+                catalogue.parallaxes / ARCSEC,
+                0.0,
+                *epoch,
+                2451545.0,
+                0.0,
+            )
+        except erfa.ErfaError:
+            fastest = catalogue.ids[int(np.argmax(np.abs(catalogue.proper_motions).max(axis=1)))]
+            raise InputError(
+                f"stars cannot be taken to 2000.0: the proper motion of star {fastest}, or a parallax, is"
+                " none that a star can have"
+            ) from None
     # Precession and nutation once for all stars.
     astrometry, origins = erfa.apci13(*tt)
     right, declination = erfa.atciq(*moved, astrometry)
