@@ -106,6 +106,8 @@ def apparent_places(catalogue: Catalogue, utc: str) -> Floats:
     with warnings.catch_warnings():
         # Parallaxes of zero stand for stars that are far; erfa remarks on each.
         warnings.simplefilter("ignore", erfa.ErfaWarning)
+        # What overflows ends as an error of erfa.
+        warnings.simplefilter("ignore", RuntimeWarning)
         try:
             moved = erfa.pmsafe(
                 ra,
@@ -119,11 +121,9 @@ def apparent_places(catalogue: Catalogue, utc: str) -> Floats:
                 0.0,
             )
         except erfa.ErfaError:
-            fastest = catalogue.ids[int(np.argmax(np.abs(catalogue.proper_motions).max(axis=1)))]
-            raise InputError(
-                f"stars cannot be taken to 2000.0: the proper motion of star {fastest}, or a parallax, is"
-                " none that a star can have"
-            ) from None
+            raise _no_motion(catalogue) from None
+    if not all(np.isfinite(part).all() for part in moved):
+        raise _no_motion(catalogue)
     # Precession and nutation once for all stars.
     astrometry, origins = erfa.apci13(*tt)
     right, declination = erfa.atciq(*moved, astrometry)
@@ -147,3 +147,13 @@ def sidereal_time(site: Site, utc: str, dut1: float = 0.0) -> float:
     time = _utc(utc)
     tt = erfa.taitt(*erfa.utctai(*time))
     return float(erfa.anp(erfa.gst06a(*erfa.utcut1(*time, dut1), *tt) - site.longitude_west))
+
+
+def _no_motion(catalogue: Catalogue) -> InputError:
+    """Name the star whose proper motion or parallax is largest."""
+    with np.errstate(over="ignore"):
+        size = np.abs(catalogue.proper_motions).max(axis=1) + np.abs(catalogue.parallaxes)
+    return InputError(
+        "stars cannot be taken to 2000.0: the proper motion or the parallax of star"
+        f" {catalogue.ids[int(np.argmax(size))]} is none that a star can have"
+    )
