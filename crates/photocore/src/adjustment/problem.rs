@@ -20,6 +20,12 @@ pub trait Model: Sync {
     /// The same for the observations of a tie. Not called where the layout has no ties.
     fn observe_tie(&self, _prepared: &Self::Prepared, _tie: usize, _rows: &mut TieRows<'_>) {}
 
+    /// Applies a step to the unknowns. By default it is added; a model whose unknowns are not the numbers that the columns of its partials
+    /// belong to (an attitude that is kept in angles and steps by a rotation) says here what a step makes of them.
+    fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
+        unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+    }
+
     /// Computes the local unknowns afresh from the others, where the model knows how; false where it does not. Far from the
     /// solution this often leads back into the region where linearized steps do.
     fn relocate(&self, _unknowns: &mut [f64]) -> bool {
@@ -87,6 +93,15 @@ impl<M> Problem<M> {
             .map(|i| if self.is_weighted(i) { weight[i] * (self.prior[i] - values[i]) } else { 0.0 })
             .collect();
         Prior { weight, right }
+    }
+}
+
+impl<M: Model> Problem<M> {
+    /// The unknowns after a step.
+    pub(super) fn advanced(&self, unknowns: &[f64], step: &[f64]) -> Vec<f64> {
+        let mut values = unknowns.to_vec();
+        self.model.advance(&mut values, step);
+        values
     }
 }
 

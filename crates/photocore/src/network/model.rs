@@ -6,7 +6,8 @@ use super::{Image, Point};
 use crate::adjustment::Model;
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
-    self, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction, Vertical,
+    self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
+    RotationSense, Vector3, Vertical,
 };
 use crate::normals::GroupRows;
 
@@ -32,6 +33,8 @@ pub struct Bundle {
     pub order: Vec<usize>,
     /// How many images each photo has.
     pub images_on: Vec<usize>,
+    /// Which photos step by a rotation vector about their own axes: those with free angles.
+    pub turning: Vec<bool>,
     /// Whether the position of anything is weighted or fixed: then the datum is the user's.
     pub placed: bool,
 }
@@ -126,11 +129,31 @@ impl Bundle {
             let pose = std::array::from_fn(|k| pose[k]);
             let own = self.cameras[photo];
             Station {
-                orientation: Orientation::new(self.poses, self.space, &pose),
+                orientation: self.orientation(photo, &pose),
                 camera: own.with_parameters(camera).unwrap_or(own),
             }
         };
         (0..self.cameras.len()).map(photo).collect()
+    }
+
+    /// The orientation of a photo, its pose given, with the columns of its unknowns.
+    fn orientation(&self, photo: usize, pose: &[f64; 6]) -> Orientation {
+        let [x, y, z, omega, phi, kappa] = *pose;
+        match self.turning_sense(photo) {
+            Some(sense) => {
+                let local = AttitudeNumbers::OmegaPhiKappa(sense).attitude([omega, phi, kappa]);
+                Orientation::stepping(self.space, [x, y, z], &local)
+            }
+            None => Orientation::new(self.poses, self.space, pose),
+        }
+    }
+
+    /// The sense of the angles of a photo that steps by a rotation vector; None for all others.
+    pub fn turning_sense(&self, photo: usize) -> Option<RotationSense> {
+        match self.poses {
+            PoseNumbers::Angles(sense) if self.turning[photo] => Some(sense),
+            PoseNumbers::Angles(_) | PoseNumbers::Vectors => None,
+        }
     }
 
     /// The images of a point.
@@ -201,6 +224,19 @@ impl Model for Bundle {
         let points = coordinates.par_iter().with_min_len(1024);
         let points = points.map(|&coordinates| geometry::Point::new(self.space, coordinates)).collect();
         Stations { photos: self.photos(photos), points, refracted }
+    }
+
+    /// Angles of photos that step by a rotation vector go by way of their matrix.
+    fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
+        let angles_of = |photo: usize| 3 * self.points.len() + self.first[photo] + 3;
+        let turn = |photo: usize| {
+            let (first, sense) = (angles_of(photo), self.turning_sense(photo)?);
+            let [angles, rho] = [&*unknowns, step].map(|values| std::array::from_fn(|k| values[first + k]));
+            Some((first, sense.stepped(angles, &Vector3::from(rho))))
+        };
+        let turned: Vec<(usize, [f64; 3])> = (0..self.cameras.len()).filter_map(turn).collect();
+        unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+        turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
     }
 
     /// Intersects the points anew.
