@@ -47,7 +47,8 @@ impl Representation {
         match (self, numbers) {
             (Self::Three(kind), &[p, q, r]) => {
                 let numbers = [p, q, r];
-                let regular = (!kind.is_singular(numbers)).then(|| kind.rates(numbers).try_inverse()).flatten();
+                let regular =
+                    (!kind.is_singular(numbers)).then(|| kind.rates(numbers).try_inverse()).flatten();
                 let partials = regular.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
                 partials.row_iter().map(|row| row.transpose()).collect()
             }
