@@ -15,6 +15,9 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(nadir_boresight, module)?)
 }
 
+/// Two arrays, each of a row or matrix for every attitude.
+type Pair<'py, A, B> = PyResult<(Bound<'py, A>, Bound<'py, B>)>;
+
 /// What the numbers of an attitude are.
 enum Representation {
     Three(AttitudeNumbers),
@@ -65,7 +68,7 @@ fn attitudes_from_numbers<'py>(
     representation: &str,
     numbers: PyReadonlyArrayDyn<'py, f64>,
     boresight: [[f64; 3]; 3],
-) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)> {
+) -> Pair<'py, PyArray3<f64>, PyArray3<f64>> {
     let representation = Representation::named(representation, boresight)?;
     let (mut attitudes, mut rates) = (vec![], vec![]);
     match &representation {
@@ -99,7 +102,7 @@ fn numbers_of_attitudes<'py>(
     representation: &str,
     attitudes: PyReadonlyArrayDyn<'py, f64>,
     boresight: [[f64; 3]; 3],
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+) -> Pair<'py, PyArray2<f64>, PyArray3<f64>> {
     let representation = Representation::named(representation, boresight)?;
     let attitudes = matrices::<3>("matrices", &attitudes)?;
     let count = attitudes.len();
