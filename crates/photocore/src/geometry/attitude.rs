@@ -231,3 +231,8 @@ fn wrapped(angle: f64) -> f64 {
 pub fn quaternion_by_step([w, x, y, z]: [f64; 4]) -> [Vector3; 4] {
     [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]].map(|row| 0.5 * Vector3::from(row))
 }
+
+/// The same of R = F A^T, vision from object (COLMAP's): dq = 1/2 (0, -F rho) q, F being [`vision_axes`].
+pub fn vision_quaternion_by_step([w, x, y, z]: [f64; 4]) -> [Vector3; 4] {
+    [[-x, -y, -z], [w, z, -y], [-z, w, x], [y, -x, w]].map(|[a, b, c]| 0.5 * Vector3::new(-a, b, c))
+}

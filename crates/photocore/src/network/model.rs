@@ -121,6 +121,26 @@ struct Approach {
     share: f64,
 }
 
+/// What the points that a photo sees have as shares in what its station learns.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shares {
+    sum: f64,
+    largest: f64,
+}
+
+impl Shares {
+    fn add(&mut self, share: f64) {
+        self.sum += share;
+        self.largest = self.largest.max(share);
+    }
+
+    /// A share in those of the others in the mean, of so many images; None unless it is much larger.
+    fn ratio(&self, own: f64, images: usize) -> Option<f64> {
+        let others = (self.sum - own).max(0.0) / (images as f64 - 1.0).max(1.0);
+        (others > 0.0 && own > ON_ITS_WAY * others).then(|| own / others)
+    }
+}
+
 impl Bundle {
     /// The photos at given values of their unknowns.
     pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
@@ -170,16 +190,18 @@ impl Bundle {
             let centre = stations.photos[image.photo].orientation.centre();
             (stations.points[point].position() - centre).norm_squared().recip()
         };
-        let mut shares = vec![0.0; stations.photos.len()];
+        let mut shares = vec![Shares::default(); stations.photos.len()];
         for point in 0..self.points.len() {
-            self.images_of(point).iter().for_each(|image| shares[image.photo] += share(point, image));
+            self.images_of(point).iter().for_each(|image| shares[image.photo].add(share(point, image)));
+        }
+        let has_near = |(shares, &images): (&Shares, &usize)| shares.ratio(shares.largest, images).is_some();
+        if !shares.iter().zip(&self.images_on).any(has_near) {
+            return vec![];
         }
         let approach = |point: usize, image: &Image| {
-            let own = share(point, image);
-            let others =
-                (shares[image.photo] - own).max(0.0) / (self.images_on[image.photo] as f64 - 1.0).max(1.0);
-            let near = others > 0.0 && own > ON_ITS_WAY * others;
-            near.then(|| Approach { point, photo: image.photo, share: own / others })
+            let photo = image.photo;
+            let share = shares[photo].ratio(share(point, image), self.images_on[photo])?;
+            Some(Approach { point, photo, share })
         };
         let of_point = |point| self.images_of(point).iter().filter_map(move |image| approach(point, image));
         (0..self.points.len()).flat_map(of_point).collect()
