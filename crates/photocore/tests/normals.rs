@@ -327,9 +327,86 @@ fn a_border_of_hundreds_agrees_with_dense_algebra() {
     }
 }
 
+/// A block whose photographs have a camera of three unknowns for each strip and share one of ten; `first` of the cameras stand before
+/// the photographs.
+fn with_cameras(strips: usize, length: usize, border: usize, first: bool) -> Layout {
+    let (plain, photos) = (block(strips, length, border).layout, strips * length);
+    let shift = if first { strips + 1 } else { 0 };
+    let camera = |index: usize| (if first { index } else { photos + index }) as u32;
+    let group = |group: usize| plain.kept_of(group);
+    let dims = if first {
+        [vec![3; strips], vec![10], vec![6; photos]].concat()
+    } else {
+        [vec![6; photos], vec![3; strips], vec![10]].concat()
+    };
+    let mut ptr = vec![0];
+    ptr.extend((0..plain.locals()).map(|local| plain.groups_of(local).end));
+    let kept = (0..plain.groups()).map(|g| (group(g) + shift) as u32).collect();
+    let further = (0..plain.groups()).flat_map(|g| [camera(strips), camera(group(g) / length)]).collect();
+    let layout = Layout::new(2, 3, &dims, ptr, kept).unwrap();
+    let layout = layout.with_further((0..=plain.groups()).map(|g| 2 * g).collect(), further).unwrap();
+    let ranges = (0..plain.groups()).map(|g| plain.border_of(g)).map(|r| r.start as u32..r.end as u32);
+    let layout = layout.with_border(border, ranges.collect()).unwrap();
+    let of_photos = plain.places().unwrap();
+    let of_cameras: Vec<[f64; 3]> =
+        (0..=strips).map(|strip| of_photos[strip.min(strips - 1) * length + length / 2]).collect();
+    let places = if first { [&of_cameras, of_photos] } else { [of_photos, &of_cameras] };
+    layout.with_places(places.concat()).unwrap()
+}
+
+#[test]
+fn shared_cameras_agree_with_dense_algebra() {
+    for ordering in ALL {
+        compare_with_dense(&Dense::new(with_cameras(1, 60, 0, true), 13), ordering);
+        compare_with_dense(&Dense::new(with_cameras(7, 12, 0, false), 14), ordering);
+        compare_with_dense(&Dense::new(with_cameras(5, 12, 9, true), 15), ordering);
+    }
+}
+
+/// The camera of the whole block is joined to everything: it goes last, and the others are ordered by the shape they have without it.
+#[test]
+fn what_is_joined_to_everything_is_eliminated_last() {
+    for (strips, length) in [(1, 200), (12, 40)] {
+        let layout = with_cameras(strips, length, 0, true);
+        let plain = block(strips, length, 0).layout;
+        for ordering in &ALL[2..] {
+            let system = System::new(layout.clone(), *ordering);
+            assert_eq!(system.symbolic().order().last(), Some(&strips), "{ordering:?}");
+            let cost =
+                |layout: &Layout| System::new(layout.clone(), *ordering).symbolic().operations(layout).factor;
+            // Thirteen more unknowns in every front, of twenty to a hundred.
+            let (with, without) = (cost(&layout), cost(&plain));
+            assert!(with < 4.0 * without, "{ordering:?}: {with} beside {without}");
+        }
+    }
+}
+
+#[test]
+fn what_a_shared_camera_and_photos_leave_open_is_named() {
+    let mut dense = Dense::new(with_cameras(3, 8, 0, false), 17);
+    let layout = dense.layout.clone();
+    let camera = 24 + 3;
+    dense.prior.weight[layout.kept_range(camera)].fill(0.0);
+    dense.prior.weight[layout.kept_range(5)].fill(0.0);
+    // What the second unknown of the shared camera does, the first of photo 5 undoes: their sum alone is determined.
+    let (photo, own) = (layout.kept_range(5).start, layout.kept_range(camera).start + 1);
+    for row in 0..dense.right.len() {
+        dense.matrix[(row, own)] = dense.matrix[(row, photo)];
+    }
+    let system = System::new(layout, Ordering::Auto);
+    let factor = done(system.factor(&pool(2), &dense, &dense.prior, 0.0, &mut go));
+    let deficiency = factor.deficiency().unwrap();
+    assert_eq!(deficiency.blocks(), vec![vec![5, camera]]);
+    assert_eq!(deficiency.unknowns(system.layout()), vec![vec![photo, own]]);
+}
+
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
-    let plain = block(8, 40, 5).layout;
+    same_bits(block(8, 40, 5).layout);
+    same_bits(with_cameras(8, 40, 5, true));
+}
+
+fn same_bits(plain: Layout) {
     let tie = |k: u32| Tie { rows: 2, kept: vec![k, k + 40, 7], border: 0..3 };
     let dense = Dense::new(plain.with_ties((10..30).map(tie).collect()).unwrap(), 3);
     let rights: Vec<f64> = (0..20 * dense.layout.unknowns()).map(|k| (k % 17) as f64 - 8.0).collect();
@@ -346,7 +423,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     };
     let one = run(1);
     assert_eq!(one, run(2));
-    assert_eq!(one, run(4));
+    assert_eq!(one, run(5));
 }
 
 #[test]
@@ -386,6 +463,18 @@ fn layouts_that_contradict_themselves_are_refused() {
     assert!(layout.clone().with_border(3, std::iter::once(1..4).collect()).is_err());
     assert!(layout.clone().with_border(3, vec![]).is_err());
     assert!(layout.clone().with_places(vec![]).is_err());
+    let two = Layout::new(2, 3, &[6, 6, 3], vec![0, 2], vec![0, 0]).unwrap();
+    assert!(two.clone().with_further(vec![0, 1, 3], vec![2, 1, 2]).is_ok());
+    for (ptr, blocks) in [
+        (vec![0, 1], vec![2]),
+        (vec![0, 2, 1], vec![2]),
+        (vec![0, 1, 1], vec![2, 1]),
+        (vec![0, 1, 1], vec![0]),
+        (vec![0, 1, 1], vec![3]),
+        (vec![0, 2, 2], vec![2, 2]),
+    ] {
+        assert!(two.clone().with_further(ptr, blocks).is_err());
+    }
     let refused = |rows, kept: &[u32], border| {
         layout.clone().with_ties(vec![Tie { rows, kept: kept.to_vec(), border }]).is_err()
     };
