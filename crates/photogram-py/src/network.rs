@@ -1,7 +1,7 @@
 //! Networks of photos: blocks and collections; their documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
-use photocore::adjustment::{Criterion, Options as AdjustmentOptions};
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
 use photocore::geometry::{Bal, BundlerPhoto, ObjectSpace, Perspective, Point as GroundPoint, PoseNumbers};
 use photocore::network::{
     AdjustedPhoto, Camera, Coarse, Image, Network, NetworkError as Failure, Options, Photo, Point, Solution,
@@ -177,13 +177,13 @@ fn adjust_block(
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
     };
-    let criterion = match criterion {
-        "fraction" => Criterion::Fraction(limit),
-        "percent" => Criterion::Percent(limit),
+    let method = match criterion {
+        "fraction" => Method::Damped(Stop::Fraction(limit)),
+        "percent" => Method::Full(Published::Percent(limit)),
         other => return Err(unknown("criterion", other)),
     };
     let options = Options {
-        adjustment: AdjustmentOptions { criterion, max_iterations, covariance, loss: named_loss(loss)? },
+        adjustment: AdjustmentOptions { method, max_iterations, covariance, loss: named_loss(loss)? },
         ordering: named_ordering(ordering)?,
         unit_variance: match unit_variance {
             "free" => UnitVariance::Free,
@@ -253,7 +253,7 @@ fn adjust_collection(
     };
     let options = Options {
         adjustment: AdjustmentOptions {
-            criterion: Criterion::Decrease(decrease),
+            method: Method::TrustRegion(Stop::Decrease(decrease)),
             max_iterations,
             covariance,
             loss: named_loss(loss)?,
