@@ -4,7 +4,7 @@ use super::model::{Bundle, Station};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
 use super::{Camera, Image, Network, NetworkError, Options, Photo, Point, Start};
-use crate::adjustment::Problem;
+use crate::adjustment::{Method, Problem};
 use crate::geometry::{ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, nearest_turns};
 use crate::normals::{Layout, System};
 
@@ -112,7 +112,7 @@ impl Network {
         let origin = self.origin();
         let mut model = self.bundle(&screened, images_on.clone(), origin);
         // The programs of their time stepped in angles.
-        if !options.adjustment.criterion.is_published() {
+        if !matches!(options.adjustment.method, Method::Full(_)) {
             model.turning = (0..self.photos.len()).map(|i| self.turns(i) && !unused(i)).collect();
         }
         let local = |pose: [f64; 6]| match self.poses {

@@ -1,7 +1,7 @@
 //! What an adjustment of a collection is given: every photo with a camera of its own, poses in vectors.
 
 use numpy::{PyArray2, PyReadonlyArrayDyn};
-use photocore::adjustment::{Criterion, Options as AdjustmentOptions};
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
 use photocore::geometry::{self, ObjectSpace, Orientation, Point as GroundPoint, PoseNumbers, Unit};
 use photocore::network::{Camera, Network, NetworkError as Failure, Options, Photo, Start, UnitVariance};
 use pyo3::exceptions::PyValueError;
@@ -115,7 +115,7 @@ fn adjust_collection(
     };
     let options = Options {
         adjustment: AdjustmentOptions {
-            criterion: Criterion::Decrease(decrease),
+            method: Method::TrustRegion(Stop::Decrease(decrease)),
             max_iterations,
             covariance,
             loss: named_loss(loss)?,
