@@ -176,6 +176,7 @@ fn adjust_block(
         photos,
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
+        observations: vec![],
     };
     let criterion = match criterion {
         "fraction" => Criterion::Fraction(limit),
@@ -250,6 +251,7 @@ fn adjust_collection(
         photos,
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
+        observations: vec![],
     };
     let options = Options {
         adjustment: AdjustmentOptions {
@@ -299,6 +301,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
         | Failure::SharedCamera(_)
+        | Failure::Observation { .. }
         | Failure::Vectors
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
