@@ -117,6 +117,30 @@ impl Orientation {
         }
     }
 
+    /// The step of the pose, dC and rho (see [`Pose::step`]), that a unit of each unknown takes to first order.
+    pub fn steps(&self) -> [(Vector3, Vector3); 6] {
+        let none = Vector3::zeros();
+        match &self.unknowns {
+            Unknowns::Position { turns, rates, .. } => {
+                let (centre, rates) = (self.centre_partials(), rates.unwrap_or_else(Matrix3::identity));
+                let [longitude, latitude] = turns.unwrap_or([none; 2]);
+                let turned = [-longitude, -latitude, none];
+                let by_position = |k: usize| (centre.column(k).into(), turned[k]);
+                let by_attitude = |k: usize| (none, rates.column(k).into());
+                std::array::from_fn(|k| if k < 3 { by_position(k) } else { by_attitude(k - 3) })
+            }
+            // du = -A^T dC + u x rho = w x (u - t) holds for every u, so that rho = -w, and at u = 0 dC = A (w x t).
+            Unknowns::Vectors { turns, translation } => std::array::from_fn(|k| {
+                if k < 3 {
+                    let turn: Vector3 = turns.column(k).into();
+                    (self.pose.attitude * turn.cross(translation), -turn)
+                } else {
+                    (-self.pose.attitude.column(k - 3), none)
+                }
+            }),
+        }
+    }
+
     /// By how much each of the three unknowns that shift would have to change, about, to move the photo to a place: the index of the
     /// unknown among the six, and the change in units of length.
     pub fn shifts_along(&self, place: &Vector3) -> [(usize, f64); 3] {
