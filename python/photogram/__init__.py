@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
     from photogram.planning import Plan, plan
-    from photogram.results.adjusted import Iteration
+    from photogram.results.iteration import Iteration
     from photogram.results.result import Result
 
 __all__ = [
@@ -59,7 +59,7 @@ _HOMES = {
     "Attitudes": "network.attitudes",
     "Block": "network.block",
     "InputError": "errors",
-    "Iteration": "results.adjusted",
+    "Iteration": "results.iteration",
     "Message": "messages",
     "Orientation": "absolute_orientation",
     "OutOfMemoryError": "errors",

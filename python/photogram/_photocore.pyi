@@ -184,6 +184,32 @@ def rotation_angles(matrices: _Floats) -> _Floats:
         An argument of another shape; the message names it and its shape.
     """
 
+def vector_rotations(vectors: _Floats) -> _Floats:
+    """Rotation matrices of (n, 3) rotation vectors: axis times angle, radians (Rodrigues).
+
+    Returns
+    -------
+    (n, 3, 3) matrices.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape; the message names it and its shape.
+    """
+
+def rotation_vectors(matrices: _Floats) -> _Floats:
+    """Rotation vectors of (n, 3, 3) rotation matrices, the inverse of `vector_rotations`.
+
+    Returns
+    -------
+    (n, 3) axis times angle, radians, no longer than pi.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape; the message names it and its shape.
+    """
+
 def geographic_to_geocentric(positions: _Floats, a: float, b: float) -> _Floats:
     """Geocentric X, Y, Z of geographic positions.
 
@@ -1256,30 +1282,44 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     (k,) numbers, and whether they are the whole text.
     """
 
-def bundler_images(photo_parameters: _Floats, points: _Floats) -> _Floats:
-    """Image coordinates of points, row by row: point i on the photo of row i.
+CAMERAS: list[str]
+"""What the models of cameras are called."""
 
-    f (1 + k1 p^2 + k2 p^4) p with P = R(w) X + t and p = -(P1, P2) / P3.
+def camera_model(camera: str) -> tuple[str, list[tuple[str, bool]]]:
+    """Return the formula of a model of cameras, and its parameters: name, whether a length in the image.
+
+    Raises
+    ------
+    ValueError
+        No model has this name.
+    """
+
+def collection_images(camera: str, photo_parameters: _Floats, points: _Floats) -> _Floats:
+    """Image coordinates of points, row by row: point i on the photo of row i.
 
     Parameters
     ----------
+    camera
+        The model, one of `CAMERAS`; `docs/collection.md` has their formulas.
     photo_parameters
-        (n, 9) angle-axis vector w (rad), t, f (pixels), k1, k2.
+        (n, 6 + k) angle-axis vector w (rad) and t, so that P = R(w) X + t in the photo's axes (x right, y up,
+        looking along -z), then the k parameters of the camera.
     points
         (n, 3) X.
 
     Returns
     -------
-    (n, 2) pixels; not finite in the plane of the projection centre. A point behind the camera has the image
-    that the formula gives.
+    (n, 2) in the unit of the camera; not finite in the plane of the projection centre. A point behind the
+    camera has the image that the formula gives.
 
     Raises
     ------
     ValueError
-        An argument of another shape or length; the message names it.
+        An argument of another shape, length or choice; the message names it.
     """
 
 def adjust_collection(
+    camera: str,
     photo_parameters: _Floats,
     photo_sd: _Floats,
     point_positions: _Floats,
@@ -1302,9 +1342,11 @@ def adjust_collection(
 
     Parameters
     ----------
+    camera
+        The model of the cameras, one of `CAMERAS`.
     photo_parameters, photo_sd
-        (P, 9) initial (and, where weighted, observed) parameters and their standard deviations, infinite
-        for free ones, zero for fixed ones; see :func:`bundler_images`.
+        (P, 6 + k) initial (and, where weighted, observed) parameters and their standard deviations, infinite
+        for free ones, zero for fixed ones; see :func:`collection_images`.
     point_positions, point_sd
         (n, 3) likewise.
     image_photos, image_points
@@ -1358,15 +1400,15 @@ class CollectionSolution:
 
     @property
     def photo_parameters(self) -> _Floats:
-        """(P, 9) angle-axis vector (rad), translation, f (pixels), k1, k2."""
+        """(P, 6 + k) as they were given, adjusted."""
 
     @property
     def photo_cofactors(self) -> _Floats:
-        """(P, 9, 9)."""
+        """(P, 6 + k, 6 + k)."""
 
     @property
     def photo_redundancy(self) -> _Floats:
-        """(P, 9) redundancy numbers of the parameters as observations; 0 unless weighted."""
+        """(P, 6 + k) redundancy numbers of the parameters as observations; 0 unless weighted."""
 
     @property
     def photo_images(self) -> _Indices:

@@ -12,6 +12,7 @@ mod resection;
 mod similarity;
 mod solution;
 mod stellar;
+mod text;
 mod work;
 
 use pyo3::prelude::*;
@@ -30,5 +31,6 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     comparator::register(module)?;
     resection::register(module)?;
     similarity::register(module)?;
-    stellar::register(module)
+    stellar::register(module)?;
+    text::register(module)
 }

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.structuring import structure
+from photogram.results.observed import control_lines, image_lines, station_lines, tested
+from photogram.results.result import Result
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.sections import Section, composed, headline, problems
+from photogram.show.ways import report_of
 from photogram.statistics.limits import normal_limit
 from photogram.statistics.outliers import Observations, outliers
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.results.adjusted import AdjustedBlock
 
 __all__ = ["bandwidths", "problems_of", "report", "summary"]
 
@@ -32,8 +34,9 @@ _ORDERINGS = {
 }
 
 
+@report_of.register(Result)
 @np.errstate(over="ignore")  # what is too large for its unit is infinite
-def report(result: AdjustedBlock) -> str:
+def report(result: Result) -> str:
     """Return the report of an adjusted block."""
     sections = [
         *summary(result),
@@ -51,6 +54,7 @@ def report(result: AdjustedBlock) -> str:
             "Stations as observations: observed minus adjusted, redundancy, standardized residual",
             _stations(result),
         ),
+        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
         ("Work", _work(result)),
@@ -59,7 +63,7 @@ def report(result: AdjustedBlock) -> str:
 
 
 @np.errstate(over="ignore")
-def summary(result: AdjustedBlock) -> list[Section]:
+def summary(result: Result) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
     return [
         ("Problems", problems_of(result)),
@@ -69,48 +73,31 @@ def summary(result: AdjustedBlock) -> list[Section]:
     ]
 
 
-def problems_of(result: AdjustedBlock) -> list[str]:
+def problems_of(result: Result) -> list[str]:
     """Return what keeps a reader from using the values: a failed test and outliers before other remarks."""
     found = outliers(_tested(result), normal_limit, "standardized residuals")
     messages = [*found, *result.messages]
     return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
 
 
-def _tested(result: AdjustedBlock) -> list[Observations]:
-    """Return all observations with their standardized residuals, where these say something."""
+def _tested(result: Result) -> list[Observations]:
     block = result.block
-    axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
-    unknowns = (*axes, "omega", "phi", "kappa")
-
-    def image(index: tuple[int, ...]) -> str:
-        point, photo = block.image_points[index[0]], block.image_photos[index[0]]
-        return f"{'xy'[index[1]]} of point {block.point_ids[point]} on photo {block.photo_ids[photo]}"
-
-    def testable(standardized: Floats, redundancy: Floats) -> Floats:
-        return np.where(redundancy > TESTABLE, standardized, np.nan)
-
-    return [
-        Observations("image coordinates", testable(result.standardized, result.redundancy), image),
-        Observations(
-            "components of control",
-            testable(result.point_standardized, result.point_redundancy),
-            lambda index: f"{axes[index[1]]} of control point {block.point_ids[index[0]]}",
-        ),
-        Observations(
-            "components of stations",
-            testable(result.photo_standardized, result.photo_redundancy),
-            lambda index: f"{unknowns[index[1]]} of photo {block.photo_ids[index[0]]}",
-        ),
-    ]
+    unknowns = (*_axes(result), "omega", "phi", "kappa")
+    return tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result))
 
 
-def _adjustment(result: AdjustedBlock) -> list[str]:
+def _axes(result: Result) -> tuple[str, str, str]:
+    """Return what the coordinates are called."""
+    return ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+
+
+def _adjustment(result: Result) -> list[str]:
     block, sums = result.block, result.sums_of_squares
     kinds = result.point_kinds[result.used_points].tolist()
     variance = result.variance_of_unit_weight
     held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
-    axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
-    components = ", ".join(f"{axis} {count}" for axis, count in zip(axes, held.sum(axis=0), strict=True))
+    counts = zip(_axes(result), held.sum(axis=0), strict=True)
+    components = ", ".join(f"{axis} {count}" for axis, count in counts)
     basis = {"free": "cameras free", "constrained": "cameras constrained", "unity": "set to 1"}[
         result.unit_variance
     ]
@@ -138,7 +125,7 @@ def _adjustment(result: AdjustedBlock) -> list[str]:
     return [f"{name:<36}{value}" for name, value in rows]
 
 
-def _residuals(result: AdjustedBlock) -> list[str]:
+def _residuals(result: Result) -> list[str]:
     used = result.used_images
     lines = [
         f"rms of image residuals              {_rms(result.residuals[used][:, axis]) * 1000:.3f} um in {name}"
@@ -162,7 +149,7 @@ def _residuals(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def _iterations(result: AdjustedBlock) -> list[str]:
+def _iterations(result: Result) -> list[str]:
     lines = [f"{'number':>6} {'weighted sum of squares':>24} {'largest change / sd':>20} {'damping':>9}"]
     lines.append(f"{0:>6} {result.initial_weighted_sum_of_squares:>24.6f}")
     lines += [
@@ -172,7 +159,7 @@ def _iterations(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def _suspects(result: AdjustedBlock) -> list[str]:
+def _suspects(result: Result) -> list[str]:
     testable = result.redundancy > TESTABLE
     size = np.where(testable, np.nan_to_num(np.abs(result.standardized)), 0.0)
     images, axes = np.nonzero(size > _BLUNDER)
@@ -191,28 +178,28 @@ def _suspects(result: AdjustedBlock) -> list[str]:
     return lines if images.size == len(order) else [*lines, f"and {images.size - len(order)} more"]
 
 
-def _held_differences(result: AdjustedBlock) -> Floats:
+def _held_differences(result: Result) -> Floats:
     return _differences_where(result, np.isfinite(result.block.point_sd))
 
 
-def _unheld_differences(result: AdjustedBlock) -> Floats:
+def _unheld_differences(result: Result) -> Floats:
     """Return those of components of control that are not held, but have a value to compare with."""
     held = np.isfinite(result.block.point_sd)
     return _differences_where(result, held.any(axis=1, keepdims=True) & ~held)
 
 
-def _check_differences(result: AdjustedBlock) -> Floats:
+def _check_differences(result: Result) -> Floats:
     return _differences_where(result, (result.point_kinds == "check")[:, np.newaxis])
 
 
-def _differences_where(result: AdjustedBlock, which: np.ndarray) -> Floats:
+def _differences_where(result: Result, which: np.ndarray) -> Floats:
     """Return (n, 3) adjusted minus supplied coordinates, NaN where not asked for or not supplied."""
     used = result.used_points[:, np.newaxis]
     differences: Floats = np.where(used & which, result.point_differences, np.nan)
     return differences
 
 
-def _difference_table(result: AdjustedBlock, differences: Floats) -> list[str]:
+def _difference_table(result: Result, differences: Floats) -> list[str]:
     points = np.flatnonzero(np.isfinite(differences).any(axis=1))
     if len(points) == 0:
         return []
@@ -226,78 +213,24 @@ def _difference_table(result: AdjustedBlock, differences: Floats) -> list[str]:
     return lines
 
 
-def _control(result: AdjustedBlock) -> list[str]:
-    rows = np.flatnonzero(result.used_points & np.isfinite(result.block.point_sd).any(axis=1))
-    units, outward = _difference_units(result), _outward(result)
-    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
-    return _observed_table(
-        "point",
-        [result.block.point_ids[row] for row in rows],
-        [f"{axis} {unit}" for axis, unit in zip(axes, units, strict=True)],
-        result.block.point_sd[rows] * outward,
-        result.point_residuals[rows] * outward,
-        result.point_redundancy[rows],
-        result.point_standardized[rows],
-    )
+def _control(result: Result) -> list[str]:
+    columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
+    return control_lines(result, result.block.point_ids, columns, _outward(result))
 
 
-def _stations(result: AdjustedBlock) -> list[str]:
-    given_sd = result.photo_given_sd
-    rows = np.flatnonzero(np.isfinite(given_sd).any(axis=1))
-    units, outward = _difference_units(result), np.append(_outward(result), [1.0 / ARCSEC] * 3)
-    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
-    names = [f"{axis} {unit}" for axis, unit in zip(axes, units, strict=True)]
-    return _observed_table(
-        "photo",
-        [result.block.photo_ids[row] for row in rows],
-        [*names, "omega arcsec", "phi arcsec", "kappa arcsec"],
-        given_sd[rows] * outward,
-        result.photo_residuals[rows] * outward,
-        result.photo_redundancy[rows],
-        result.photo_standardized[rows],
-    )
+def _stations(result: Result) -> list[str]:
+    columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
+    columns += ["omega arcsec", "phi arcsec", "kappa arcsec"]
+    outward = np.append(_outward(result), [1.0 / ARCSEC] * 3)
+    return station_lines(result, result.block.photo_ids, columns, outward)
 
 
-def _observed_table(
-    kind: str,
-    names: list[str],
-    columns: list[str],
-    sd: Floats,
-    residuals: Floats,
-    redundancy: Floats,
-    standardized: Floats,
-) -> list[str]:
-    """Four lines for each of some observed positions: what was observed, and how it fits."""
-    if not names:
-        return []
-    lines = [f"{kind:<10}{'':<14}" + "".join(f"{column:>18}" for column in columns)]
-    held = np.isfinite(sd)
-    weighted = held & (sd > 0)
-    for row, name in enumerate(names):
-        deviations = [
-            "free" if math.isinf(each) else "fixed" if each == 0 else f"{each:.5f}" for each in sd[row]
-        ]
-        parts = (
-            ("sd", deviations),
-            ("residual", _cells(residuals[row], held[row], 5)),
-            ("redundancy", _cells(redundancy[row], weighted[row], 3)),
-            ("standardized", _cells(standardized[row], weighted[row], 2)),
-        )
-        lines += [
-            f"{name if part == 'sd' else '':<10}{part:<14}" + "".join(f"{cell:>18}" for cell in cells)
-            for part, cells in parts
-        ]
-    return lines
+def _images(result: Result) -> list[str]:
+    block = result.block
+    return image_lines(result, block.image_photos, block.photo_ids, block.point_ids, "um", 1000.0)
 
 
-def _cells(values: Floats, there: np.ndarray, decimals: int) -> list[str]:
-    return [
-        f"{value:.{decimals}f}" if use and math.isfinite(value) else "-"
-        for value, use in zip(values, there, strict=True)
-    ]
-
-
-def _photos(result: AdjustedBlock) -> list[str]:
+def _photos(result: Result) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [
         f"{'photo':<10}{_position_head(result)}{'omega deg':>15}{'phi deg':>15}{'kappa deg':>15}",
@@ -316,7 +249,7 @@ def _photos(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def _points(result: AdjustedBlock) -> list[str]:
+def _points(result: Result) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [f"{'point':<10}{_position_head(result)}  rays  kind", f"{'':<10}{_sd_head(result)}"]
     rows = zip(
@@ -334,7 +267,7 @@ def _points(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def _work(result: AdjustedBlock) -> list[str]:
+def _work(result: Result) -> list[str]:
     order = _ORDERINGS[result.ordering]
     lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
     lines += [
@@ -347,7 +280,7 @@ def _work(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def bandwidths(result: AdjustedBlock) -> list[str]:
+def bandwidths(result: Result) -> list[str]:
     """Return what the 1987 program would have needed, for the order of the input and for the one chosen."""
     images = result.block.image_photos, result.block.image_points
     lines = ["bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)"]
@@ -364,35 +297,34 @@ def _rms(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
 
 
-def _outward(result: AdjustedBlock) -> Floats:
+def _outward(result: Result) -> Floats:
     """Return the factors from inner units to those of the report: arcsec for angles."""
     return np.array([1.0 / ARCSEC, 1.0 / ARCSEC, 1.0] if result.block.geographic else [1.0, 1.0, 1.0])
 
 
-def _difference_units(result: AdjustedBlock) -> tuple[str, str, str]:
+def _difference_units(result: Result) -> tuple[str, str, str]:
     unit = result.block.linear_unit
     return ("arcsec", "arcsec", unit) if result.block.geographic else (unit, unit, unit)
 
 
-def _differences(result: AdjustedBlock, values: Iterable[float]) -> list[str]:
-    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+def _differences(result: Result, values: Iterable[float]) -> list[str]:
     outward = np.array(list(values)) * _outward(result)
-    triples = zip(axes, outward, _difference_units(result), strict=True)
+    triples = zip(_axes(result), outward, _difference_units(result), strict=True)
     return [f"{axis} {value:.5f} {unit}" for axis, value, unit in triples if math.isfinite(value)]
 
 
-def _position_head(result: AdjustedBlock) -> str:
+def _position_head(result: Result) -> str:
     unit = result.block.linear_unit
     planimetry = ("longitude", "latitude") if result.block.geographic else (f"X {unit}", f"Y {unit}")
     names = (*planimetry, f"height {unit}" if result.block.geographic else f"Z {unit}")
     return "".join(f"{name:>20}" for name in names)
 
 
-def _sd_head(result: AdjustedBlock) -> str:
+def _sd_head(result: Result) -> str:
     return "".join(f"{f'sd {unit}':>20}" for unit in _difference_units(result))
 
 
-def _position_formats(result: AdjustedBlock) -> tuple[Callable[[Floats], str], Callable[[Floats], str]]:
+def _position_formats(result: Result) -> tuple[Callable[[Floats], str], Callable[[Floats], str]]:
     """How positions and their standard deviations are written."""
 
     def position(values: Floats) -> str:

@@ -1,128 +1,152 @@
-"""Results as pandas data frames.
+"""The tables of results: named columns.
 
-pandas rather than polars: geopandas, matplotlib and statsmodels, which people use on such tables, speak it.
-It is imported only when a table is asked for. Every column that has a unit other than the linear unit of the
-object space says it in its name.
+Every column that has a unit other than the linear unit of the object space says it in its name.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.network.block import ATTITUDE_COLUMNS, position_columns
+from photogram.results.network import AdjustedNetwork
+from photogram.results.result import Result
+from photogram.show.ways import columns_of
 
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.results.adjusted import AdjustedBlock
-
-__all__ = ["check_table", "control_table", "image_table", "photo_table", "point_table", "station_table"]
+__all__ = ["control", "images", "named", "stations"]
 
 
-def photo_table(result: AdjustedBlock) -> pd.DataFrame:
-    """Return adjusted photos: `photo`, position, attitude, and `sd_` of each; angles in degrees."""
+@columns_of.register(Result)
+def table(result: Result, what: str) -> dict[str, Any]:
+    """Return the columns of photos, points, images, check points, control or stations."""
+    return _TABLES[what](result)
+
+
+def _photos(result: Result) -> dict[str, Any]:
+    """`photo`, position, attitude, and `sd_` of each; angles in degrees."""
     names = [*position_columns(result.block), *ATTITUDE_COLUMNS]
     values = np.hstack([result.photo_positions, result.photo_attitudes])
-    return pd.DataFrame(
-        {
-            "photo": result.block.photo_ids,
-            **_columns(names, values),
-            **_columns(names, result.photo_sd, "sd_"),
-        }
-    )
+    photos = _ids(result.block.photo_ids)
+    return {"photo": photos, **named(names, values), **named(names, result.photo_sd, "sd_")}
 
 
-def point_table(result: AdjustedBlock) -> pd.DataFrame:
-    """Return adjusted points: `point`, `kind`, `rays`, coordinates, and `sd_` of each; angles in degrees."""
-    used = result.used_points
-    names = position_columns(result.block)
-    return pd.DataFrame(
-        {
-            "point": np.array(result.block.point_ids, dtype=object)[used],
-            "kind": result.point_kinds[used],
-            "rays": result.point_rays[used],
-            **_columns(names, result.point_positions[used]),
-            **_columns(names, result.point_sd[used], "sd_"),
-        }
-    )
+def _points(result: Result) -> dict[str, Any]:
+    """`point`, `kind`, `rays`, coordinates, and `sd_` of each; angles in degrees."""
+    used, names = result.used_points, position_columns(result.block)
+    return {
+        "point": _ids(result.block.point_ids)[used],
+        "kind": result.point_kinds[used],
+        "rays": result.point_rays[used],
+        **named(names, result.point_positions[used]),
+        **named(names, result.point_sd[used], "sd_"),
+    }
 
 
-def image_table(result: AdjustedBlock) -> pd.DataFrame:
-    """Return image observations: residuals in millimetres, redundancy numbers, standardized residuals."""
+def _images(result: Result) -> dict[str, Any]:
+    """Residuals in millimetres, redundancy numbers, standardized residuals."""
     block, used = result.block, result.used_images
-    return pd.DataFrame(
-        {
-            "photo": np.array(block.photo_ids, dtype=object)[block.image_photos[used]],
-            "point": np.array(block.point_ids, dtype=object)[block.image_points[used]],
-            **_columns(("residual_x_mm", "residual_y_mm"), result.residuals[used]),
-            **_columns(("redundancy_x", "redundancy_y"), result.redundancy[used]),
-            **_columns(("standardized_x", "standardized_y"), result.standardized[used]),
-        }
-    )
+    return {
+        "photo": _ids(block.photo_ids)[block.image_photos[used]],
+        "point": _ids(block.point_ids)[block.image_points[used]],
+        **images(result, "mm"),
+    }
 
 
-def check_table(result: AdjustedBlock) -> pd.DataFrame:
-    """Return check points: adjusted minus supplied coordinates (`d_`) and standard deviations (`sd_`)."""
+def _check_points(result: Result) -> dict[str, Any]:
+    """`d_`, adjusted minus supplied coordinates, and standard deviations (`sd_`)."""
     check = result.used_points & (result.point_kinds == "check")
     names = position_columns(result.block)
-    return pd.DataFrame(
-        {
-            "point": np.array(result.block.point_ids, dtype=object)[check],
-            **_columns(names, result.point_differences[check], "d_"),
-            **_columns(names, result.point_sd[check], "sd_"),
-        }
-    )
+    return {
+        "point": _ids(result.block.point_ids)[check],
+        **named(names, result.point_differences[check], "d_"),
+        **named(names, result.point_sd[check], "sd_"),
+    }
 
 
-def control_table(result: AdjustedBlock) -> pd.DataFrame:
-    """Return control as observations: `residual_`, `sd_`, `redundancy_`, `standardized_` of each component.
+def _control(result: Result) -> dict[str, Any]:
+    points = _ids(result.block.point_ids)[result.held_points]
+    return {"point": points, **control(result, position_columns(result.block))}
+
+
+def _stations(result: Result) -> dict[str, Any]:
+    names = [*position_columns(result.block), *ATTITUDE_COLUMNS]
+    return {"photo": _ids(result.block.photo_ids)[result.known_photos], **stations(result, names)}
+
+
+_TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
+    "photo": _photos,
+    "point": _points,
+    "image": _images,
+    "check": _check_points,
+    "control": _control,
+    "station": _stations,
+}
+
+
+def images(result: AdjustedNetwork, unit: str) -> dict[str, Any]:
+    """Name what there is of the image observations that took part."""
+    used = result.used_images
+    return {
+        **named((f"residual_x_{unit}", f"residual_y_{unit}"), result.residuals[used]),
+        **named(("redundancy_x", "redundancy_y"), result.redundancy[used]),
+        **named(("standardized_x", "standardized_y"), result.standardized[used]),
+    }
+
+
+def control(result: AdjustedNetwork, names: Sequence[str]) -> dict[str, Any]:
+    """Name what there is of control as observations.
 
     Residuals are observed minus adjusted. Where `sd_` is 0 a component is fixed, where it is infinite it is
     not held.
     """
-    held = result.used_points & np.isfinite(result.block.point_sd).any(axis=1)
-    names = position_columns(result.block)
-    return pd.DataFrame(
-        {
-            "point": np.array(result.block.point_ids, dtype=object)[held],
-            **_columns(names, result.point_residuals[held], "residual_"),
-            **_columns(names, result.block.point_sd[held], "sd_"),
-            **_numbers(names, result.point_redundancy[held], "redundancy_"),
-            **_numbers(names, result.point_standardized[held], "standardized_"),
-        }
+    parts = (
+        result.point_residuals,
+        result.point_given_sd,
+        result.point_redundancy,
+        result.point_standardized,
     )
+    return _observed(names, *(part[result.held_points] for part in parts))
 
 
-def station_table(result: AdjustedBlock) -> pd.DataFrame:
-    """Return photos as observations of their own positions and attitudes, columns as in `control_table`.
+def stations(result: AdjustedNetwork, names: Sequence[str]) -> dict[str, Any]:
+    """Name what there is of photos as observations of their own unknowns, columns as for control.
 
-    Those with a component that is weighted or fixed (`sd_` 0); free ones have an infinite `sd_`.
+    Of those with an unknown that is weighted or fixed (`sd_` 0); free ones have an infinite `sd_`.
     """
-    given_sd = result.photo_given_sd
-    known = np.isfinite(given_sd).any(axis=1)
-    names = [*position_columns(result.block), *ATTITUDE_COLUMNS]
-    return pd.DataFrame(
-        {
-            "photo": np.array(result.block.photo_ids, dtype=object)[known],
-            **_columns(names, result.photo_residuals[known], "residual_"),
-            **_columns(names, given_sd[known], "sd_"),
-            **_numbers(names, result.photo_redundancy[known], "redundancy_"),
-            **_numbers(names, result.photo_standardized[known], "standardized_"),
-        }
+    parts = (
+        result.photo_residuals,
+        result.photo_given_sd,
+        result.photo_redundancy,
+        result.photo_standardized,
     )
+    return _observed(names, *(part[result.known_photos] for part in parts))
 
 
-def _numbers(names: tuple[str, ...] | list[str], values: Floats, prefix: str) -> dict[str, Any]:
-    """Name the columns of an array of plain numbers."""
-    return _columns([name.removesuffix("_deg") for name in names], values, prefix)
+def _observed(
+    names: Sequence[str], residuals: Floats, sd: Floats, redundancy: Floats, standardized: Floats
+) -> dict[str, Any]:
+    """`residual_`, `sd_`, `redundancy_` and `standardized_` of each component; the latter have no units."""
+    plain = [name.removesuffix("_deg").removesuffix("_rad").removesuffix("_px") for name in names]
+    return {
+        **named(names, residuals, "residual_"),
+        **named(names, sd, "sd_"),
+        **named(plain, redundancy, "redundancy_"),
+        **named(plain, standardized, "standardized_"),
+    }
 
 
-def _columns(names: tuple[str, ...] | list[str], values: Floats, prefix: str = "") -> dict[str, Any]:
+def named(names: Sequence[str], values: Floats, prefix: str = "") -> dict[str, Any]:
     """Name the columns of an array, in degrees where the name says so."""
     with np.errstate(over="ignore"):  # infinite then
         return {
             prefix + name: np.degrees(column) if name.endswith("_deg") else column
             for name, column in zip(names, values.T, strict=True)
         }
+
+
+def _ids(names: Sequence[str]) -> NDArray[np.object_]:
+    return np.array(names, dtype=object)
