@@ -65,6 +65,7 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
         photos: vec![],
         points: vec![],
         images: vec![],
+        observations: vec![],
     };
     for (photo, (position, attitude)) in true_photos.iter().enumerate() {
         let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();

@@ -150,6 +150,7 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
         photos: (0..photos).map(coarse_photo).collect(),
         points: (0..points).map(coarse_point).collect(),
         images,
+        observations: vec![],
     }
 }
 

@@ -113,6 +113,18 @@ impl Orientation {
         -(self.pose.attitude * self.shifts)
     }
 
+    /// The step of the pose, dC and rho (see [`Pose::step`]), that a unit of each unknown takes to first order.
+    pub fn steps(&self) -> [(Vector3, Vector3); 6] {
+        // du = -A^T dC + u x rho holds for every u, so that rho = -w, and at u = 0 dC = A (w x s - S).
+        std::array::from_fn(|k| {
+            let mut at_centre = self.turns[k].cross(&self.pivot);
+            if (self.shifting..self.shifting + 3).contains(&k) {
+                at_centre -= self.shifts.column(k - self.shifting);
+            }
+            (self.pose.attitude * at_centre, -self.turns[k])
+        })
+    }
+
     /// By how much each of the three unknowns that shift would have to change, about, to move the photo to a place: the index of the
     /// unknown among the six, and the change in units of length.
     pub fn shifts_along(&self, place: &Vector3) -> [(usize, f64); 3] {
