@@ -54,8 +54,8 @@ def collection(
         Path | None,
         Writes.DIRECTORY,
         out_option(
-            "Directory for report.txt and the adjusted collection: adjusted.txt or adjusted.out, in the format"
-            " of FILE and packed as it is."
+            "Directory for report.txt and the adjusted collection: adjusted.txt, or adjusted.out for a Bundle"
+            " file, packed as FILE is."
             " Default: no files."
         ),
     ] = None,
