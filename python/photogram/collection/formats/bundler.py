@@ -1,9 +1,9 @@
 """The text format of Bundler, version 0.3 (Snavely, Seitz and Szeliski 2006): `bundle.out`.
 
-After the line `# Bundle file v0.3` there are the numbers of cameras and points; for each camera f, k1, k2, the
-rows of R and t; for each point X, Y, Z, a colour, and its views: how many, and for each the camera, a key, x
-and y. P = R X + t; the camera looks along -z, and image coordinates are pixels from the middle, x to the
-right, y up. A camera that was not registered has zeros only. Colours and keys are not kept.
+After the line `# Bundle file v0.3` there are the numbers of cameras and points; for each camera f, k1, k2,
+the rows of R and t; for each point X, Y, Z, a colour, and its views: how many, and for each the camera, a
+key, x and y. P = R X + t; the camera looks along -z, and image coordinates are pixels from the middle, x to
+the right, y up. A camera that was not registered has zeros only. Colours and keys are not kept.
 """
 
 from __future__ import annotations
