@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
+    from photogram.network.attitudes import Attitudes
     from photogram.network.block import Block
     from photogram.network.geometry import Spheroid
     from photogram.network.refraction import Refraction
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AdjustmentError",
     "AsPublished",
+    "Attitudes",
     "Block",
     "InputError",
     "Iteration",
@@ -54,6 +56,7 @@ __all__ = [
 _HOMES = {
     "AdjustmentError": "errors",
     "AsPublished": "adjustment.adjustment",
+    "Attitudes": "network.attitudes",
     "Block": "network.block",
     "InputError": "errors",
     "Iteration": "results.iteration",

@@ -88,6 +88,65 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     NaN for arguments that cannot be.
     """
 
+def attitudes_from_numbers(
+    representation: str, numbers: _Floats, boresight: _Floats
+) -> tuple[_Floats, _Floats]:
+    """Attitudes from numbers (`docs/conventions.md`).
+
+    Parameters
+    ----------
+    representation
+        "omega_phi_kappa", "omega_phi_kappa_photo_to_ground", "phi_omega_kappa", "azimuth_tilt_swing",
+        "yaw_pitch_roll", "rotation_vector", "rotation_vector_to_photo", "rotation_vector_to_vision",
+        "quaternion" or "quaternion_to_vision".
+    numbers
+        (n, 3), angles in radians; of quaternions (n, 4), w, x, y, z of any length but zero.
+    boresight
+        (3, 3), photo axes from body axes; of yaw, pitch, roll.
+
+    Returns
+    -------
+    (n, 3, 3) matrices A, photo to object; and K, (n, 3, k), the partials of the rotation step rho by the
+    numbers: A steps by Exp(rho), about the photo's own axes.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape, or another representation; the message names it.
+    """
+
+def numbers_of_attitudes(
+    representation: str, attitudes: _Floats, boresight: _Floats
+) -> tuple[_Floats, _Floats]:
+    """Numbers of attitudes, the inverse of `attitudes_from_numbers`.
+
+    Parameters
+    ----------
+    representation, boresight
+        As there.
+    attitudes
+        (n, 3, 3) matrices A, photo to object.
+
+    Returns
+    -------
+    (n, k) numbers, and their partials by the rotation step, (n, k, 3); NaN where two angles turn about one
+    axis: one of them is zero then.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape, or another representation; the message names it.
+    """
+
+def nadir_boresight(quarters: int) -> _Floats:
+    """Photo axes from body axes, (3, 3), of a camera that looks at the nadir.
+
+    Parameters
+    ----------
+    quarters
+        Of a turn that the top of the picture is turned by from forward to the right wing: 0 to 3.
+    """
+
 def rotation_matrix(angles: _Floats) -> _Floats:
     """Rotation matrices M = M_kappa M_phi M_omega.
 

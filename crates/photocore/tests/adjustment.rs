@@ -62,7 +62,7 @@ impl Model for Frames {
             rows.constant[row] = self.measured[group][row] - computed[row];
             rows.local[2 * row..][..2].copy_from_slice(&partials[row][..2]);
             rows.kept[3 * row..][..3].copy_from_slice(&partials[row][2..5]);
-            rows.border[2 * row..][..2].copy_from_slice(&partials[row][5..]);
+            rows.common[2 * row..][..2].copy_from_slice(&partials[row][5..]);
         }
     }
 }

@@ -9,7 +9,8 @@ use photocore::geometry::angle_axis::{
 };
 use photocore::geometry::attitude::{quaternion_by_step, vision_axes};
 use photocore::geometry::{
-    AttitudeNumbers, Matrix3, ObjectSpace, Orientation, Point, Pose, PoseNumbers, RotationSense, Vector3,
+    AttitudeNumbers, Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, Pose, PoseNumbers, RotationSense,
+    Vector3,
 };
 use proptest::prelude::*;
 use serde_json::Value;
@@ -123,6 +124,59 @@ proptest! {
                 let expected = (ends[0] - ends[1]) / 2e-5;
                 prop_assert!((partials[k] - expected).abs() < 1e-8, "{numbers:?} {k}: {} {expected}", partials[k]);
             }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    #[test]
+    fn attitudes_step_by_rotation_vectors_whatever_phi_is(
+        omega in -PI..PI,
+        phi in prop_oneof![-1.3..1.3f64, Just(FRAC_PI_2), Just(-FRAC_PI_2), (FRAC_PI_2 - 1e-7)..(FRAC_PI_2 + 1e-7), 1.6..3.0f64],
+        kappa in -PI..PI,
+        rho in prop::array::uniform3(-0.3..0.3f64),
+        position in prop_oneof![
+            (Just(ObjectSpace::Rectangular), [-3.0..3.0f64, -3.0..3.0, -3.0..3.0]),
+            (Just(ObjectSpace::Geographic(Ellipsoid::new(6_378_137.0, 6_356_752.3).unwrap())), [-3.0..3.0f64, -1.2..1.2, 0.0..3000.0]),
+        ],
+        g in prop::array::uniform3(-1.0..1.0f64),
+    ) {
+        let ((space, position), g) = (position, Vector3::from(g));
+        let angles = [omega, phi, kappa];
+        for sense in [RotationSense::GroundToPhoto, RotationSense::PhotoToGround] {
+            let numbers = AttitudeNumbers::OmegaPhiKappa(sense);
+            let local = numbers.attitude(angles);
+            let stepped = sense.stepped(angles, &Vector3::from(rho));
+            let expected = local * angle_axis_rotation(&Vector3::from(rho));
+            prop_assert!((numbers.attitude(stepped) - expected).amax() < 1e-14, "{stepped:?}");
+            // Away from where they turn about one axis the angles change as little as the attitude does.
+            if phi.cos().abs() > 0.5 {
+                let small = sense.stepped(angles, &(1e-3 * Vector3::from(rho)));
+                prop_assert!((0..3).all(|k| (small[k] - angles[k]).abs() < 2e-3), "{angles:?} {small:?}");
+            }
+
+            // Partials in a point some metres off, by differences.
+            let photo = Orientation::stepping(space, position, &local);
+            let at = photo.centre() + Vector3::new(3.0, -5.0, 4.0);
+            let point = Point::new(ObjectSpace::Rectangular, at.into());
+            let (partials, _) = photo.chain(&photo.sight(&point), &g, &point);
+            for k in 0..3 {
+                let ends = [1e-5, -1e-5].map(|step| {
+                    let turned = local * angle_axis_rotation(&Vector3::ith(k, step));
+                    Orientation::stepping(space, position, &turned).sight(&point).dot(&g)
+                });
+                let expected = (ends[0] - ends[1]) / 2e-5;
+                // Geocentric coordinates are good to a nanometre.
+                prop_assert!((partials[3 + k] - expected).abs() < 5e-4, "{k}: {} {expected}", partials[3 + k]);
+                prop_assert!(space != ObjectSpace::Rectangular || (partials[3 + k] - expected).abs() < 1e-8);
+            }
+            // In angles it is K that stands between the two.
+            let rates = numbers.rates(angles);
+            let (by_angles, _) = Orientation::from_angles(space, sense, position, angles).chain(&photo.sight(&point), &g, &point);
+            let expected = rates.tr_mul(&Vector3::new(partials[3], partials[4], partials[5]));
+            prop_assert!((0..3).all(|k| by_angles[k] == partials[k] && (by_angles[3 + k] - expected[k]).abs() < 1e-13));
         }
     }
 }

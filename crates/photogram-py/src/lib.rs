@@ -1,6 +1,7 @@
 //! The extension module `photogram._photocore`: converts arrays, releases the GIL, decides nothing.
 
 mod arrays;
+mod attitude;
 mod comparator;
 mod distributions;
 mod geometry;
@@ -24,6 +25,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     memory::arm()?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     distributions::register(module)?;
+    attitude::register(module)?;
     geometry::register(module)?;
     network::register(module)?;
     comparator::register(module)?;

@@ -29,6 +29,13 @@ pub enum Criterion {
     Decrease(f64),
 }
 
+impl Criterion {
+    /// Whether these are the full steps of a published program.
+    pub(crate) fn is_published(&self) -> bool {
+        matches!(self, Criterion::Percent(_) | Criterion::Length { .. })
+    }
+}
+
 /// Damping of the first step of [`Criterion::Decrease`].
 pub(super) const FIRST_DAMPING: f64 = 1e-4;
 

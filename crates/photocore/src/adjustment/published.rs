@@ -21,7 +21,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let Some(solved) = self.solve_unless_lost(state)? else {
                 return Ok(End::lost(unknowns, None));
             };
-            let values = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
+            let values = self.problem.advanced(&unknowns, &solved.step);
             state = self.form(values, 0.0)?;
             let sum_of_squares = state.sum_of_squares;
             if !sum_of_squares.is_finite() {
@@ -59,7 +59,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             };
             let number = self.iterations.len() + 1;
             let length = step[tested.clone()].iter().map(|dx| dx * dx).sum::<f64>().sqrt();
-            let values: Vec<f64> = unknowns.iter().zip(&step).map(|(x, dx)| x + dx).collect();
+            let values = self.problem.advanced(&unknowns, &step);
             let mut iteration =
                 Iteration { number, sum_of_squares: f64::NAN, largest_change: change, damping: 0.0 };
             if length < limit || number >= self.options.max_iterations {

@@ -245,7 +245,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let problem = self.problem;
         let mut unknowns = end.unknowns.clone();
         if let Some((_, step)) = &end.last {
-            unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+            problem.model.advance(&mut unknowns, step);
         }
         let residuals = problem.residuals(self.pool, &unknowns);
         if let Some((last, _)) = end.last {

@@ -56,7 +56,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 return Ok(End { status: Status::Converged, unknowns, basis, undetermined: None, last });
             }
             let step = solved.step;
-            let trial: Vec<f64> = unknowns.iter().zip(&step).map(|(x, dx)| x + dx).collect();
+            let trial = self.problem.advanced(&unknowns, &step);
             let moved = (damping == 0.0).then(|| solved.basis.factor.moved(&self.problem.system, &step));
             solved.basis.factor.recycle(&self.problem.system);
             let relaxed = if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 };
@@ -113,7 +113,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         unknowns: &[f64],
         step: &[f64],
     ) -> Result<End<'a, M>, AdjustError> {
-        let values: Vec<f64> = unknowns.iter().zip(step).map(|(x, dx)| x + dx).collect();
+        let values = self.problem.advanced(unknowns, step);
         let sum_of_squares = self.objective(&values);
         self.accept(Iteration { sum_of_squares, ..last }, unknowns, &values)?;
         self.curved = false;

@@ -64,7 +64,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let predicted = solved.basis.equations.decrease(self.pool, &solved.basis.prior, &solved.step);
             solved.basis.factor.recycle(&self.problem.system);
             let whole = used <= FIRST_DAMPING && predicted <= fraction * lowest;
-            let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
+            let trial = self.problem.advanced(&unknowns, &solved.step);
             let sum_of_squares = self.objective(&trial);
             let gain = (lowest - sum_of_squares) / predicted;
             // Written so that a gain that is not a number is a failure.

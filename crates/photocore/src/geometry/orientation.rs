@@ -1,4 +1,4 @@
-//! A photo's pose as its six unknowns give it, with what each of them does to it.
+//! A photo's pose with what each of its six unknowns does to it: position and rotation step, or the numbers of a file.
 
 use super::attitude::{AttitudeNumbers, RotationSense};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
@@ -39,30 +39,42 @@ impl Orientation {
         }
     }
 
-    /// The orientation at `position` (coordinates of the object space) with `attitude` omega, phi, kappa.
+    /// The orientation at `position` (coordinates of the object space) with `attitude` omega, phi, kappa, in these numbers: their K is
+    /// singular where phi is 90 degrees.
     pub fn from_angles(
         space: ObjectSpace,
         sense: RotationSense,
         position: [f64; 3],
         attitude: [f64; 3],
     ) -> Self {
-        let (centre, centre_partials) = space.cartesian_with_partials(position);
         let numbers = AttitudeNumbers::OmegaPhiKappa(sense);
+        let stepping = Self::stepping(space, position, &numbers.attitude(attitude));
         // A step rho turns the photo, and what it sees the other way.
         let rates = -numbers.rates(attitude);
         let [omega, phi, kappa] = [0, 1, 2].map(|k| rates.column(k).into());
-        let local = numbers.attitude(attitude);
+        let [longitude, latitude, height, ..] = stepping.turns;
+        Self { turns: [longitude, latitude, height, omega, phi, kappa], ..stepping }
+    }
+
+    /// The orientation at `position` (coordinates of the object space) with the attitude A, in geographic space that in the local
+    /// vertical frame; its last three unknowns are the rotation vector rho of a step A <- A Exp(rho), about the photo's own axes: no
+    /// attitude is singular.
+    ///
+    /// du = u x rho, so that the partials of an image coordinate with respect to rho are g x u.
+    pub fn stepping(space: ObjectSpace, position: [f64; 3], local: &Matrix3) -> Self {
+        let (centre, centre_partials) = space.cartesian_with_partials(position);
         let (attitude, longitude, latitude) = match space {
-            ObjectSpace::Rectangular => (local, Vector3::zeros(), Vector3::zeros()),
+            ObjectSpace::Rectangular => (*local, Vector3::zeros(), Vector3::zeros()),
             ObjectSpace::Geographic(_) => {
                 let vertical = local_vertical(position[0], position[1]);
                 let [longitude, latitude] = local_vertical_turns(position[1]).map(|w| local.tr_mul(&w));
-                (vertical.tr_mul(&local), longitude, latitude)
+                (vertical.tr_mul(local), longitude, latitude)
             }
         };
+        let [x, y, z] = [-Vector3::x(), -Vector3::y(), -Vector3::z()];
         Self {
             pose: Pose { position: centre, attitude },
-            turns: [longitude, latitude, Vector3::zeros(), omega, phi, kappa],
+            turns: [longitude, latitude, Vector3::zeros(), x, y, z],
             pivot: Vector3::zeros(),
             shifts: -attitude.tr_mul(&centre_partials),
             shifting: 0,

@@ -6,7 +6,8 @@ use super::{Image, Point};
 use crate::adjustment::Model;
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
-    self, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction, Vertical,
+    self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
+    RotationSense, Vector3, Vertical,
 };
 use crate::normals::GroupRows;
 
@@ -32,6 +33,8 @@ pub struct Bundle {
     pub order: Vec<usize>,
     /// How many images each photo has.
     pub images_on: Vec<usize>,
+    /// Which photos step by a rotation vector about their own axes: those with free angles.
+    pub turning: Vec<bool>,
     /// Whether the position of anything is weighted or fixed: then the datum is the user's.
     pub placed: bool,
 }
@@ -118,6 +121,26 @@ struct Approach {
     share: f64,
 }
 
+/// What the points that a photo sees have as shares in what its station learns.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shares {
+    sum: f64,
+    largest: f64,
+}
+
+impl Shares {
+    fn add(&mut self, share: f64) {
+        self.sum += share;
+        self.largest = self.largest.max(share);
+    }
+
+    /// A share in those of the others in the mean, of so many images; None unless it is much larger.
+    fn ratio(&self, own: f64, images: usize) -> Option<f64> {
+        let others = (self.sum - own).max(0.0) / (images as f64 - 1.0).max(1.0);
+        (others > 0.0 && own > ON_ITS_WAY * others).then(|| own / others)
+    }
+}
+
 impl Bundle {
     /// The photos at given values of their unknowns.
     pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
@@ -126,11 +149,31 @@ impl Bundle {
             let pose = std::array::from_fn(|k| pose[k]);
             let own = self.cameras[photo];
             Station {
-                orientation: Orientation::new(self.poses, self.space, &pose),
+                orientation: self.orientation(photo, &pose),
                 camera: own.with_parameters(camera).unwrap_or(own),
             }
         };
         (0..self.cameras.len()).map(photo).collect()
+    }
+
+    /// The orientation of a photo, its pose given, with the columns of its unknowns.
+    fn orientation(&self, photo: usize, pose: &[f64; 6]) -> Orientation {
+        let [x, y, z, omega, phi, kappa] = *pose;
+        match self.turning_sense(photo) {
+            Some(sense) => {
+                let local = AttitudeNumbers::OmegaPhiKappa(sense).attitude([omega, phi, kappa]);
+                Orientation::stepping(self.space, [x, y, z], &local)
+            }
+            None => Orientation::new(self.poses, self.space, pose),
+        }
+    }
+
+    /// The sense of the angles of a photo that steps by a rotation vector; None for all others.
+    pub fn turning_sense(&self, photo: usize) -> Option<RotationSense> {
+        match self.poses {
+            PoseNumbers::Angles(sense) if self.turning[photo] => Some(sense),
+            PoseNumbers::Angles(_) | PoseNumbers::Vectors => None,
+        }
     }
 
     /// The images of a point.
@@ -147,16 +190,18 @@ impl Bundle {
             let centre = stations.photos[image.photo].orientation.centre();
             (stations.points[point].position() - centre).norm_squared().recip()
         };
-        let mut shares = vec![0.0; stations.photos.len()];
+        let mut shares = vec![Shares::default(); stations.photos.len()];
         for point in 0..self.points.len() {
-            self.images_of(point).iter().for_each(|image| shares[image.photo] += share(point, image));
+            self.images_of(point).iter().for_each(|image| shares[image.photo].add(share(point, image)));
+        }
+        let has_near = |(shares, &images): (&Shares, &usize)| shares.ratio(shares.largest, images).is_some();
+        if !shares.iter().zip(&self.images_on).any(has_near) {
+            return vec![];
         }
         let approach = |point: usize, image: &Image| {
-            let own = share(point, image);
-            let others =
-                (shares[image.photo] - own).max(0.0) / (self.images_on[image.photo] as f64 - 1.0).max(1.0);
-            let near = others > 0.0 && own > ON_ITS_WAY * others;
-            near.then(|| Approach { point, photo: image.photo, share: own / others })
+            let photo = image.photo;
+            let share = shares[photo].ratio(share(point, image), self.images_on[photo])?;
+            Some(Approach { point, photo, share })
         };
         let of_point = |point| self.images_of(point).iter().filter_map(move |image| approach(point, image));
         (0..self.points.len()).flat_map(of_point).collect()
@@ -201,6 +246,19 @@ impl Model for Bundle {
         let points = coordinates.par_iter().with_min_len(1024);
         let points = points.map(|&coordinates| geometry::Point::new(self.space, coordinates)).collect();
         Stations { photos: self.photos(photos), points, refracted }
+    }
+
+    /// Angles of photos that step by a rotation vector go by way of their matrix.
+    fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
+        let angles_of = |photo: usize| 3 * self.points.len() + self.first[photo] + 3;
+        let turn = |photo: usize| {
+            let (first, sense) = (angles_of(photo), self.turning_sense(photo)?);
+            let [angles, rho] = [&*unknowns, step].map(|values| std::array::from_fn(|k| values[first + k]));
+            Some((first, sense.stepped(angles, &Vector3::from(rho))))
+        };
+        let turned: Vec<(usize, [f64; 3])> = (0..self.cameras.len()).filter_map(turn).collect();
+        unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+        turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
     }
 
     /// Intersects the points anew.

@@ -86,6 +86,13 @@ impl Network {
         std::array::from_fn(|k| if turning(k) { near[k] } else { photo.observed[k] })
     }
 
+    /// Whether a photo's attitude may step by a rotation vector: its angles are all free. Those that are weighted stay unknowns
+    /// themselves, so that their weights stand in the diagonal and keep them regular; a fixed one keeps its bits.
+    fn turns(&self, photo: usize) -> bool {
+        let free = self.photos[photo].sd[3..].iter().all(|sd| sd.is_infinite());
+        free && matches!(self.poses, PoseNumbers::Angles(_))
+    }
+
     /// The problem of the points that take part, from the initial values on or from those reached.
     ///
     /// # Errors
@@ -103,7 +110,11 @@ impl Network {
             self.check_rounding(&screened, |photo| !unused(photo))?;
         }
         let origin = self.origin();
-        let model = self.bundle(&screened, images_on.clone(), origin);
+        let mut model = self.bundle(&screened, images_on.clone(), origin);
+        // The programs of their time stepped in angles.
+        if !options.adjustment.criterion.is_published() {
+            model.turning = (0..self.photos.len()).map(|i| self.turns(i) && !unused(i)).collect();
+        }
         let local = |pose: [f64; 6]| match self.poses {
             PoseNumbers::Angles(_) => {
                 std::array::from_fn(|k| if k < 3 { pose[k] - origin[k] } else { pose[k] })
@@ -165,6 +176,7 @@ impl Network {
             images,
             start: screened.images.start.clone(),
             order: screened.images.order.clone(),
+            turning: vec![false; self.photos.len()],
             images_on,
             placed,
         }

@@ -1,9 +1,11 @@
 //! The adjusted network.
 
+use nalgebra::DMatrix;
+
 use super::problem::Assembled;
 use super::{Dropped, Network, NetworkError, Options, Point, UnitVariance};
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
-use crate::geometry::PoseNumbers;
+use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::network::model::Bundle;
 
 /// An adjusted photo.
@@ -178,8 +180,10 @@ fn photos(
         let values = &unknowns[first..end];
         let (count, given) = ((end - first).pow(2), start);
         start += count;
+        let angles = reported_angles(model, index, values);
         let absolute = |k: usize| {
             let counted = if k < positions { values[k] + origin[k] } else { values[k] };
+            let counted = angles.filter(|_| k >= 3).map_or(counted, |angles| angles[k - 3]);
             // Fixed ones as they were given, to the last bit.
             if k < positions && photo.sd[k] == 0.0 { photo.pose[k] } else { counted }
         };
@@ -190,14 +194,39 @@ fn photos(
         AdjustedPhoto {
             pose: std::array::from_fn(absolute),
             camera: if values.len() > 6 { values[6..].to_vec() } else { model.cameras[index].parameters() },
-            cofactors: cofactors
-                .map_or_else(|| vec![f64::NAN; count], |all| all.kept[given..given + count].to_vec()),
+            cofactors: cofactors.map_or_else(
+                || vec![f64::NAN; count],
+                |all| in_angles(model, index, values, &all.kept[given..given + count]),
+            ),
             redundancy: redundancy
                 .map_or_else(|| vec![f64::NAN; end - first], |all| all[first..end].to_vec()),
             images: model.images_on[index],
         }
     };
     network.photos.iter().enumerate().map(photo).collect()
+}
+
+/// The angles of a photo that steps by a rotation vector; at a singular attitude kappa is zero and omega takes the sum.
+fn reported_angles(model: &Bundle, photo: usize, values: &[f64]) -> Option<[f64; 3]> {
+    let numbers = AttitudeNumbers::OmegaPhiKappa(model.turning_sense(photo)?);
+    let angles = [values[3], values[4], values[5]];
+    Some(if numbers.is_singular(angles) { numbers.numbers(&numbers.attitude(angles)) } else { angles })
+}
+
+/// Cofactors of a photo's unknowns: where its attitude has stepped by a rotation vector rho = K d(angles), taken to the angles by
+/// diag(I, K^-1, I). NaN for angles that are not determined, phi being 90 degrees.
+fn in_angles(model: &Bundle, photo: usize, values: &[f64], cofactors: &[f64]) -> Vec<f64> {
+    let Some(sense) = model.turning_sense(photo) else { return cofactors.to_vec() };
+    let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [values[3], values[4], values[5]]);
+    let inverse = numbers.rates(angles).try_inverse().filter(|_| !numbers.is_singular(angles));
+    let inverse = inverse.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
+    let width = values.len();
+    let mut found = DMatrix::from_row_slice(width, width, cofactors);
+    let rows = inverse * found.fixed_rows::<3>(3);
+    found.fixed_rows_mut::<3>(3).copy_from(&rows);
+    let columns = found.fixed_columns::<3>(3) * inverse.transpose();
+    found.fixed_columns_mut::<3>(3).copy_from(&columns);
+    ((&found + found.transpose()) / 2.0).as_slice().to_vec()
 }
 
 fn adjusted_points(
