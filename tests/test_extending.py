@@ -12,7 +12,12 @@ PAGE = (ROOT / "docs" / "extending.md").read_text()
 CAMERAS = Path("crates/photocore/src/geometry/camera")
 FORMATS = Path("python/photogram/collection/formats")
 EXTENSIONS = {
-    "lens": (CAMERAS / "radial.rs", CAMERAS / "mod.rs", "radial::Radial;", r"\bRadial\b(?! distortion)|\"radial\""),
+    "lens": (
+        CAMERAS / "radial.rs",
+        CAMERAS / "mod.rs",
+        "radial::Radial;",
+        r"\bRadial\b(?! distortion)|\"radial\"",
+    ),
     "format": (FORMATS / "bundler.py", FORMATS / "registry.py", '"bundler",', r"bundler"),
 }
 """Its file, the file that registers it, the line there, and what the extension is called in sources."""
