@@ -65,6 +65,7 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
         photos: vec![],
         points: vec![],
         images: vec![],
+        observations: vec![],
     };
     for (photo, (position, attitude)) in true_photos.iter().enumerate() {
         let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();
@@ -229,7 +230,7 @@ fn adjust(criterion: &mut Criterion) {
     let pool = pool();
     let options = Options {
         adjustment: adjustment::Options {
-            criterion: adjustment::Criterion::Fraction(1e-5),
+            method: adjustment::Method::Damped(adjustment::Stop::Fraction(1e-5)),
             max_iterations: 50,
             covariance: true,
             loss: None,

@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 
 use num_complex::Complex64 as C;
-use photocore::adjustment::{self, Criterion, Loss, Status};
+use photocore::adjustment::{self, Loss, Method, Status, Stop};
 use photocore::geometry::{
     Bal, BundlerPhoto, ObjectSpace, Orientation, Perspective, Point as GroundPoint, PoseNumbers,
     angle_axis_rotation, angle_axis_with_jacobian,
@@ -150,6 +150,7 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
         photos: (0..photos).map(coarse_photo).collect(),
         points: (0..points).map(coarse_point).collect(),
         images,
+        observations: vec![],
     }
 }
 
@@ -165,7 +166,7 @@ fn adjusted_from(
 ) -> Result<Solution, NetworkError> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let adjustment = adjustment::Options {
-        criterion: Criterion::Decrease(1e-10),
+        method: Method::TrustRegion(Stop::Decrease(1e-10)),
         max_iterations: 200,
         covariance: true,
         loss,

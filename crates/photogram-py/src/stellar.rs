@@ -1,7 +1,7 @@
 //! Stellar camera calibration; its documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
-use photocore::adjustment::{Criterion, Options as AdjustmentOptions, Watch};
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop, Watch};
 use photocore::geometry::{Air, Station, pointing, pointing_angles};
 use photocore::programs::stellar::{
     Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Observations, Options, Rows,
@@ -262,9 +262,9 @@ impl StellarProblem {
         progress: Option<Py<PyAny>>,
         whole: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let criterion = Criterion::Fraction(fraction);
+        let method = Method::Damped(Stop::Fraction(fraction));
         let options = Options {
-            adjustment: AdjustmentOptions { criterion, max_iterations, covariance, loss: None },
+            adjustment: AdjustmentOptions { method, max_iterations, covariance, loss: None },
             unit,
             whole,
         };

@@ -2,7 +2,9 @@
 
 use thiserror::Error;
 
+use super::observations::Fault;
 use super::precision::Coarse;
+use super::problem::Assembled;
 use crate::adjustment::{AdjustError, gib};
 use crate::normals::LayoutError;
 
@@ -21,6 +23,16 @@ pub enum NetworkError {
     /// Several photos share a camera that is not held.
     #[error("camera {0} has unknown parameters and belongs to several photos")]
     SharedCamera(usize),
+    /// An observation that contradicts itself or the network.
+    #[error("observation {index}, of kind {kind}, {fault}")]
+    Observation {
+        /// Its index.
+        index: usize,
+        /// The name of its kind.
+        kind: &'static str,
+        /// What is wrong with it.
+        fault: Fault,
+    },
     /// Poses in vectors in a space where they are not defined.
     #[error("poses in vectors need rectangular space and no refraction")]
     Vectors,
@@ -62,18 +74,38 @@ pub enum NetworkError {
 }
 
 impl NetworkError {
-    /// What stopped the adjustment, in terms of the network; `points` are those that took part.
-    pub(super) fn new(error: AdjustError, points: &[usize]) -> Self {
+    /// What stopped the adjustment, in terms of the network.
+    pub(super) fn new(error: AdjustError, assembled: &Assembled) -> Self {
         match error {
             AdjustError::UndeterminedLocals(locals) => {
-                let mut points: Vec<usize> = locals.into_iter().map(|local| points[local]).collect();
+                let mut points: Vec<usize> =
+                    locals.into_iter().map(|local| assembled.points[local]).collect();
                 points.sort_unstable();
                 Self::UndeterminedPoints(points)
             }
-            AdjustError::Undetermined(combinations) => Self::UndeterminedPhotos(combinations),
+            AdjustError::Undetermined(combinations) => Self::undetermined(combinations, assembled),
             AdjustError::NotFinite => Self::NotFinite,
             AdjustError::Interrupted => Self::Interrupted,
             AdjustError::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
         }
+    }
+
+    /// Combinations of kept blocks: those that move photos by these, else the points that they move.
+    fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
+        let model = &assembled.problem.model;
+        let photos = model.cameras.len();
+        let of_photos: Vec<Vec<usize>> = combinations
+            .iter()
+            .map(|blocks| blocks.iter().copied().filter(|&block| block < photos).collect())
+            .filter(|blocks: &Vec<usize>| !blocks.is_empty())
+            .collect();
+        if !of_photos.is_empty() {
+            return Self::UndeterminedPhotos(of_photos);
+        }
+        let point = |block: usize| assembled.points[model.locals + block - photos];
+        let mut points: Vec<usize> = combinations.into_iter().flatten().map(point).collect();
+        points.sort_unstable();
+        points.dedup();
+        Self::UndeterminedPoints(points)
     }
 }

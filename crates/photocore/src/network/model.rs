@@ -1,7 +1,10 @@
 //! The observation equations of a network.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
+use super::observations::{TiedModel, TiedObservation};
 use super::{Image, Point};
 use crate::adjustment::Model;
 use crate::geometry::camera::each_camera;
@@ -9,10 +12,11 @@ use crate::geometry::{
     self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
     RotationSense, Vector3, Vertical,
 };
-use crate::normals::GroupRows;
+use crate::normals::{GroupRows, Tie, TieRows};
 
-/// Images of points by photos: the local blocks are the points, the kept blocks the photos with their pose and, unless it is held,
-/// their camera.
+/// Images of points by photos, and other observations of these: the local blocks are the points that no such observation touches, the
+/// kept blocks the photos with their pose and, unless it is held, their camera, then all other points. The images of these are ties,
+/// and so are the observations, in this order.
 #[derive(Debug)]
 pub struct Bundle {
     pub space: ObjectSpace,
@@ -23,9 +27,13 @@ pub struct Bundle {
     pub cameras: Vec<Camera>,
     /// The unknowns of photo i are `first[i]..first[i + 1]` of the kept ones: six of the pose, then those of the camera.
     pub first: Vec<usize>,
-    /// The points; coordinates counted from the local origin.
+    /// What coordinates are counted from.
+    pub origin: [f64; 3],
+    /// The points, local ones first; coordinates counted from the origin.
     pub points: Vec<Point>,
-    /// The images, point by point: the groups of observations.
+    /// How many of them are local.
+    pub locals: usize,
+    /// The images, point by point: the groups of observations, then the first ties.
     pub images: Vec<Image>,
     /// The images of point i are `images[start[i]..start[i + 1]]`.
     pub start: Vec<usize>,
@@ -35,7 +43,9 @@ pub struct Bundle {
     pub images_on: Vec<usize>,
     /// Which photos step by a rotation vector about their own axes: those with free angles.
     pub turning: Vec<bool>,
-    /// Whether the position of anything is weighted or fixed: then the datum is the user's.
+    /// What else was observed.
+    pub observations: Vec<TiedObservation>,
+    /// Whether the position of anything is weighted, fixed or observed: then the datum is the user's.
     pub placed: bool,
 }
 
@@ -44,6 +54,8 @@ pub struct Bundle {
 pub struct Stations {
     pub photos: Vec<Station>,
     pub points: Vec<geometry::Point>,
+    /// The coordinates of the points that are not local.
+    tied: Vec<[f64; 3]>,
     refracted: Option<Refracted>,
 }
 
@@ -142,6 +154,64 @@ impl Shares {
 }
 
 impl Bundle {
+    /// The unknowns that are those of photos, of all.
+    pub fn of_photos(&self) -> Range<usize> {
+        let start = 3 * self.locals;
+        start..start + self.first[self.cameras.len()]
+    }
+
+    /// Where the coordinates of a point stand among the unknowns.
+    pub fn of_point(&self, point: usize) -> Range<usize> {
+        let start = if point < self.locals { 0 } else { self.of_photos().len() };
+        start + 3 * point..start + 3 * point + 3
+    }
+
+    /// The coordinates of all points, counted from the origin, at given values of the unknowns.
+    pub fn coordinates<'a>(&self, unknowns: &'a [f64]) -> impl Iterator<Item = &'a [f64; 3]> + use<'a> {
+        let photos = self.of_photos();
+        let (local, tied) = (&unknowns[..photos.start], &unknowns[photos.end..]);
+        local.as_chunks().0.iter().chain(tied.as_chunks().0)
+    }
+
+    /// The ties: images of points that are not local, then observations.
+    pub fn ties(&self) -> Vec<Tie> {
+        let photos = self.cameras.len();
+        let block = |&point: &usize| (photos + point - self.locals) as u32;
+        let images = self.images[self.start[self.locals]..].iter().enumerate().map(|(tie, image)| {
+            let point = self.point_of(self.start[self.locals] + tie);
+            Tie { rows: 2, kept: vec![block(&point), image.photo as u32], border: 0..0 }
+        });
+        let observations = self.observations.iter().map(|tied| Tie {
+            rows: tied.root.nrows(),
+            kept: tied.points.iter().map(block).chain(tied.photos.iter().map(|&i| i as u32)).collect(),
+            border: 0..0,
+        });
+        images.chain(observations).collect()
+    }
+
+    /// How many ties are images.
+    pub fn tied_images(&self) -> usize {
+        self.images.len() - self.start[self.locals]
+    }
+
+    /// The point of an image.
+    fn point_of(&self, image: usize) -> usize {
+        self.start.partition_point(|&start| start <= image) - 1
+    }
+
+    /// Writes the equations of an image whose point is not local.
+    fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut TieRows<'_>) {
+        let width = rows.coefficients.len() / 2 - 3;
+        let (mut local, mut kept) = ([0.0; 6], vec![0.0; 2 * width]);
+        let mut apart =
+            GroupRows { constant: &mut *rows.constant, local: &mut local, kept: &mut kept, common: &mut [] };
+        self.observe(stations, self.point_of(image), image, &mut apart);
+        for (row, both) in rows.coefficients.chunks_exact_mut(3 + width).enumerate() {
+            both[..3].copy_from_slice(&local[3 * row..][..3]);
+            both[3..].copy_from_slice(&kept[width * row..][..width]);
+        }
+    }
+
     /// The photos at given values of their unknowns.
     pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
         let photo = |photo: usize| {
@@ -232,8 +302,9 @@ impl Model for Bundle {
     type Prepared = Stations;
 
     fn prepare(&self, unknowns: &[f64]) -> Stations {
-        let (points, photos) = unknowns.split_at(3 * self.points.len());
-        let coordinates = points.as_chunks().0;
+        let photos = &unknowns[self.of_photos()];
+        let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_photos().end..]);
+        let tied = tied.as_chunks().0.to_vec();
         let refracted = self.refraction.map(|refraction| Refracted {
             refraction,
             at_photos: verticals(
@@ -241,18 +312,24 @@ impl Model for Bundle {
                 self.space,
                 self.first[..self.cameras.len()].iter().map(|&i| &photos[i..]),
             ),
-            at_points: verticals(&refraction, self.space, points.chunks(3)),
+            at_points: verticals(
+                &refraction,
+                self.space,
+                local.chunks(3).chain(tied.as_flattened().chunks(3)),
+            ),
         });
-        let points = coordinates.par_iter().with_min_len(1024);
-        let points = points.map(|&coordinates| geometry::Point::new(self.space, coordinates)).collect();
-        Stations { photos: self.photos(photos), points, refracted }
+        let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
+        let mut points: Vec<geometry::Point> =
+            local.as_chunks().0.par_iter().with_min_len(1024).map(place).collect();
+        points.extend(tied.iter().map(place));
+        Stations { photos: self.photos(photos), points, tied, refracted }
     }
 
     /// Angles of photos that step by a rotation vector go by way of their matrix.
     fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
-        let angles_of = |photo: usize| 3 * self.points.len() + self.first[photo] + 3;
+        let start = self.of_photos().start + 3;
         let turn = |photo: usize| {
-            let (first, sense) = (angles_of(photo), self.turning_sense(photo)?);
+            let (first, sense) = (start + self.first[photo], self.turning_sense(photo)?);
             let [angles, rho] = [&*unknowns, step].map(|values| std::array::from_fn(|k| values[first + k]));
             Some((first, sense.stepped(angles, &Vector3::from(rho))))
         };
@@ -263,9 +340,11 @@ impl Model for Bundle {
 
     /// Intersects the points anew.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
-        let (points, photos) = unknowns.split_at_mut(3 * self.points.len());
-        let Ok(coordinates) = self.intersect(&self.photos(photos)) else { return false };
-        points.copy_from_slice(coordinates.as_flattened());
+        let photos = self.of_photos();
+        let Ok(coordinates) = self.intersect(&self.photos(&unknowns[photos.clone()])) else { return false };
+        let (local, tied) = coordinates.split_at(self.locals);
+        unknowns[..photos.start].copy_from_slice(local.as_flattened());
+        unknowns[photos.end..].copy_from_slice(tied.as_flattened());
         true
     }
 
@@ -282,6 +361,17 @@ impl Model for Bundle {
         }
     }
 
+    fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {
+        let Some(observation) = tie.checked_sub(self.tied_images()) else {
+            return self.observe_tied_image(stations, self.start[self.locals] + tie, rows);
+        };
+        let point = |point: usize| (stations.points[point], stations.tied[point - self.locals]);
+        let photo =
+            |photo: usize| (&stations.photos[photo].orientation, self.first[photo + 1] - self.first[photo]);
+        let model = TiedModel { space: self.space, origin: self.origin, point: &point, photo: &photo };
+        self.observations[observation].write(&model, rows.constant, rows.coefficients);
+    }
+
     /// Points that have run into a station, or are on their way there: two rays that meet there ask for it.
     fn collapsed(&self, before: &[f64], after: &[f64]) -> Vec<usize> {
         let stations = self.prepare(after);
@@ -294,10 +384,11 @@ impl Model for Bundle {
         near.iter().map(|near| near.point).collect()
     }
 
-    /// The pose of the first photo, and the component of another's position or translation that changes most when the scale does.
+    /// The pose of the first photo and, unless an observation gives the scale, the component of another's position or translation that
+    /// changes most when the scale does.
     fn datum(&self, unknowns: &[f64]) -> Vec<usize> {
-        let locals = 3 * self.points.len();
-        let photos = self.photos(&unknowns[locals..]);
+        let kept = self.of_photos();
+        let photos = self.photos(&unknowns[kept.clone()]);
         let with_images = || (0..photos.len()).filter(|&photo| self.images_on[photo] > 0);
         let (false, Some(first)) = (self.placed, with_images().next()) else { return vec![] };
         let centre = photos[first].orientation.centre();
@@ -307,7 +398,8 @@ impl Model for Bundle {
         });
         let scale = shifts.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, unknown)| unknown);
         let pose = self.first[first]..self.first[first] + 6;
-        pose.chain(scale).map(|unknown| locals + unknown).collect()
+        let scale = scale.filter(|_| self.observations.is_empty());
+        pose.chain(scale).map(|unknown| kept.start + unknown).collect()
     }
 }
 

@@ -1,7 +1,7 @@
 //! What an adjustment of a block is given: photos whose cameras are known, poses in angles.
 
 use numpy::PyReadonlyArrayDyn;
-use photocore::adjustment::{Criterion, Options as AdjustmentOptions};
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
 use photocore::geometry::{Perspective, PoseNumbers};
 use photocore::network::{Camera, Network, Options, Photo, Start, UnitVariance};
 use pyo3::prelude::*;
@@ -92,14 +92,15 @@ fn adjust_block(
         photos,
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
+        observations: vec![],
     };
-    let criterion = match criterion {
-        "fraction" => Criterion::Fraction(limit),
-        "percent" => Criterion::Percent(limit),
+    let method = match criterion {
+        "fraction" => Method::Damped(Stop::Fraction(limit)),
+        "percent" => Method::Full(Published::Percent(limit)),
         other => return Err(unknown("criterion", other)),
     };
     let options = Options {
-        adjustment: AdjustmentOptions { criterion, max_iterations, covariance, loss: named_loss(loss)? },
+        adjustment: AdjustmentOptions { method, max_iterations, covariance, loss: named_loss(loss)? },
         ordering: named_ordering(ordering)?,
         unit_variance: match unit_variance {
             "free" => UnitVariance::Free,

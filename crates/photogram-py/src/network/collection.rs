@@ -1,7 +1,7 @@
 //! What an adjustment of a collection is given: every photo with a camera of its own, poses in vectors.
 
 use numpy::{PyArray2, PyReadonlyArrayDyn};
-use photocore::adjustment::{Criterion, Options as AdjustmentOptions};
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
 use photocore::geometry::{self, ObjectSpace, Orientation, Point as GroundPoint, PoseNumbers, Unit};
 use photocore::network::{Camera, Network, NetworkError as Failure, Options, Photo, Start, UnitVariance};
 use pyo3::exceptions::PyValueError;
@@ -112,10 +112,11 @@ fn adjust_collection(
         photos: given.iter().zip(&sd).enumerate().map(photo).collect(),
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
+        observations: vec![],
     };
     let options = Options {
         adjustment: AdjustmentOptions {
-            criterion: Criterion::Decrease(decrease),
+            method: Method::TrustRegion(Stop::Decrease(decrease)),
             max_iterations,
             covariance,
             loss: named_loss(loss)?,

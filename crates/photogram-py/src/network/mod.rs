@@ -90,6 +90,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
         | Failure::SharedCamera(_)
+        | Failure::Observation { .. }
         | Failure::Vectors
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
