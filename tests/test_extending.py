@@ -38,7 +38,7 @@ EXTENSIONS = {
         CRATE,
     ),
 }
-"""Its file, the file that registers it, the line there, what it is called, and where it is not named otherwise."""
+"""Its file, the file that registers it, the line there, its name, and the sources that do not know it."""
 
 
 def code(path):
