@@ -288,9 +288,10 @@ impl Others {
         rows: usize,
         part: &Part,
     ) -> (usize, &'s [f64]) {
-        let Rows { values, stride, width, .. } = stack.part_rows(t, p, part, rows).rows;
+        let equation = t * rows + row;
+        let Rows { values, width, .. } = stack.part_rows(p, part, equation..equation + 1).rows;
         let start = self.strips[stack.slots.len() + part.segment].1 + part.shift;
-        (start, &values[row * stride..][..width])
+        (start, &values[..width])
     }
 
     /// Computes H = L^-T V and its product with the inverse, for local block `t` of the stack.
