@@ -10,25 +10,35 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "extending.md").read_text()
 CAMERAS = Path("crates/photocore/src/geometry/camera")
+KINDS = Path("crates/photocore/src/network/observations")
 FORMATS = Path("python/photogram/collection/formats")
-EXTENSIONS = {
-    "lens": (
-        CAMERAS / "radial.rs",
-        CAMERAS / "mod.rs",
-        "radial::Radial;",
-        r"\bRadial\b(?! distortion)|\"radial\"",
-    ),
-    "format": (FORMATS / "bundler.py", FORMATS / "registry.py", '"bundler",', r"bundler"),
-}
-"""Its file, the file that registers it, the line there, and what the extension is called in sources."""
 PACKAGE = [
     path
     for path in (ROOT / "python" / "photogram").rglob("*.py*")
     if path.suffix in (".py", ".pyi") and path.parent.name != "stellar"
 ]
 """Without the calibration by stars, whose plots have a radial axis."""
-SOURCES = {".rs": [*(ROOT / "crates").glob("*/src/**/*.rs"), *PACKAGE], ".py": PACKAGE}
-"""Where an extension of the crate, or of the package, must not be named."""
+CRATE = [*(ROOT / "crates" / "photocore" / "src").rglob("*.rs")]
+BINDING = [*(ROOT / "crates" / "photogram-py" / "src").rglob("*.rs")]
+EXTENSIONS = {
+    "lens": (
+        CAMERAS / "radial.rs",
+        CAMERAS / "mod.rs",
+        "radial::Radial;",
+        r"\bRadial\b(?! distortion)|\"radial\"",
+        [*CRATE, *BINDING, *PACKAGE],
+    ),
+    "format": (FORMATS / "bundler.py", FORMATS / "registry.py", '"bundler",', r"bundler", PACKAGE),
+    # What Python can say of an observation is another matter.
+    "observation": (
+        KINDS / "equal_height.rs",
+        KINDS / "mod.rs",
+        "equal_height::EqualHeight;",
+        r"EqualHeight|equal.height",
+        CRATE,
+    ),
+}
+"""Its file, the file that registers it, the line there, its name, and the sources that do not know it."""
 
 
 def code(path):
@@ -39,7 +49,7 @@ def code(path):
 
 @pytest.mark.parametrize("extension", EXTENSIONS)
 def test_the_page_quotes_the_file_and_the_line(extension):
-    own, registry, line, _ = EXTENSIONS[extension]
+    own, registry, line, *_ = EXTENSIONS[extension]
     language = {".rs": "rust", ".py": "python"}[own.suffix]
     assert f"<!-- quote: {own} -->\n```{language}\n{(ROOT / own).read_text()}```\n<!-- end -->" in PAGE
     said = re.search(
@@ -51,10 +61,10 @@ def test_the_page_quotes_the_file_and_the_line(extension):
 
 @pytest.mark.parametrize("extension", EXTENSIONS)
 def test_an_extension_is_one_file_and_one_line(extension):
-    own, registry, line, called = EXTENSIONS[extension]
+    own, registry, line, called, sources = EXTENSIONS[extension]
     places = [
         (path.relative_to(ROOT), text.strip())
-        for path in SOURCES[own.suffix]
+        for path in sources
         for text in code(path)
         if re.search(called, text)
     ]

@@ -38,9 +38,9 @@ def report(result: AdjustedCollection) -> str:
             "Weighted and fixed parameters: given minus adjusted, redundancy, standardized residual",
             observed_lines("photo", photos, heads, np.ones(len(heads)), result.stations),
         ),
-        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Photos: values and standard deviations", _photos(result)),
         ("Points: standard deviations", _points(result)),
+        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Work", _work(result)),
     ]
     return composed(headline("collection of photos"), sections)

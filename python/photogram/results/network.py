@@ -20,6 +20,8 @@ from photogram.statistics.reliability import ROUNDING
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram import _photocore
+
 __all__ = ["AdjustedNetwork", "Observed"]
 
 
@@ -125,7 +127,7 @@ class AdjustedNetwork(Shown, ABC):
                 value.flags.writeable = False
 
     @classmethod
-    def taken_over(cls, solution: Any, **found: Any) -> Self:
+    def taken_over(cls, solution: _photocore._NetworkSolution, **found: Any) -> Self:
         """Take over what the core found: under the same names, but for what is put otherwise in `found`."""
         found["initial_weighted_sum_of_squares"] = solution.initial_sum_of_squares
         found["iterations"] = [Iteration(*row) for row in solution.iterations]

@@ -54,9 +54,9 @@ def report(result: Result) -> str:
             "Stations as observations: observed minus adjusted, redundancy, standardized residual",
             _stations(result),
         ),
-        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
+        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Work", _work(result)),
     ]
     return composed(headline("block adjustment", result.block.title), sections)
