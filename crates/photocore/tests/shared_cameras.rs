@@ -7,7 +7,7 @@ use std::ops::{ControlFlow, Range};
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
 use num_complex::Complex64 as C;
-use photocore::adjustment::{self, Criterion, Status};
+use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{self, Bal, ObjectSpace, Perspective, PoseNumbers};
 use photocore::network::observations::Distance;
 use photocore::network::{
@@ -19,7 +19,7 @@ const FREE: f64 = f64::INFINITY;
 const PHOTOS: usize = 11;
 const POINTS: usize = 40;
 const IMAGE_SD: f64 = 0.5;
-const TIGHT: Criterion = Criterion::Fraction(1e-9);
+const TIGHT: Criterion = Method::Damped(Stop::Fraction(1e-9));
 /// Two that several photos share, one of one photo, one that is held, and one with a principal distance alone.
 const CAMERA_OF: [usize; PHOTOS] = [0, 1, 0, 1, 0, 1, 0, 2, 3, 4, 4];
 
@@ -116,9 +116,9 @@ fn network() -> Network {
     }
 }
 
-fn adjust(network: &Network, criterion: Criterion) -> Result<Solution, NetworkError> {
+fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
     let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    let adjustment = adjustment::Options { criterion, ..adjustment::Options::default() };
+    let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
     let options = Options { adjustment, ..Options::default() };
     network.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
 }
@@ -300,7 +300,7 @@ fn redundancy_numbers_of_a_free_network_add_up() {
     let mut network = network();
     network.points.iter_mut().for_each(|point| point.sd = [FREE; 3]);
     network.observations.clear();
-    let solution = adjust(&network, Criterion::Decrease(1e-10)).unwrap();
+    let solution = adjust(&network, Method::TrustRegion(Stop::Decrease(1e-10))).unwrap();
     assert_eq!(solution.datum.len(), 7);
     let parameters = 3 + 2 + 3 + 1;
     let weighted = 1 + 2;
