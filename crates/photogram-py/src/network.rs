@@ -14,6 +14,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{check_lengths, indices, numbers, rows, squares, table};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
+use crate::observations::{AdjustedRow, Group, adjusted_row, observations};
 use crate::options::{named_loss, named_ordering, unknown};
 use crate::solution::{
     IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
@@ -104,7 +105,7 @@ fn images(
 #[pyfunction]
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
-    principal_distances, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
+    principal_distances, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
     covariance, loss, ordering, unit_variance, threads, memory, progress
 ))]
 fn adjust_block(
@@ -122,6 +123,7 @@ fn adjust_block(
     image_points: PyReadonlyArrayDyn<'_, i64>,
     image_xy: PyReadonlyArrayDyn<'_, f64>,
     image_sd: PyReadonlyArrayDyn<'_, f64>,
+    observation_groups: Vec<Group<'_>>,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
     refraction: Option<RefractionRow>,
@@ -176,7 +178,7 @@ fn adjust_block(
         photos,
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
-        observations: vec![],
+        observations: observations(&observation_groups)?,
     };
     let criterion = match criterion {
         "fraction" => Criterion::Fraction(limit),
@@ -532,9 +534,14 @@ solution_class! {
         }
 
         #[getter]
-        fn sums_of_squares(&self) -> (f64, f64, f64) {
+        fn sums_of_squares(&self) -> (f64, f64, f64, f64) {
             let sums = self.solution.sums_of_squares;
-            (sums.camera, sums.ground, sums.plates)
+            (sums.camera, sums.ground, sums.plates, sums.observations)
+        }
+
+        #[getter]
+        fn adjusted_observations(&self) -> Vec<Option<AdjustedRow>> {
+            self.solution.observations.iter().map(|own| own.as_ref().map(adjusted_row)).collect()
         }
 
         #[getter]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.results.observed import ObservedKind, observed_kinds
 from photogram.results.scaled import Scaled
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import ROUNDING
@@ -57,16 +58,24 @@ class SumsOfSquares:
         Of the held components of control.
     plates
         Of the image coordinates.
+    observations
+        Of the observations beside images.
     """
 
     camera: float
     ground: float
     plates: float
+    observations: float = 0.0
+
+    @property
+    def measured(self) -> float:
+        """Of all but photos."""
+        return self.ground + self.plates + self.observations
 
     @property
     def total(self) -> float:
         """All together."""
-        return self.camera + self.ground + self.plates
+        return self.camera + self.ground + self.plates + self.observations
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +132,8 @@ class AdjustedBlock(Scaled):
         NaN without redundancy.
     image_weights
         (m,) factor by which the loss has changed the weight of an image point; 1 without a loss.
+    kinds
+        Observations beside images: arrays for each kind, by its name.
     dropped
         Points left out, with the reason.
     ordering, photo_order, predictions
@@ -157,6 +168,7 @@ class AdjustedBlock(Scaled):
     redundancy: Floats
     standardized: Floats
     image_weights: Floats
+    kinds: Mapping[str, ObservedKind]
     dropped: Mapping[str, str]
     ordering: str
     predictions: Mapping[str, float]
@@ -189,6 +201,7 @@ class AdjustedBlock(Scaled):
             "iterations": [Iteration(*row) for row in solution.iterations],
             "sums_of_squares": SumsOfSquares(*solution.sums_of_squares),
             "unit_variance": unit_variance,
+            "kinds": observed_kinds(block, solution),
             "dropped": {block.point_ids[point]: reason for point, reason in solution.dropped},
         }
         same = {each.name: getattr(solution, each.name) for each in fields(cls) if each.name not in found}
@@ -199,10 +212,10 @@ class AdjustedBlock(Scaled):
         """The test of all residuals together; None without degrees of freedom.
 
         It takes the observations on which the variance of unit weight is based: with `constrained` cameras
-        all of them, else image coordinates and ground control.
+        all of them, else image coordinates, observations beside these and ground control.
         """
         sums = self.sums_of_squares
-        tested = sums.total if self.unit_variance == "constrained" else sums.ground + sums.plates
+        tested = sums.total if self.unit_variance == "constrained" else sums.measured
         return global_test(tested, self.degrees_of_freedom)
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ from photogram.statistics.reliability import TESTABLE
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.results.adjusted import AdjustedBlock
+    from photogram.results.observed import ObservedKind
 
 __all__ = ["bandwidths", "problems_of", "report", "summary"]
 
@@ -50,6 +52,10 @@ def report(result: AdjustedBlock) -> str:
         (
             "Stations as observations: observed minus adjusted, redundancy, standardized residual",
             _stations(result),
+        ),
+        (
+            "Observations beside images: observed minus adjusted, redundancy, standardized residual",
+            _beside_images(result),
         ),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
@@ -101,7 +107,19 @@ def _tested(result: AdjustedBlock) -> list[Observations]:
             testable(result.photo_standardized, result.photo_redundancy),
             lambda index: f"{unknowns[index[1]]} of photo {block.photo_ids[index[0]]}",
         ),
+        *(
+            Observations(
+                f"components of observations of the kind {each.kind}",
+                testable(each.standardized, each.redundancy),
+                partial(_component_name, each),
+            )
+            for each in result.kinds.values()
+        ),
     ]
+
+
+def _component_name(kind: ObservedKind, index: tuple[int, ...]) -> str:
+    return f"{kind.components[index[1]]} of {kind.kind} {kind.names[index[0]]}"
 
 
 def _adjustment(result: AdjustedBlock) -> list[str]:
@@ -126,11 +144,19 @@ def _adjustment(result: AdjustedBlock) -> list[str]:
         ("weighted sum of squares, camera", f"{sums.camera:.6f}"),
         ("weighted sum of squares, ground", f"{sums.ground:.6f}"),
         ("weighted sum of squares, plates", f"{sums.plates:.6f}"),
+        *(
+            (f"weighted sum of squares, {each.kind}", f"{each.sum_of_squares:.6f}")
+            for each in result.kinds.values()
+        ),
         ("weighted sum of squares, total", f"{sums.total:.6f}"),
         ("photos", f"{len(block.photo_ids)}"),
         ("points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
         ("held components of control", components),
         ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
+        *(
+            (f"observations, {each.kind}", f"{each.used} used of {len(each.rows)}")
+            for each in result.kinds.values()
+        ),
         ("object space", "geographic" if block.geographic else "rectangular"),
         ("rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
         ("refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
@@ -297,6 +323,31 @@ def _cells(values: Floats, there: np.ndarray, decimals: int) -> list[str]:
     ]
 
 
+def _beside_images(result: AdjustedBlock) -> list[str]:
+    """Write a line for each component of every observation, rotations in arcsec."""
+    lines = []
+    for each in result.kinds.values():
+        units = ["arcsec" if unit == "rad" else unit for unit in each.units]
+        outward = np.array([1.0 / ARCSEC if unit == "rad" else 1.0 for unit in each.units])
+        columns = ("sd", "residual", "redundancy", "standardized")
+        head = f"{each.kind:<28}{'component':<22}" + "".join(f"{column:>14}" for column in columns)
+        lines += [head]
+        sd, residuals = each.sd * outward, each.residuals * outward
+        for i, k in np.argwhere(~np.isnan(each.residuals)).tolist():
+            cells = (
+                f"{sd[i, k]:>14.5f}",
+                _cell(residuals[i, k], 14, 5),
+                _cell(each.redundancy[i, k], 14, 3),
+                _cell(each.standardized[i, k], 14, 2),
+            )
+            lines.append(f"{each.names[i]:<28}{f'{each.components[k]} {units[k]}':<22}{''.join(cells)}")
+    return lines
+
+
+def _cell(value: float, width: int, decimals: int) -> str:
+    return f"{value:>{width}.{decimals}f}" if math.isfinite(value) else f"{'-':>{width}}"
+
+
 def _photos(result: AdjustedBlock) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [
@@ -415,4 +466,4 @@ def _dms(angle: float, decimals: int) -> str:
 
 
 def _number(value: float, decimals: int) -> str:
-    return f"{value:>16.{decimals}f}" if math.isfinite(value) else f"{'-':>16}"
+    return _cell(value, 16, decimals)

@@ -53,6 +53,12 @@ class Result(AdjustedBlock):
 
         return tables.station_table(self)
 
+    def observation_table(self) -> pd.DataFrame:
+        """Return observations beside images as a data frame, a row for each component."""
+        from photogram.results import tables  # pandas takes long to import
+
+        return tables.observation_table(self)
+
     def report(self) -> str:
         """Return the adjustment report as text."""
         return report(self)

@@ -18,7 +18,15 @@ if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.results.adjusted import AdjustedBlock
 
-__all__ = ["check_table", "control_table", "image_table", "photo_table", "point_table", "station_table"]
+__all__ = [
+    "check_table",
+    "control_table",
+    "image_table",
+    "observation_table",
+    "photo_table",
+    "point_table",
+    "station_table",
+]
 
 
 def photo_table(result: AdjustedBlock) -> pd.DataFrame:
@@ -112,6 +120,22 @@ def station_table(result: AdjustedBlock) -> pd.DataFrame:
             **_numbers(names, result.photo_standardized[known], "standardized_"),
         }
     )
+
+
+def observation_table(result: AdjustedBlock) -> pd.DataFrame:
+    """Return observations beside images: a row for each component, with its unit.
+
+    Columns: `kind`, `of`, `component`, `unit`, `sd`, `residual` (observed minus adjusted), `redundancy`,
+    `standardized`. Components that were not observed have no row, nor have observations that were left out.
+    """
+    rows = [
+        (each.kind, each.names[i], each.components[k], each.units[k], *(values[i, k] for values in numbers))
+        for each in result.kinds.values()
+        for numbers in [(each.sd, each.residuals, each.redundancy, each.standardized)]
+        for i, k in np.argwhere(~np.isnan(each.residuals)).tolist()
+    ]
+    names = ["kind", "of", "component", "unit", "sd", "residual", "redundancy", "standardized"]
+    return pd.DataFrame(rows, columns=names)
 
 
 def _numbers(names: tuple[str, ...] | list[str], values: Floats, prefix: str) -> dict[str, Any]:
