@@ -22,7 +22,7 @@ __all__ = ["images", "named", "observed", "table"]
 
 @columns_of.register(Result)
 def table(result: Result, what: str) -> dict[str, Any]:
-    """Return the columns of photos, points, images, check points, control or stations."""
+    """Return the columns of photos, points, images, check points, control, stations or other observations."""
     return _TABLES[what](result)
 
 
@@ -79,6 +79,18 @@ def _stations(result: Result) -> dict[str, Any]:
     return {"photo": _ids(result.block.photo_ids)[stations.rows], **observed(names, stations)}
 
 
+def _beside_images(result: Result) -> dict[str, Any]:
+    """Name what there is of each component: one row; what was not observed or left out has none."""
+    rows = [
+        (each.kind, each.names[i], each.components[k], each.units[k], *(values[i, k] for values in numbers))
+        for each in result.kinds.values()
+        for numbers in [(each.sd, each.residuals, each.redundancy, each.standardized)]
+        for i, k in np.argwhere(~np.isnan(each.residuals)).tolist()
+    ]
+    names = ("kind", "of", "component", "unit", "sd", "residual", "redundancy", "standardized")
+    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+
+
 _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "photo": _photos,
     "point": _points,
@@ -86,6 +98,7 @@ _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "check": _check_points,
     "control": _control,
     "station": _stations,
+    "observation": _beside_images,
 }
 
 

@@ -7,6 +7,7 @@ use pyo3::types::PyDict;
 
 use super::{FailureRow, failure};
 use crate::arrays::{squares, table};
+use crate::observations::{AdjustedRow, adjusted_row};
 use crate::solution::{
     IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
 };
@@ -234,9 +235,14 @@ solution_class! {
         }
 
         #[getter]
-        fn sums_of_squares(&self) -> (f64, f64, f64) {
+        fn sums_of_squares(&self) -> (f64, f64, f64, f64) {
             let sums = self.solution.sums_of_squares;
-            (sums.camera, sums.ground, sums.plates)
+            (sums.camera, sums.ground, sums.plates, sums.observations)
+        }
+
+        #[getter]
+        fn adjusted_observations(&self) -> Vec<Option<AdjustedRow>> {
+            self.solution.observations.iter().map(|own| own.as_ref().map(adjusted_row)).collect()
         }
 
         #[getter]
