@@ -305,6 +305,7 @@ def test_members_of_the_document(result, document):
         "program", "title", "units", "conventions", "status", "messages", "loss",
         "initial_weighted_sum_of_squares", "iterations", "weighted_sum_of_squares", "degrees_of_freedom",
         "unit_variance", "variance_of_unit_weight", "covariance_scale", "photos", "points", "observations",
+        "observations_beside_images",
         "control", "stations", "problems", "global_test",
         "check_points", "dropped_points", "ordering", "predictions", "operations", "refraction", "seconds",
     }  # fmt: skip
@@ -316,7 +317,8 @@ def test_members_of_the_document(result, document):
     assert document["unit_variance"] == "constrained"
     sums = result.sums_of_squares
     assert document["weighted_sum_of_squares"] == {
-        "camera": sums.camera, "ground": sums.ground, "plates": sums.plates, "total": sums.total
+        "camera": sums.camera, "ground": sums.ground, "plates": sums.plates, "observations": 0.0,
+        "total": sums.total
     }  # fmt: skip
     assert document["dropped_points"] == [{"id": "SINGLE", "reason": "pass point on one photo"}]
     assert [iteration["number"] for iteration in document["iterations"]] == [

@@ -349,6 +349,7 @@ def adjust_block(
     image_xy: _Floats,
     image_sd: _Floats,
     *,
+    observation_groups: list[tuple[str, _Indices, _Floats, _Floats]],
     spheroid: tuple[float, float] | None,
     photo_to_ground: bool,
     refraction: RefractionRow | None,
@@ -384,6 +385,13 @@ def adjust_block(
         (m,) indices.
     image_xy, image_sd
         (m, 2) millimetres.
+    observation_groups
+        Observations beside images, each kind with its name, (k, p) indices of points or photos, (k, v) values
+        and (k, r, r) covariance matrices of its r components. Values: `distance` the length, `equal height`
+        the difference, `difference` three components (NaN where not observed), `control` three coordinates,
+        `position` three coordinates and the lever arm, `attitude` two matrices row by row (body to object,
+        body to photo), `relative` a translation and a matrix. Lengths in the unit of the object space, angles
+        in radians.
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
@@ -559,8 +567,19 @@ class BlockSolution(_NetworkSolution):
         """Points left out, each with the reason."""
 
     @property
-    def sums_of_squares(self) -> tuple[float, float, float]:
-        """Weighted sums of squares: camera, ground, plates."""
+    def sums_of_squares(self) -> tuple[float, float, float, float]:
+        """Weighted sums of squares: camera, ground, plates, observations beside images."""
+
+    @property
+    def adjusted_observations(
+        self,
+    ) -> list[tuple[list[float], list[float], list[float], float, float] | None]:
+        """What has become of each observation, in the order of the groups.
+
+        Residuals, redundancy numbers and standardized residuals of its components, in the units of its kind;
+        its weighted square; the factor by which a loss has changed its weight. None for observations of
+        points that were left out.
+        """
 
     @property
     def degrees_of_freedom(self) -> int:

@@ -18,6 +18,7 @@ from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, Rank
 from photogram.memory import available_memory, threads_that_fit, turned
 from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
+from photogram.network.observations import observation_rows
 from photogram.network.refracted import check_cameras, remarks
 from photogram.results.iteration import Iteration
 from photogram.results.result import Result
@@ -164,6 +165,7 @@ def adjust(
             photo_positions_observed=None,
             photo_attitudes_observed=None,
         )
+    groups = observation_rows(block.observations, block.point_ids, block.photo_ids)
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
 
     try:
@@ -181,6 +183,7 @@ def adjust(
             block.image_points,
             block.image_xy,
             block.image_sd,
+            observation_groups=[group for _, group in groups],
             spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
             photo_to_ground=block.photo_to_ground,
             refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
@@ -206,7 +209,8 @@ def _fits_anywhere(block: Block) -> bool:
 
     A full factor of 100 photos takes 3 MB, and 10,000 image points with all their results 10 MB.
     """
-    return len(block.photo_ids) <= 100 and len(block.image_xy) <= 10_000
+    others = len(block.observations) <= 100
+    return others and len(block.photo_ids) <= 100 and len(block.image_xy) <= 10_000
 
 
 def _result(
@@ -279,8 +283,12 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
     messages += behind(block, solution)
     messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
+    dropped = {block.point_ids[point] for point, _ in solution.dropped}
+    lost = [each.name for each in block.observations if not each.OF_PHOTOS and dropped.intersection(each.of)]
+    if lost:
+        messages.append(Message(f"left out with their points: {listed(lost)}"))
     held = np.isfinite(block.point_sd) & (solution.point_rays > 0)[:, np.newaxis]
-    if not held.any() and not (block.photo_position_sd == 0).all():
+    if not held.any() and not block.observations and not (block.photo_position_sd == 0).all():
         messages.insert(
             0, Message("there is no control: the datum of the block rests on the weights of its photos")
         )

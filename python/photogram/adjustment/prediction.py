@@ -17,7 +17,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.network import geometry
-from photogram.network.block import Block, checked
+from photogram.network.block import Block, checked, of_images_alone
 from photogram.results.result import Result
 
 __all__ = ["at_adjusted", "image_depths", "predict"]
@@ -52,13 +52,14 @@ def predict(
     Raises
     ------
     InputError
-        Points with images but without coordinates, or behind a photo that shows them, named.
+        Points with images but without coordinates, or behind a photo that shows them, named; observations
+        beside images.
     RankError
         The network does not determine all unknowns; names the photos and points concerned.
     AdjustmentError
         There is nothing to adjust, or rays are so nearly parallel that their points cannot be found.
     """
-    _check_positions(checked(block))
+    _check_positions(of_images_alone(checked(block), "predict"))
     images = block.image_photos, block.image_points
     computed = geometry.project(
         block.point_positions[images[1]],

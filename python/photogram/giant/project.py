@@ -67,8 +67,8 @@ class Project(Contents):
         Raises
         ------
         InputError
-            Something that GIANT files cannot say: fixed values, or different standard deviations within a
-            photo.
+            Something that GIANT files cannot say: fixed values, different standard deviations within a photo,
+            observations beside images.
         """
         return cls(*block_files(block, common))
 

@@ -14,6 +14,7 @@ from photogram.arguments.arrays import indices, length, names, shaped, shown, te
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.geometry import Spheroid
+from photogram.network.observations import Observation, observation_rows
 from photogram.network.refraction import Refraction, metres_per_unit
 
 __all__ = ["Block"]
@@ -76,13 +77,16 @@ class Block:
         (P, 3) observed values of the weighted components, as of GNSS and inertial measurements: the
         adjustment starts at the initial values and weights these. Whole turns of angles do not matter. NaN,
         or any number, where a component is free; the fixed value where it is fixed. None: the initial values.
+    observations
+        What else was observed: distances, differences of coordinates, heights, positions and attitudes of
+        photos, relative poses, control with full covariance (:mod:`photogram.network.observations`).
 
     Raises
     ------
     InputError
         Arrays of the wrong shape or type, values that are not finite or masked, indices out of range, names
         that repeat, are empty or are no names, a point with two images on a photo; refraction in a linear
-        unit whose length is not known.
+        unit whose length is not known; observations of points or photos that are not there.
     """
 
     photo_ids: list[str]
@@ -105,6 +109,7 @@ class Block:
     refraction: Refraction | None = None
     photo_positions_observed: Floats | None = None
     photo_attitudes_observed: Floats | None = None
+    observations: Sequence[Observation] = ()
 
     def __post_init__(self) -> None:
         for name in ("photo_ids", "point_ids"):
@@ -133,6 +138,7 @@ class Block:
         self._check_observed()
         self._check_twice()
         self._check_conventions()
+        self._check_observations()
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -197,6 +203,15 @@ class Block:
             if not isinstance(self.refraction, Refraction):
                 raise InputError(f"refraction is a Refraction or None, not {shown(self.refraction)}")
             metres_per_unit(self.linear_unit)
+
+    def _check_observations(self) -> None:
+        if not isinstance(self.observations, Sequence):
+            raise InputError(f"observations is no list: {shown(self.observations)}")
+        self._set("observations", tuple(self.observations))
+        for row, each in enumerate(self.observations):
+            if not isinstance(each, Observation) or not each.KIND:
+                raise InputError(f"observations[{row}] is no observation: {shown(each)}")
+        observation_rows(self.observations, self.point_ids, self.photo_ids)
 
     def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
         if bad.any():
@@ -313,6 +328,19 @@ class Block:
         own._set("photo_ids", list(self.photo_ids))
         own._set("point_ids", list(self.point_ids))
         return own
+
+
+def of_images_alone(block: Block, what: str) -> Block:
+    """Return a block that has nothing but images; refuse others for what would leave the rest out.
+
+    Raises
+    ------
+    InputError
+        Observations beside images.
+    """
+    if block.observations:
+        raise InputError(f"{what}: the block has observations beside images, which are not taken there")
+    return block
 
 
 def checked(block: Block) -> Block:

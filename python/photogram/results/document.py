@@ -60,6 +60,7 @@ def _document(result: Result) -> dict[str, Any]:
             "camera": sums.camera,
             "ground": sums.ground,
             "plates": sums.plates,
+            "observations": sums.observations,
             "total": sums.total,
         },
         "degrees_of_freedom": result.degrees_of_freedom,
@@ -70,6 +71,7 @@ def _document(result: Result) -> dict[str, Any]:
         "photos": _photos(result),
         "points": _points(result),
         "observations": _observations(result),
+        "observations_beside_images": _beside_images(result),
         "control": _control(result),
         "stations": _stations(result),
         "check_points": _check_points(result),
@@ -171,6 +173,25 @@ def _observations(result: Result) -> list[dict[str, Any]]:
             **({"weight_factor": weight} if result.loss else {}),
         }
         for photo, point, residual, redundancy, standardized, weight in columns
+    ]
+
+
+def _beside_images(result: Result) -> list[dict[str, Any]]:
+    return [
+        {
+            "kind": each.kind,
+            "of": list(result.block.observations[row].of),
+            "components": list(each.components),
+            "units": list(each.units),
+            "sd": each.sd[k].tolist(),
+            "residual": each.residuals[k].tolist(),
+            "redundancy": each.redundancy[k].tolist(),
+            "standardized": each.standardized[k].tolist(),
+            **({"weight_factor": each.weights[k].item()} if result.loss else {}),
+        }
+        for each in result.kinds.values()
+        for k, row in enumerate(each.rows.tolist())
+        if np.isfinite(each.squares[k])
     ]
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.structuring import structure
-from photogram.results.observed import image_lines, observed_lines, tested
+from photogram.results.observed import image_lines, kind_lines, observed_lines, tested, tested_kind
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.sections import Section, composed, headline, problems
@@ -54,6 +54,10 @@ def report(result: Result) -> str:
             "Stations as observations: observed minus adjusted, redundancy, standardized residual",
             _stations(result),
         ),
+        (
+            "Observations beside images: observed minus adjusted, redundancy, standardized residual",
+            _beside_images(result),
+        ),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
         ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
@@ -83,7 +87,8 @@ def problems_of(result: Result) -> list[str]:
 def _tested(result: Result) -> list[Observations]:
     block = result.block
     unknowns = (*_axes(result), "omega", "phi", "kappa")
-    return tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result))
+    images = tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result))
+    return [*images, *map(tested_kind, result.kinds.values())]
 
 
 def _axes(result: Result) -> tuple[str, str, str]:
@@ -113,11 +118,19 @@ def _adjustment(result: Result) -> list[str]:
         ("weighted sum of squares, camera", f"{sums.camera:.6f}"),
         ("weighted sum of squares, ground", f"{sums.ground:.6f}"),
         ("weighted sum of squares, plates", f"{sums.plates:.6f}"),
+        *(
+            (f"weighted sum of squares, {each.kind}", f"{each.sum_of_squares:.6f}")
+            for each in result.kinds.values()
+        ),
         ("weighted sum of squares, total", f"{sums.total:.6f}"),
         ("photos", f"{len(block.photo_ids)}"),
         ("points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
         ("held components of control", components),
         ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
+        *(
+            (f"observations, {each.kind}", f"{each.used} used of {len(each.rows)}")
+            for each in result.kinds.values()
+        ),
         ("object space", "geographic" if block.geographic else "rectangular"),
         ("rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
         ("refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
@@ -223,6 +236,10 @@ def _stations(result: Result) -> list[str]:
     columns += ["omega arcsec", "phi arcsec", "kappa arcsec"]
     outward = np.append(_outward(result), [1.0 / ARCSEC] * 3)
     return observed_lines("photo", result.block.photo_ids, columns, outward, result.stations)
+
+
+def _beside_images(result: Result) -> list[str]:
+    return [line for each in result.kinds.values() for line in kind_lines(each)]
 
 
 def _images(result: Result) -> list[str]:

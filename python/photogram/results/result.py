@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.limits import GlobalTest, global_test
 
@@ -36,16 +37,24 @@ class SumsOfSquares:
         Of the held components of control.
     plates
         Of the image coordinates.
+    observations
+        Of the observations beside images.
     """
 
     camera: float
     ground: float
     plates: float
+    observations: float = 0.0
+
+    @property
+    def measured(self) -> float:
+        """Of all but photos."""
+        return self.ground + self.plates + self.observations
 
     @property
     def total(self) -> float:
         """All together."""
-        return self.camera + self.ground + self.plates
+        return self.camera + self.measured
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,6 +81,8 @@ class Result(AdjustedNetwork):
         (P,) the indices of the photos as they were eliminated.
     point_last_corrections
         (n, 3) corrections in the last iteration.
+    kinds
+        Observations beside images: arrays for each kind, by its name.
     dropped
         Points left out, with the reason.
     """
@@ -84,6 +95,7 @@ class Result(AdjustedNetwork):
     photo_attitudes: Floats
     photo_order: Indices
     point_last_corrections: Floats
+    kinds: Mapping[str, ObservedKind]
     dropped: Mapping[str, str]
 
     @classmethod
@@ -103,6 +115,7 @@ class Result(AdjustedNetwork):
             loss=loss,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
             unit_variance=unit_variance,
+            kinds=observed_kinds(block, solution),
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
         )
 
@@ -116,10 +129,10 @@ class Result(AdjustedNetwork):
         """The test of all residuals together; None without degrees of freedom.
 
         It takes the observations on which the variance of unit weight is based: with `constrained` cameras
-        all of them, else image coordinates and ground control.
+        all of them, else image coordinates, observations beside these and ground control.
         """
         sums = self.sums_of_squares
-        tested = sums.total if self.unit_variance == "constrained" else sums.ground + sums.plates
+        tested = sums.total if self.unit_variance == "constrained" else sums.measured
         return global_test(tested, self.degrees_of_freedom)
 
     @property
@@ -180,6 +193,10 @@ class Result(AdjustedNetwork):
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""
         return self._table("check")
+
+    def observation_table(self) -> pd.DataFrame:
+        """Return observations beside images as a data frame, a row for each component."""
+        return self._table("observation")
 
 
 def _least_turns(angles: Floats) -> Floats:

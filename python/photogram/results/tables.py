@@ -79,6 +79,20 @@ def _stations(result: Result) -> dict[str, Any]:
     return {"photo": _ids(result.block.photo_ids)[stations.rows], **observed(names, stations)}
 
 
+def _beside_images(result: Result) -> dict[str, Any]:
+    """`kind`, `of`, `component`, `unit` and what `observed` has: a row for each component."""
+    columns: dict[str, list[Any]] = {name: [] for name in _BESIDE_IMAGES}
+    for each in result.kinds.values():
+        there = np.argwhere(~np.isnan(each.residuals))
+        for i, k in there.tolist():
+            row = (each.kind, each.names[i], each.components[k], each.units[k])
+            figures = (each.sd[i, k], each.residuals[i, k], each.redundancy[i, k], each.standardized[i, k])
+            for name, value in zip(_BESIDE_IMAGES, (*row, *figures), strict=True):
+                columns[name].append(value)
+    return columns
+
+
+_BESIDE_IMAGES = ("kind", "of", "component", "unit", "sd", "residual", "redundancy", "standardized")
 _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "photo": _photos,
     "point": _points,
@@ -86,6 +100,7 @@ _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "check": _check_points,
     "control": _control,
     "station": _stations,
+    "observation": _beside_images,
 }
 
 

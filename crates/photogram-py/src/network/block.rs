@@ -6,6 +6,7 @@ use photocore::geometry::{Perspective, PoseNumbers};
 use photocore::network::{Camera, Network, Options, Photo, Start, UnitVariance};
 use pyo3::prelude::*;
 
+use super::observations::{Group, observations};
 use super::solution::BlockSolution;
 use super::{BlockError, adjusted, failure, images, points};
 use crate::arrays::{check_lengths, numbers, rows};
@@ -20,7 +21,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyfunction]
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
-    principal_distances, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
+    principal_distances, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
     covariance, loss, ordering, unit_variance, threads, memory, progress
 ))]
 fn adjust_block(
@@ -38,6 +39,7 @@ fn adjust_block(
     image_points: PyReadonlyArrayDyn<'_, i64>,
     image_xy: PyReadonlyArrayDyn<'_, f64>,
     image_sd: PyReadonlyArrayDyn<'_, f64>,
+    observation_groups: Vec<Group<'_>>,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
     refraction: Option<RefractionRow>,
@@ -92,7 +94,7 @@ fn adjust_block(
         photos,
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
-        observations: vec![],
+        observations: observations(&observation_groups)?,
     };
     let method = match criterion {
         "fraction" => Method::Damped(Stop::Fraction(limit)),

@@ -2,6 +2,7 @@
 
 mod block;
 mod collection;
+mod observations;
 mod solution;
 
 use numpy::PyReadonlyArrayDyn;

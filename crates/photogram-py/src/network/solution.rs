@@ -5,6 +5,7 @@ use photocore::network::{AdjustedPhoto, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::observations::{AdjustedRow, adjusted_row};
 use super::{FailureRow, failure};
 use crate::arrays::{squares, table};
 use crate::solution::{
@@ -234,9 +235,14 @@ solution_class! {
         }
 
         #[getter]
-        fn sums_of_squares(&self) -> (f64, f64, f64) {
+        fn sums_of_squares(&self) -> (f64, f64, f64, f64) {
             let sums = self.solution.sums_of_squares;
-            (sums.camera, sums.ground, sums.plates)
+            (sums.camera, sums.ground, sums.plates, sums.observations)
+        }
+
+        #[getter]
+        fn adjusted_observations(&self) -> Vec<Option<AdjustedRow>> {
+            self.solution.observations.iter().map(|own| own.as_ref().map(adjusted_row)).collect()
         }
 
         #[getter]

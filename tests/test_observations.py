@@ -1,0 +1,225 @@
+"""Observations beside images in Python; the tests of the crate compare all kinds with dense algebra."""
+
+import json
+
+import numpy as np
+import pytest
+
+from example_scripts import load
+from photogram import Block, InputError, Spheroid, adjust, predict, simulate
+from photogram.giant import Project
+from photogram.network.geometry import geographic_to_geocentric, local_frames, rotation_matrix
+from photogram.network.observations import (
+    Attitude,
+    Control,
+    Difference,
+    Distance,
+    EqualHeight,
+    Position,
+    Relative,
+)
+
+KINDS = {
+    "distance": 1,
+    "equal height": 1,
+    "difference": 3,
+    "control": 3,
+    "position": 3,
+    "attitude": 3,
+    "relative": 6,
+}
+
+
+@pytest.fixture(scope="module")
+def example():
+    return load("scale_bar")
+
+
+def exact(spheroid):
+    """Return the truth, and a block of free photos and points with all kinds of observation, exact."""
+    simulation = simulate(
+        strips=2, photos_per_strip=3, points_per_photo=15, check_points=0, spheroid=spheroid, seed=5
+    )
+    truth = simulation.truth
+    rays = np.bincount(truth.image_points)
+    p, q = np.flatnonzero(rays >= 4)[:2].tolist()
+    points, photos = truth.point_ids, truth.photo_ids
+    plane = truth.point_positions
+    xyz = plane if spheroid is None else geographic_to_geocentric(plane, spheroid)
+    stations = truth.photo_positions
+    centres = stations if spheroid is None else geographic_to_geocentric(stations, spheroid)
+    local = rotation_matrix(truth.photo_attitudes).transpose(0, 2, 1)
+    frames = np.broadcast_to(np.eye(3), (len(photos), 3, 3)) if spheroid is None else local_frames(stations)
+    turned = frames.transpose(0, 2, 1) @ local
+    boresight = rotation_matrix([[0.01, -0.02, 1.5]])[0]
+    shift = turned[0].T @ (centres[1] - centres[0])
+    covariance = 0.01**2 * (np.eye(3) + 0.3)
+    control = [point for point, sd in enumerate(truth.point_sd) if np.isfinite(sd).all()]
+    observations = [
+        Distance(points[p], points[q], float(np.linalg.norm(xyz[q] - xyz[p])), sd=0.01),
+        EqualHeight(points[p], points[q], sd=0.01, difference=float(plane[q, 2] - plane[p, 2])),
+        Difference(points[q], points[p], np.where([True, False, True], xyz[p] - xyz[q], np.nan), sd=0.01),
+        *(Control(points[point], plane[point], covariance=covariance) for point in control),
+        Position(photos[0], stations[0], sd=[0.01, 0.01, 0.02]),
+        Attitude(photos[1], local[1] @ boresight, sd=1e-4, boresight=boresight),
+        Relative(photos[0], photos[1], shift, turned[0].T @ turned[1], sd=[0.01] * 3 + [1e-4] * 3),
+    ]
+    return truth, simulation.block.replace(
+        image_xy=truth.image_xy, point_sd=np.inf, observations=observations
+    )
+
+
+@pytest.mark.parametrize("spheroid", [None, Spheroid.clarke_1866()], ids=["rectangular", "geographic"])
+def test_what_is_computed_is_what_was_observed(spheroid):
+    truth, block = exact(spheroid)
+    result = adjust(block)
+    assert result.converged
+    assert set(result.kinds) == set(KINDS)
+    for each in result.kinds.values():
+        assert each.residuals.shape == (len(each.rows), KINDS[each.kind])
+        assert len(each.components) == len(each.units) == KINDS[each.kind]
+        assert np.nanmax(np.abs(each.residuals) / each.sd) < 1e-3, each.kind
+        assert (each.weights == 1).all()
+    difference = result.kinds["difference"]
+    assert np.isnan(difference.residuals[0]).tolist() == [False, True, False]
+    assert np.isnan(difference.sd[0, 1])
+    used = result.used_points
+    per_unit = [1e-6, 1e-6, 1.0] if spheroid else [1.0, 1.0, 1.0]
+    errors = np.abs(result.point_positions - truth.point_positions)[used] / per_unit
+    assert errors.max() < 1e-3
+    names = ("east", "north", "up") if spheroid else ("X", "Y", "Z")
+    assert result.kinds["control"].components == result.kinds["position"].components == names
+    assert difference.components == ("X", "Y", "Z")
+
+
+def test_redundancy_numbers_of_all_observations_sum_to_the_degrees_of_freedom(example):
+    result = adjust(example.measured())
+    kinds = result.kinds.values()
+    total = result.redundancy.sum() + sum(each.redundancy.sum() for each in kinds)
+    assert total == pytest.approx(result.degrees_of_freedom, abs=1e-8)
+    assert result.degrees_of_freedom == 160 + 1 + 2 + 15 + 15 - 30 - 48
+    for each in kinds:
+        ratio = each.residuals / (each.sd * np.sqrt(each.redundancy))
+        np.testing.assert_allclose(each.standardized, ratio, rtol=1e-6)
+        np.testing.assert_allclose(each.squares, ((each.residuals / each.sd) ** 2).sum(axis=1))
+    sums = result.sums_of_squares
+    assert sum(each.sum_of_squares for each in kinds) == pytest.approx(sums.observations)
+    assert sums.total == pytest.approx(sums.plates + sums.observations)
+    with pytest.raises(ValueError, match="read-only"):
+        result.kinds["distance"].residuals[0] = 0.0
+
+
+def test_the_scale_bar_gives_the_scale(example, capsys):
+    once = example.main()
+    assert "distance P0 - P15" in capsys.readouterr().out
+    block = once.block
+    bar = block.observations[0]
+    # Twice as long, and nothing else says so but GNSS to two centimetres.
+    kept = [each for each in block.observations if each.KIND != "position"]
+    longer = [Distance("P0", "P15", 2 * bar.length, sd=bar.sd), *kept[1:]]
+    fixed = np.zeros((5, 3))
+    fixed[1:] = np.inf
+    free = {"photo_position_sd": fixed}
+    one, two = (adjust(block.replace(observations=each, **free)) for each in (kept, longer))
+    origin = block.photo_positions[0]
+    heights = [result.point_positions - origin for result in (one, two)]
+    np.testing.assert_allclose(heights[1], 2 * heights[0], atol=2e-3)
+
+
+def test_the_report_the_table_and_the_document_tell_of_them(example):
+    result = adjust(example.measured())
+    text = result.report()
+    section = text[text.index("Observations beside images") :]
+    lines = {line.split("  ")[0]: line for line in section.splitlines()}
+    assert lines["P0 - P15"].split()[3:6] == ["length", "m", "0.00002"]
+    assert "rotation x arcsec" in section
+    assert "412.52961" in section  # 0.002 rad
+    assert "weighted sum of squares, position" in text
+    assert "observations, attitude" in text
+    table = result.observation_table()
+    assert len(table) == 1 + 2 + 15 + 15
+    assert table["unit"].tolist() == ["m"] * 18 + ["rad"] * 15
+    lengths = [result.kinds[kind].standardized.ravel() for kind in ("distance", "equal height", "position")]
+    np.testing.assert_array_equal(table["standardized"][:18].tolist(), np.concatenate(lengths))
+    document = json.loads(result.to_json())
+    assert document["weighted_sum_of_squares"]["observations"] == result.sums_of_squares.observations
+    first = document["observations_beside_images"][0]
+    assert (first["kind"], first["of"], first["units"]) == ("distance", ["P0", "P15"], ["m"])
+    assert first["residual"] == result.kinds["distance"].residuals[0].tolist()
+    assert len(document["observations_beside_images"]) == len(result.block.observations)
+
+
+def test_an_outlier_is_named(example):
+    block = example.measured()
+    wrong = [Distance("P1", "P14", 1.1, sd=2e-5), *block.observations]
+    problems = "\n".join(map(str, adjust(block.replace(observations=wrong)).report().splitlines()[:30]))
+    assert "distance" in problems
+    assert "P1 - P14" in problems or "P0 - P15" in problems
+
+
+def test_observations_of_points_that_are_left_out_are_left_out_too(example):
+    block = example.measured()
+    one = (block.image_points != 15) | (block.image_photos == 0)
+    names = ("image_photos", "image_points", "image_xy", "image_sd")
+    result = adjust(block.replace(**{name: getattr(block, name)[one] for name in names}))
+    assert result.kinds["distance"].used == 0
+    assert np.isnan(result.kinds["distance"].residuals).all()
+    assert "left out with their points: distance P0 - P15" in [str(each) for each in result.messages]
+    assert len(json.loads(result.to_json())["observations_beside_images"]) == len(block.observations) - 1
+    assert "distance" not in result.observation_table()["kind"].tolist()
+
+
+def test_where_observations_cannot_be_taken_it_is_said(example):
+    block = example.measured()
+    with pytest.raises(InputError, match="predict: the block has observations beside images"):
+        predict(block.replace(point_positions=np.zeros((16, 3))))
+    with pytest.raises(InputError, match="GIANT files: the block has observations beside images"):
+        Project.from_block(block)
+
+
+ROTATION = np.eye(3)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Distance("1", "1", 2.0, sd=0.1), "distance 1 - 1 is of one point alone"),
+        (lambda: Distance("1", "2", 0.0, sd=0.1), "length of distance 1 - 2 is not positive"),
+        (lambda: Distance("1", "2", np.nan, sd=0.1), "length of distance 1 - 2 is not finite"),
+        (lambda: Distance("1", "2", 2.0, sd=0.0), "sd of distance 1 - 2 is not positive and finite"),
+        (lambda: EqualHeight("1", "2", sd=np.inf), "sd of equal height 1 - 2 is not positive and finite"),
+        (lambda: EqualHeight("1", "", sd=1.0), "equal height"),
+        (lambda: Difference("1", "2", [np.nan] * 3, sd=1.0), "no component that was observed"),
+        (lambda: Difference("1", "2", [np.inf, 0, 0], sd=1.0), "vector of difference 1 - 2 is not finite"),
+        (lambda: Control("1", [0, 0, 0]), "control 1 needs either sd or covariance"),
+        (lambda: Control("1", [0, 0, 0], 1.0, np.eye(3)), "control 1 needs either sd or covariance"),
+        (lambda: Control("1", [0, 0, 0], covariance=-np.eye(3)), "is not symmetric and positive definite"),
+        (
+            lambda: Control("1", [0, 0, 0], covariance=np.ones((3, 3))),
+            "is not symmetric and positive definite",
+        ),
+        (lambda: Control("1", [0, 0, 0], covariance=np.tri(3)), "is not symmetric and positive definite"),
+        (lambda: Position("1", [0, 0], sd=1.0), "position of position 1"),
+        (lambda: Position("1", [0, np.nan, 0], sd=1.0), "position of position 1 is not finite"),
+        (lambda: Attitude("1", 2 * ROTATION, sd=1.0), "attitude of attitude 1 is no rotation matrix"),
+        (lambda: Attitude("1", -ROTATION, sd=1.0), "attitude of attitude 1 is mirrored"),
+        (lambda: Relative("1", "1", [0, 0, 0], ROTATION, sd=1.0), "relative 1 - 1 is of one photo alone"),
+        (lambda: Relative("1", "2", [0, 0, 0], ROTATION, sd=[1.0] * 5), "sd of relative 1 - 2"),
+    ],
+)
+def test_what_cannot_be_observed_is_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_a_block_refuses_what_it_does_not_know(example):
+    block = example.measured()
+    with pytest.raises(InputError, match="distance P0 - P99 is of the point P99, which the block has not"):
+        block.replace(observations=[Distance("P0", "P99", 1.0, sd=0.1)])
+    with pytest.raises(InputError, match="position P1 is of the photo P1, which the block has not"):
+        block.replace(observations=[Position("P1", [0, 0, 0], sd=0.1)])
+    with pytest.raises(InputError, match=r"observations\[0\] is no observation"):
+        block.replace(observations=["distance"])
+    with pytest.raises(InputError, match="observations is no list"):
+        block.replace(observations=5)
+    assert isinstance(block, Block)
