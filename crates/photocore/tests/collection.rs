@@ -309,7 +309,6 @@ fn networks_that_contradict_themselves_are_refused() {
     };
     assert_eq!(refused(&|network| network.images[3].point = 10), NetworkError::Index(3));
     assert_eq!(refused(&|network| network.photos[2].camera = 4), NetworkError::NoCamera(2));
-    assert_eq!(refused(&|network| network.photos[2].camera = 1), NetworkError::SharedCamera(1));
     assert_eq!(refused(&|network| network.cameras[1].sd = vec![0.0]), NetworkError::CameraDeviations(1));
     assert_eq!(refused(&|network| network.images.clear()), NetworkError::Empty);
     let ellipsoid = photocore::geometry::Ellipsoid::CLARKE_1866;
