@@ -8,13 +8,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork, Observed
-from photogram.show.angles import ARCSEC
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["image_lines", "kind_lines", "observed_lines", "tested", "tested_kind"]
+__all__ = ["image_lines", "observed_lines", "tested"]
 
 LISTED = 10_000
 """Image points that a report lists at most; tables and documents have every one."""
@@ -66,15 +64,6 @@ def tested(
     ]
 
 
-def tested_kind(kind: ObservedKind) -> Observations:
-    """Return the observations of a kind beside images, as `tested` does the others."""
-    return Observations(
-        f"components of observations of the kind {kind.kind}",
-        np.where(kind.redundancy > TESTABLE, kind.standardized, np.nan),
-        lambda index: f"{kind.components[index[1]]} of {kind.kind} {kind.names[index[0]]}",
-    )
-
-
 def image_lines(
     result: AdjustedNetwork,
     image_photos: Indices,
@@ -92,7 +81,7 @@ def image_lines(
         name = f"{photos[image_photos[image]]:<10} {points[result.image_points[image]]:<10}"
         figures = "".join(
             "".join(
-                f"{_cell(part[image, axis], decimals):>16}"
+                f"{f'{part[image, axis]:.{decimals}f}' if math.isfinite(part[image, axis]) else '-':>16}"
                 for part, decimals in zip(parts, (2, 3, 2), strict=True)
             )
             for axis in (0, 1)
@@ -142,24 +131,8 @@ def observed_lines(
     return lines
 
 
-def kind_lines(kind: ObservedKind) -> list[str]:
-    """List the observations of a kind beside images, a line for each component, rotations in arcsec."""
-    units = ["arcsec" if unit == "rad" else unit for unit in kind.units]
-    outward = np.array([1.0 / ARCSEC if unit == "rad" else 1.0 for unit in kind.units])
-    parts = (kind.sd * outward, kind.residuals * outward, kind.redundancy, kind.standardized)
-    heads = ("sd", "residual", "redundancy", "standardized")
-    lines = [f"{kind.kind:<28}{'component':<22}" + "".join(f"{head:>14}" for head in heads)]
-    for i, k in np.argwhere(~np.isnan(kind.residuals)).tolist():
-        figures = "".join(
-            f"{_cell(part[i, k], decimals):>14}" for part, decimals in zip(parts, (5, 5, 3, 2), strict=True)
-        )
-        lines.append(f"{kind.names[i]:<28}{f'{kind.components[k]} {units[k]}':<22}{figures}")
-    return lines
-
-
-def _cell(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}" if math.isfinite(value) else "-"
-
-
 def _cells(values: Floats, there: Bools, decimals: int) -> list[str]:
-    return [_cell(value if use else math.nan, decimals) for value, use in zip(values, there, strict=True)]
+    return [
+        f"{value:.{decimals}f}" if use and math.isfinite(value) else "-"
+        for value, use in zip(values, there, strict=True)
+    ]

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.structuring import structure
-from photogram.results.observed import image_lines, kind_lines, observed_lines, tested, tested_kind
+from photogram.results.kinds import kind_lines, tested_kind
+from photogram.results.observed import image_lines, observed_lines, tested
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.sections import Section, composed, headline, problems
@@ -56,7 +57,7 @@ def report(result: Result) -> str:
         ),
         (
             "Observations beside images: observed minus adjusted, redundancy, standardized residual",
-            _beside_images(result),
+            kind_lines(result.kinds),
         ),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
@@ -87,8 +88,10 @@ def problems_of(result: Result) -> list[str]:
 def _tested(result: Result) -> list[Observations]:
     block = result.block
     unknowns = (*_axes(result), "omega", "phi", "kappa")
-    images = tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result))
-    return [*images, *map(tested_kind, result.kinds.values())]
+    of_unknowns = tested(
+        result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result)
+    )
+    return of_unknowns + [tested_kind(each) for each in result.kinds.values()]
 
 
 def _axes(result: Result) -> tuple[str, str, str]:
@@ -236,10 +239,6 @@ def _stations(result: Result) -> list[str]:
     columns += ["omega arcsec", "phi arcsec", "kappa arcsec"]
     outward = np.append(_outward(result), [1.0 / ARCSEC] * 3)
     return observed_lines("photo", result.block.photo_ids, columns, outward, result.stations)
-
-
-def _beside_images(result: Result) -> list[str]:
-    return [line for each in result.kinds.values() for line in kind_lines(each)]
 
 
 def _images(result: Result) -> list[str]:

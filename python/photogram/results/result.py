@@ -195,7 +195,7 @@ class Result(AdjustedNetwork):
         return self._table("check")
 
     def observation_table(self) -> pd.DataFrame:
-        """Return observations beside images as a data frame, a row for each component."""
+        """Return observations beside images as a data frame, a row for each component, with its unit."""
         return self._table("observation")
 
 

@@ -22,7 +22,7 @@ __all__ = ["images", "named", "observed", "table"]
 
 @columns_of.register(Result)
 def table(result: Result, what: str) -> dict[str, Any]:
-    """Return the columns of photos, points, images, check points, control or stations."""
+    """Return the columns of photos, points, images, check points, control, stations or other observations."""
     return _TABLES[what](result)
 
 
@@ -80,19 +80,17 @@ def _stations(result: Result) -> dict[str, Any]:
 
 
 def _beside_images(result: Result) -> dict[str, Any]:
-    """`kind`, `of`, `component`, `unit` and what `observed` has: a row for each component."""
-    columns: dict[str, list[Any]] = {name: [] for name in _BESIDE_IMAGES}
-    for each in result.kinds.values():
-        there = np.argwhere(~np.isnan(each.residuals))
-        for i, k in there.tolist():
-            row = (each.kind, each.names[i], each.components[k], each.units[k])
-            figures = (each.sd[i, k], each.residuals[i, k], each.redundancy[i, k], each.standardized[i, k])
-            for name, value in zip(_BESIDE_IMAGES, (*row, *figures), strict=True):
-                columns[name].append(value)
-    return columns
+    """Name what there is of each component: one row; what was not observed or left out has none."""
+    rows = [
+        (each.kind, each.names[i], each.components[k], each.units[k], *(values[i, k] for values in numbers))
+        for each in result.kinds.values()
+        for numbers in [(each.sd, each.residuals, each.redundancy, each.standardized)]
+        for i, k in np.argwhere(~np.isnan(each.residuals)).tolist()
+    ]
+    names = ("kind", "of", "component", "unit", "sd", "residual", "redundancy", "standardized")
+    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
-_BESIDE_IMAGES = ("kind", "of", "component", "unit", "sd", "residual", "redundancy", "standardized")
 _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "photo": _photos,
     "point": _points,
