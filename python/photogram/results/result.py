@@ -54,7 +54,7 @@ class SumsOfSquares:
     @property
     def total(self) -> float:
         """All together."""
-        return self.camera + self.measured
+        return self.camera + self.ground + self.plates + self.observations
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
