@@ -8,14 +8,11 @@ matrix, the local frame on the globe from the terrestrial one.
 
 from __future__ import annotations
 
-from io import StringIO
 from pathlib import Path
-from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from views import BLUE, GREEN, GREY, LIGHT, RED, Floats, View, circle, svg
 
 from photogram import _photocore
 from photogram.stellar import Site
@@ -24,59 +21,11 @@ from photogram.stellar.transformation import terrestrial
 
 FIGURE = Path(__file__).with_name("stellar-frames.svg")
 
-Floats = NDArray[np.float64]
-
-BLUE, RED, GREEN, GREY, LIGHT = "#0072b2", "#d55e00", "#009e73", "0.45", "0.75"
 # The report's triads are left-handed; the space of a picture is not: east, north, zenith, and X, 90 E, Z.
 TO_SPACE = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 TO_GLOBE = np.diag([1.0, -1.0, 1.0])
 ATTITUDE = np.array([64.0, 24.0, -86.0]) * GRAD
 SITE = Site(np.radians(42.0), np.radians(84.0))
-
-
-class View:
-    """An orthographic view of a right-handed space."""
-
-    def __init__(self, axes: Any, turn: float, tilt: float, box: tuple[float, float, float, float]) -> None:
-        (s, c), (st, ct) = ((np.sin(a), np.cos(a)) for a in np.radians([turn, tilt]))
-        self.axes, self.rows = axes, np.array([[c, s, 0.0], [-s * st, c * st, ct]])
-        axes.set(aspect="equal", xlim=box[:2], ylim=box[2:])
-        axes.axis("off")
-
-    def line(self, points: Floats, **style: Any) -> None:
-        """Draw a line through points in space."""
-        self.axes.plot(*(self.rows @ np.asarray(points).T), **{"color": GREY, "linewidth": 1.0, **style})
-
-    def arrow(self, start: Floats, end: Floats, label: str, colour: str, out: float = 1.17) -> None:
-        """Draw an arrow with its name beyond the point."""
-        a, b = self.rows @ start, self.rows @ end
-        style = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
-        self.axes.annotate("", b, a, arrowprops=style)
-        self.text(start + out * (end - start), label, colour)
-
-    def text(self, place: Floats, label: str, colour: str = "black") -> None:
-        """Write at a place in space."""
-        self.axes.text(*(self.rows @ place), label, color=colour, ha="center", va="center", fontsize=9)
-
-    def arc(
-        self, start: Floats, end: Floats, label: str, colour: str, radius: float, out: float = 1.25
-    ) -> None:
-        """Draw the arc between two directions, with a point at its end."""
-        a, b = (v / np.linalg.norm(v) for v in (start, end))
-        angle = np.arccos(np.clip(a @ b, -1.0, 1.0))
-        t = np.linspace(0.0, 1.0, 40)[:, None]
-        points = radius * (np.sin((1 - t) * angle) * a + np.sin(t * angle) * b) / np.sin(angle)
-        self.line(points[:-2], color=colour, linewidth=1.3)
-        tip, before = self.rows @ points[-1], self.rows @ points[-4]
-        style = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.3, "shrinkA": 0, "shrinkB": 0}
-        self.axes.annotate("", tip, before, arrowprops=style)
-        self.text(out * points[20], label, colour)
-
-
-def circle(u: Floats, v: Floats) -> Floats:
-    """Return the circle through two directions at right angles."""
-    t = np.linspace(0.0, 2.0 * np.pi, 181)[:, None]
-    return np.cos(t) * u + np.sin(t) * v
 
 
 def local_axes() -> tuple[Floats, Floats, Floats]:
@@ -163,17 +112,19 @@ def draw_camera(view: View) -> None:
     )
 
 
+def drawn() -> Figure:
+    """Draw the three frames side by side."""
+    made = Figure(figsize=(11.0, 4.2), layout="constrained")
+    left, middle, right = made.subplots(1, 3)
+    draw_local(View(left, 32.0, 24.0, (-1.4, 1.4, -0.7, 1.3)))
+    draw_globe(View(middle, 40.0, 22.0, (-1.4, 1.4, -1.1, 1.5)))
+    draw_camera(View(right, 18.0, 16.0, (-1.25, 1.75, -0.5, 1.45)))
+    return made
+
+
 def figure() -> str:
     """Return the figure as an SVG document."""
-    with mpl.rc_context({"svg.hashsalt": "photogram", "svg.fonttype": "none", "font.family": "sans-serif"}):
-        made = Figure(figsize=(11.0, 4.2), layout="constrained")
-        left, middle, right = made.subplots(1, 3)
-        draw_local(View(left, 32.0, 24.0, (-1.4, 1.4, -0.7, 1.3)))
-        draw_globe(View(middle, 40.0, 22.0, (-1.4, 1.4, -1.1, 1.5)))
-        draw_camera(View(right, 18.0, 16.0, (-1.25, 1.75, -0.5, 1.45)))
-        text = StringIO()
-        made.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-    return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
+    return svg(drawn)
 
 
 if __name__ == "__main__":

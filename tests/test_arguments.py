@@ -120,6 +120,7 @@ def good(tmp_path_factory):
     return {
         "photogram": {
             "AsPublished": {"percent": 5.0, "max_iterations": 4},
+            "Attitudes": {"matrices": np.eye(3)[None], "step_covariances": np.eye(3)[None]},
             "Block": {name: getattr(block, name) for name in photogram.Block.__dataclass_fields__},
             "Refraction": {"air": "giant", "water": None, "water_level": 0.0, "refractive_index": 1.34},
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},

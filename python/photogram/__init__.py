@@ -15,17 +15,19 @@ if TYPE_CHECKING:
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
+    from photogram.network.attitudes import Attitudes
     from photogram.network.block import Block
     from photogram.network.geometry import Spheroid
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
     from photogram.planning import Plan, plan
-    from photogram.results.adjusted import Iteration
+    from photogram.results.iteration import Iteration
     from photogram.results.result import Result
 
 __all__ = [
     "AdjustmentError",
     "AsPublished",
+    "Attitudes",
     "Block",
     "InputError",
     "Iteration",
@@ -54,9 +56,10 @@ __all__ = [
 _HOMES = {
     "AdjustmentError": "errors",
     "AsPublished": "adjustment.adjustment",
+    "Attitudes": "network.attitudes",
     "Block": "network.block",
     "InputError": "errors",
-    "Iteration": "results.adjusted",
+    "Iteration": "results.iteration",
     "Message": "messages",
     "Orientation": "absolute_orientation",
     "OutOfMemoryError": "errors",

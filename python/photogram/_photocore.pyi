@@ -88,6 +88,65 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     NaN for arguments that cannot be.
     """
 
+def attitudes_from_numbers(
+    representation: str, numbers: _Floats, boresight: _Floats
+) -> tuple[_Floats, _Floats]:
+    """Attitudes from numbers (`docs/conventions.md`).
+
+    Parameters
+    ----------
+    representation
+        "omega_phi_kappa", "omega_phi_kappa_photo_to_ground", "phi_omega_kappa", "azimuth_tilt_swing",
+        "yaw_pitch_roll", "rotation_vector", "rotation_vector_to_photo", "rotation_vector_to_vision",
+        "quaternion" or "quaternion_to_vision".
+    numbers
+        (n, 3), angles in radians; of quaternions (n, 4), w, x, y, z of any length but zero.
+    boresight
+        (3, 3), photo axes from body axes; of yaw, pitch, roll.
+
+    Returns
+    -------
+    (n, 3, 3) matrices A, photo to object; and K, (n, 3, k), the partials of the rotation step rho by the
+    numbers: A steps by Exp(rho), about the photo's own axes.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape, or another representation; the message names it.
+    """
+
+def numbers_of_attitudes(
+    representation: str, attitudes: _Floats, boresight: _Floats
+) -> tuple[_Floats, _Floats]:
+    """Numbers of attitudes, the inverse of `attitudes_from_numbers`.
+
+    Parameters
+    ----------
+    representation, boresight
+        As there.
+    attitudes
+        (n, 3, 3) matrices A, photo to object.
+
+    Returns
+    -------
+    (n, k) numbers, and their partials by the rotation step, (n, k, 3); NaN where two angles turn about one
+    axis: one of them is zero then.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape, or another representation; the message names it.
+    """
+
+def nadir_boresight(quarters: int) -> _Floats:
+    """Photo axes from body axes, (3, 3), of a camera that looks at the nadir.
+
+    Parameters
+    ----------
+    quarters
+        Of a turn that the top of the picture is turned by from forward to the right wing: 0 to 3.
+    """
+
 def rotation_matrix(angles: _Floats) -> _Floats:
     """Rotation matrices M = M_kappa M_phi M_omega.
 
@@ -118,6 +177,32 @@ def rotation_angles(matrices: _Floats) -> _Floats:
     -------
     (n, 3) omega and kappa in [-pi, pi], phi in [-pi/2, pi/2], radians. Where phi is +-pi/2 only omega + kappa
     or omega - kappa is determined; the angles returned give the matrix.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape; the message names it and its shape.
+    """
+
+def vector_rotations(vectors: _Floats) -> _Floats:
+    """Rotation matrices of (n, 3) rotation vectors: axis times angle, radians (Rodrigues).
+
+    Returns
+    -------
+    (n, 3, 3) matrices.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape; the message names it and its shape.
+    """
+
+def rotation_vectors(matrices: _Floats) -> _Floats:
+    """Rotation vectors of (n, 3, 3) rotation matrices, the inverse of `vector_rotations`.
+
+    Returns
+    -------
+    (n, 3) axis times angle, radians, no longer than pi.
 
     Raises
     ------
@@ -344,11 +429,12 @@ def adjust_block(
         An argument of another shape, length or choice; the message names it.
     """
 
-@final
-class BlockSolution:
-    """An adjusted block, in the order of its photos (P), points (n) and images (m).
+class _NetworkSolution:
+    """What adjusted blocks and collections have alike, in the order of photos (P), points (n), images (m).
 
-    Points and images that were left out are NaN. Cofactors hold for a priori unit weight.
+    A photo has k unknowns: of a block its position and attitude, of a collection also its camera. Values are
+    in the units in which they were given. Points and images that were left out are NaN. Cofactors hold for a
+    priori unit weight.
     """
 
     @property
@@ -357,15 +443,101 @@ class BlockSolution:
 
     @property
     def initial_sum_of_squares(self) -> float:
-        """Weighted sum of squares at the initial values."""
+        """Weighted sum of squares, of losses with a loss, at the initial values."""
 
     @property
     def iterations(self) -> list[IterationRow]:
         """Every iteration."""
 
     @property
+    def photo_cofactors(self) -> _Floats:
+        """(P, k, k): position and attitude, or vector and translation, then the camera."""
+
+    @property
+    def photo_redundancy(self) -> _Floats:
+        """(P, k) redundancy numbers of the unknowns as observations; 0 unless weighted."""
+
+    @property
+    def point_positions(self) -> _Floats:
+        """(n, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
+
+    @property
+    def point_cofactors(self) -> _Floats:
+        """(n, 3, 3)."""
+
+    @property
+    def point_redundancy(self) -> _Floats:
+        """(n, 3) redundancy numbers of the coordinates as observations; 0 unless weighted."""
+
+    @property
+    def point_rays(self) -> _Indices:
+        """(n,) number of images; 0 for points left out."""
+
+    @property
+    def residuals(self) -> _Floats:
+        """(m, 2) observed minus computed, in the unit of the image."""
+
+    @property
+    def redundancy(self) -> _Floats:
+        """(m, 2) redundancy numbers."""
+
+    @property
+    def standardized(self) -> _Floats:
+        """(m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight.
+
+        NaN without redundancy.
+        """
+
+    @property
+    def image_weights(self) -> _Floats:
+        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
+
+    @property
+    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
+        """Why there are no cofactors although they were asked for, as in :class:`BlockError`."""
+
+    @property
+    def redundancy_excess(self) -> float | None:
+        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
+
+        None without cofactors, and with a loss.
+        """
+
+    @property
+    def variance_of_unit_weight(self) -> float | None:
+        """None without degrees of freedom."""
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Observations, weighted unknowns, unknowns that are neither fixed nor held."""
+
+    @property
+    def ordering(self) -> str:
+        """The ordering in force."""
+
+    @property
+    def predictions(self) -> dict[str, float]:
+        """Predicted multiply-adds of one factorisation in each ordering that was tried."""
+
+    @property
+    def operations(self) -> dict[str, float]:
+        """Predicted multiply-adds of `reduction`, `factor` and `inverse`, each time they are carried out."""
+
+    @property
+    def formations(self) -> int:
+        """How often the normal equations were formed."""
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds in `form`, `factor`, `solve`, `invert` and `cofactors`, over all iterations."""
+
+@final
+class BlockSolution(_NetworkSolution):
+    """An adjusted block; k is 6."""
+
+    @property
     def photo_corrections(self) -> _Floats:
-        """(k, P, 6) corrections of position and attitude in each of k iterations, in their units."""
+        """(i, P, 6) corrections of position and attitude in each of i iterations, in their units."""
 
     @property
     def photo_positions(self) -> _Floats:
@@ -376,66 +548,12 @@ class BlockSolution:
         """(P, 3) omega, phi, kappa in radians."""
 
     @property
-    def photo_cofactors(self) -> _Floats:
-        """(P, 6, 6): position, then attitude, in the units of the values."""
-
-    @property
-    def photo_redundancy(self) -> _Floats:
-        """(P, 6) redundancy numbers of position and attitude as observations; 0 unless weighted."""
-
-    @property
-    def point_positions(self) -> _Floats:
-        """(n, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
-
-    @property
     def point_last_corrections(self) -> _Floats:
         """(n, 3) corrections in the last iteration, in the units of the values."""
 
     @property
-    def point_cofactors(self) -> _Floats:
-        """(n, 3, 3) in the units of the values."""
-
-    @property
-    def point_redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of held components; 0 unless weighted."""
-
-    @property
-    def point_rays(self) -> _Indices:
-        """(n,) number of images; 0 for points left out."""
-
-    @property
-    def residuals(self) -> _Floats:
-        """(m, 2) observed minus computed, millimetres."""
-
-    @property
-    def redundancy(self) -> _Floats:
-        """(m, 2) redundancy numbers."""
-
-    @property
-    def standardized(self) -> _Floats:
-        """(m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight."""
-
-    @property
-    def image_weights(self) -> _Floats:
-        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
-
-    @property
     def images_behind(self) -> _Indices:
         """Indices of the images whose point stands behind the camera, ascending."""
-
-    @property
-    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
-        """What the adjusted values leave undetermined, as in a :class:`BlockError`: there are no cofactors.
-
-        None where everything is determined.
-        """
-
-    @property
-    def redundancy_excess(self) -> float | None:
-        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
-
-        None without cofactors, and with a loss.
-        """
 
     @property
     def weak(self) -> list[tuple[int, int]]:
@@ -468,36 +586,8 @@ class BlockSolution:
         """Of the chosen unit variance."""
 
     @property
-    def variance_of_unit_weight(self) -> float | None:
-        """None without degrees of freedom."""
-
-    @property
-    def counts(self) -> tuple[int, int, int]:
-        """Image coordinates, weighted unknowns, unknowns that are not fixed."""
-
-    @property
-    def ordering(self) -> str:
-        """The ordering of photos in force."""
-
-    @property
-    def predictions(self) -> dict[str, float]:
-        """The orderings that were tried, with the predicted multiply-adds of one factorisation."""
-
-    @property
     def photo_order(self) -> _Indices:
         """(P,) indices of the photos in the order of their elimination."""
-
-    @property
-    def operations(self) -> dict[str, float]:
-        """Predicted multiply-adds of `reduction`, `factor` and `inverse`, each time they are carried out."""
-
-    @property
-    def formations(self) -> int:
-        """How often the normal equations were formed."""
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Seconds in `form`, `factor`, `solve`, `invert` and `cofactors`, over all iterations."""
 
 class ResectionError(Exception):
     """A photo that cannot be resected.
@@ -1216,30 +1306,44 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     (k,) numbers, and whether they are the whole text.
     """
 
-def bundler_images(photo_parameters: _Floats, points: _Floats) -> _Floats:
-    """Image coordinates of points, row by row: point i on the photo of row i.
+CAMERAS: list[str]
+"""What the models of cameras are called."""
 
-    f (1 + k1 p^2 + k2 p^4) p with P = R(w) X + t and p = -(P1, P2) / P3.
+def camera_model(camera: str) -> tuple[str, list[tuple[str, bool]]]:
+    """Return the formula of a model of cameras, and its parameters: name, whether a length in the image.
+
+    Raises
+    ------
+    ValueError
+        No model has this name.
+    """
+
+def collection_images(camera: str, photo_parameters: _Floats, points: _Floats) -> _Floats:
+    """Image coordinates of points, row by row: point i on the photo of row i.
 
     Parameters
     ----------
+    camera
+        The model, one of `CAMERAS`; `docs/collection.md` has their formulas.
     photo_parameters
-        (n, 9) angle-axis vector w (rad), t, f (pixels), k1, k2.
+        (n, 6 + k) angle-axis vector w (rad) and t, so that P = R(w) X + t in the photo's axes (x right, y up,
+        looking along -z), then the k parameters of the camera.
     points
         (n, 3) X.
 
     Returns
     -------
-    (n, 2) pixels; not finite in the plane of the projection centre. A point behind the camera has the image
-    that the formula gives.
+    (n, 2) in the unit of the camera; not finite in the plane of the projection centre. A point behind the
+    camera has the image that the formula gives.
 
     Raises
     ------
     ValueError
-        An argument of another shape or length; the message names it.
+        An argument of another shape, length or choice; the message names it.
     """
 
 def adjust_collection(
+    camera: str,
     photo_parameters: _Floats,
     photo_sd: _Floats,
     point_positions: _Floats,
@@ -1262,9 +1366,11 @@ def adjust_collection(
 
     Parameters
     ----------
+    camera
+        The model of the cameras, one of `CAMERAS`.
     photo_parameters, photo_sd
-        (P, 9) initial (and, where weighted, observed) parameters and their standard deviations, infinite
-        for free ones, zero for fixed ones; see :func:`bundler_images`.
+        (P, 6 + k) initial (and, where weighted, observed) parameters and their standard deviations, infinite
+        for free ones, zero for fixed ones; see :func:`collection_images`.
     point_positions, point_sd
         (n, 3) likewise.
     image_photos, image_points
@@ -1298,55 +1404,16 @@ def adjust_collection(
     """
 
 @final
-class CollectionSolution:
-    """An adjusted collection, in the order of its photos (P), points (n) and images (m).
-
-    Points and images that were left out are NaN. Cofactors hold for a priori unit weight.
-    """
-
-    @property
-    def status(self) -> str:
-        """`converged`, `not converged` or `diverged`."""
-
-    @property
-    def initial_sum_of_squares(self) -> float:
-        """Weighted sum of squares, of losses with a loss, at the initial values."""
-
-    @property
-    def iterations(self) -> list[IterationRow]:
-        """Every iteration."""
+class CollectionSolution(_NetworkSolution):
+    """An adjusted collection; k is 6 plus the number of parameters of a camera."""
 
     @property
     def photo_parameters(self) -> _Floats:
-        """(P, 9) angle-axis vector (rad), translation, f (pixels), k1, k2."""
-
-    @property
-    def photo_cofactors(self) -> _Floats:
-        """(P, 9, 9)."""
-
-    @property
-    def photo_redundancy(self) -> _Floats:
-        """(P, 9) redundancy numbers of the parameters as observations; 0 unless weighted."""
+        """(P, k) as they were given, adjusted."""
 
     @property
     def photo_images(self) -> _Indices:
         """(P,) number of images that took part."""
-
-    @property
-    def point_positions(self) -> _Floats:
-        """(n, 3)."""
-
-    @property
-    def point_cofactors(self) -> _Floats:
-        """(n, 3, 3)."""
-
-    @property
-    def point_redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of the coordinates as observations; 0 unless weighted."""
-
-    @property
-    def point_rays(self) -> _Indices:
-        """(n,) number of images; 0 for points left out."""
 
     @property
     def point_rays_behind(self) -> _Indices:
@@ -1357,22 +1424,6 @@ class CollectionSolution:
         """Indices of the points that ran into a station and were left out."""
 
     @property
-    def residuals(self) -> _Floats:
-        """(m, 2) observed minus computed, pixels."""
-
-    @property
-    def redundancy(self) -> _Floats:
-        """(m, 2) redundancy numbers."""
-
-    @property
-    def standardized(self) -> _Floats:
-        """(m, 2) residual / (standard deviation x root of redundancy number); NaN without redundancy."""
-
-    @property
-    def image_weights(self) -> _Floats:
-        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
-
-    @property
     def sum_of_squares(self) -> float:
         """Weighted sum of squares, weights as the loss has changed them."""
 
@@ -1381,44 +1432,5 @@ class CollectionSolution:
         """Observations and weighted unknowns less unknowns."""
 
     @property
-    def variance_of_unit_weight(self) -> float | None:
-        """None without degrees of freedom."""
-
-    @property
     def datum(self) -> list[tuple[int, int]]:
         """Photos and parameters held to give the cofactors a datum."""
-
-    @property
-    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
-        """Why there are no cofactors although they were asked for, as in :class:`CollectionError`."""
-
-    @property
-    def redundancy_excess(self) -> float | None:
-        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
-
-        None without cofactors, and with a loss.
-        """
-
-    @property
-    def counts(self) -> tuple[int, int, int]:
-        """Observations, weighted unknowns, unknowns that are neither fixed nor held."""
-
-    @property
-    def ordering(self) -> str:
-        """The ordering in force."""
-
-    @property
-    def predictions(self) -> dict[str, float]:
-        """Predicted multiply-adds of one factorisation in each ordering that was tried."""
-
-    @property
-    def operations(self) -> dict[str, float]:
-        """Predicted multiply-adds of reduction, factor and inverse, once."""
-
-    @property
-    def formations(self) -> int:
-        """Formations of the normal equations."""
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Seconds spent in form, factor, solve, invert and cofactors."""

@@ -19,10 +19,13 @@ if TYPE_CHECKING:
 __all__ = ["TODAY", "found_under_former_names", "today"]
 
 TODAY = {
-    "adjusted": "results.adjusted",
+    "adjusted": "results.result",
     "angles": "show.angles",
     "arrays": "arguments.arrays",
+    "absolute_orientation.oriented": "absolute_orientation.orientation",
     "block": "network.block",
+    "collection.bal": "collection.formats",
+    "collection.solution": "collection.adjusted",
     "document": "results.document",
     "ends": "adjustment.ends",
     "files": "io.files",
@@ -41,6 +44,7 @@ TODAY = {
     "report": "results.report",
     "resection": "adjustment.resection",
     "result": "results.result",
+    "results.adjusted": "results.result",
     "robust": "adjustment.robust",
     "rows": "io.rows",
     "sections": "show.sections",

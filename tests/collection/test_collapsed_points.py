@@ -21,7 +21,7 @@ def with_point():
     collection = SOUND
     photos = adjust(collection, tolerance=1e-14).photo_parameters
     station = -rotation(photos[0, :3]).T @ photos[0, 3:6]
-    seen = _photocore.bundler_images(photos[[4]], station[np.newaxis])
+    seen = _photocore.collection_images("bal", photos[[4]], station[np.newaxis])
     return collection.replace(
         point_positions=np.vstack([collection.point_positions, station + np.array([0.0, 0.5, 0.0])]),
         point_sd=np.vstack([collection.point_sd, np.full((1, 3), np.inf)]),
@@ -71,7 +71,10 @@ def test_a_point_that_other_photos_tell_from_the_station_stays():
         image_photos=np.append(collection.image_photos[others], extra),
         image_points=np.append(collection.image_points[others], [WRONG] * 4),
         image_xy=np.vstack(
-            [collection.image_xy[others], _photocore.bundler_images(photos[extra], np.tile(near, (4, 1)))]
+            [
+                collection.image_xy[others],
+                _photocore.collection_images("bal", photos[extra], np.tile(near, (4, 1))),
+            ]
         ),
         image_sd=np.vstack([collection.image_sd[others], np.full((4, 2), 0.5)]),
     )

@@ -230,7 +230,7 @@ fn adjust(criterion: &mut Criterion) {
     let pool = pool();
     let options = Options {
         adjustment: adjustment::Options {
-            criterion: adjustment::Criterion::Fraction(1e-5),
+            method: adjustment::Method::Damped(adjustment::Stop::Fraction(1e-5)),
             max_iterations: 50,
             covariance: true,
             loss: None,

@@ -6,7 +6,7 @@
 use std::error::Error;
 use std::{env, fs};
 
-use photocore::adjustment::{self, Criterion, on_all_processors};
+use photocore::adjustment::{self, Method, Stop, on_all_processors};
 use photocore::geometry::{Bal, CameraModel, ObjectSpace, PoseNumbers};
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Solution, Start};
 
@@ -53,7 +53,8 @@ pub fn read(text: &str) -> Result<Network, Box<dyn Error>> {
 
 /// Adjusts a network from a far start; nothing gives it a datum, so that unknowns are held for one.
 pub fn adjusted(network: &Network) -> Result<Solution, Box<dyn Error>> {
-    let adjustment = adjustment::Options { criterion: Criterion::Decrease(1e-9), ..Default::default() };
+    let adjustment =
+        adjustment::Options { method: Method::TrustRegion(Stop::Decrease(1e-9)), ..Default::default() };
     let options = Options { adjustment, start: Start::Given, hold_unused: true, ..Options::default() };
     Ok(on_all_processors(|pool, watch| network.adjust(&options, pool, watch))??)
 }

@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use std::thread::{self, ThreadId};
 
 use photocore::adjustment::{
-    AdjustError, Adjustment, Criterion, Event, Model, Options, Phase, Problem, Status, adjust,
+    AdjustError, Adjustment, Event, Method, Model, Options, Phase, Problem, Published, Status, Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System};
 use rayon::ThreadPoolBuilder;
@@ -62,7 +62,7 @@ impl Model for Frames {
             rows.constant[row] = self.measured[group][row] - computed[row];
             rows.local[2 * row..][..2].copy_from_slice(&partials[row][..2]);
             rows.kept[3 * row..][..3].copy_from_slice(&partials[row][2..5]);
-            rows.border[2 * row..][..2].copy_from_slice(&partials[row][5..]);
+            rows.common[2 * row..][..2].copy_from_slice(&partials[row][5..]);
         }
     }
 }
@@ -115,8 +115,12 @@ fn hold(problem: &mut Problem<Frames>, unknowns: &[usize], sd: f64) {
     }
 }
 
-const STRICT: Options =
-    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 50, covariance: true, loss: None };
+const STRICT: Options = Options {
+    method: Method::Damped(Stop::Fraction(1e-8)),
+    max_iterations: 50,
+    covariance: true,
+    loss: None,
+};
 
 fn run(problem: &Problem<Frames>, options: &Options) -> Result<Adjustment, AdjustError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
@@ -179,7 +183,7 @@ fn a_bad_start_is_damped_and_a_good_one_is_not() {
         problem.initial[2 * POINTS + 3 * frame + 2] += 1.2 * noise(3 * frame + 1);
     }
     problem.initial[SCALE] = 0.4;
-    let published = Options { criterion: Criterion::Percent(5.0), ..STRICT };
+    let published = Options { method: Method::Full(Published::Percent(5.0)), ..STRICT };
     assert_eq!(run(&problem, &published).unwrap().status, Status::Diverged);
     let far = run(&problem, &STRICT).unwrap();
     assert_eq!(far.status, Status::Converged);
@@ -198,8 +202,8 @@ fn corrections_lead_from_the_initial_to_the_adjusted_values() {
     for frame in 0..FRAMES {
         problem.initial[2 * POINTS + 3 * frame + 2] += 1.2 * noise(3 * frame + 1);
     }
-    for criterion in [STRICT.criterion, Criterion::Percent(5.0)] {
-        let adjusted = run(&problem, &Options { criterion, ..STRICT }).unwrap();
+    for method in [STRICT.method, Method::Full(Published::Percent(5.0))] {
+        let adjusted = run(&problem, &Options { method, ..STRICT }).unwrap();
         assert_eq!(adjusted.corrections().count(), adjusted.iterations.len());
         assert!(adjusted.iterations.len() > 1);
         for (i, (initial, last)) in
@@ -210,7 +214,7 @@ fn corrections_lead_from_the_initial_to_the_adjusted_values() {
         }
         // One iteration less ends where the last one began.
         let max_iterations = adjusted.iterations.len() - 1;
-        let before = run(&problem, &Options { criterion, max_iterations, ..STRICT }).unwrap();
+        let before = run(&problem, &Options { method, max_iterations, ..STRICT }).unwrap();
         for (i, correction) in adjusted.last_local_corrections.iter().enumerate() {
             assert!((before.unknowns[i] + correction - adjusted.unknowns[i]).abs() < 1e-13);
         }

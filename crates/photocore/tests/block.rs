@@ -4,7 +4,7 @@
 
 use std::ops::ControlFlow;
 
-use photocore::adjustment::{self, Criterion, Status};
+use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{ObjectSpace, Orientation, Perspective, Point as At, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Solution};
 use rayon::ThreadPoolBuilder;
@@ -78,7 +78,7 @@ fn sound() -> Network {
 
 fn adjust(block: &Network) -> Result<Solution, NetworkError> {
     let adjustment = adjustment::Options {
-        criterion: Criterion::Fraction(1e-6),
+        method: Method::Damped(Stop::Fraction(1e-6)),
         max_iterations: 100,
         covariance: true,
         loss: None,

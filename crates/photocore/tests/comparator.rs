@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 
 use num_complex::Complex64 as C;
-use photocore::adjustment::{Criterion, Options, Status};
+use photocore::adjustment::{Method, Options, Status, Stop};
 use photocore::programs::comparator::{
     Basis, Calibration, CalibrationError, Case, Comparator, GridPoint, Measurement, Placement, Solution,
 };
@@ -13,8 +13,12 @@ use proptest::prelude::*;
 use rayon::ThreadPoolBuilder;
 
 const BASIS: Basis = Basis { degree: 4, centre: [125e3, 130e3], half_range: [120e3, 110e3] };
-const OPTIONS: Options =
-    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 30, covariance: true, loss: None };
+const OPTIONS: Options = Options {
+    method: Method::Damped(Stop::Fraction(1e-8)),
+    max_iterations: 30,
+    covariance: true,
+    loss: None,
+};
 
 fn comparator() -> Comparator {
     Comparator {

@@ -6,7 +6,7 @@ use faer::linalg::solvers::DenseSolveCore;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 use num_complex::Complex64 as C;
-use photocore::adjustment::{self, Criterion, Loss, Status};
+use photocore::adjustment::{self, Loss, Method, Status, Stop};
 use photocore::geometry::{
     self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3,
     rotation,
@@ -172,8 +172,8 @@ fn network() -> Network {
     network
 }
 
-fn options(criterion: Criterion, loss: Option<Loss>) -> Options {
-    let adjustment = adjustment::Options { criterion, max_iterations: 50, covariance: true, loss };
+fn options(method: Method, loss: Option<Loss>) -> Options {
+    let adjustment = adjustment::Options { method, max_iterations: 50, covariance: true, loss };
     Options { adjustment, ..Options::default() }
 }
 
@@ -183,7 +183,7 @@ fn adjust_with(network: &Network, options: &Options, threads: usize) -> Result<S
 }
 
 fn adjusted(network: &Network) -> Solution {
-    let solution = adjust_with(network, &options(Criterion::Fraction(1e-9), None), 2).unwrap();
+    let solution = adjust_with(network, &options(Method::Damped(Stop::Fraction(1e-9)), None), 2).unwrap();
     assert_eq!(solution.adjustment.status, Status::Converged);
     solution
 }
@@ -458,7 +458,7 @@ fn every_kind_agrees_with_dense_algebra() {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let network = network();
-    let options = options(Criterion::Fraction(1e-9), Some(Loss::Huber(1.0)));
+    let options = options(Method::Damped(Stop::Fraction(1e-9)), Some(Loss::Huber(1.0)));
     let [one, two, three] = [1, 2, 3].map(|threads| adjust_with(&network, &options, threads).unwrap());
     for other in [two, three] {
         assert_eq!(unknowns(&one), unknowns(&other));
@@ -507,7 +507,7 @@ fn one_distance_gives_the_scale() {
 fn a_free_network_with_a_scale_holds_six_unknowns() {
     let mut network = scaled(1.5);
     network.photos[0].sd = [f64::INFINITY; 6];
-    let free = adjust_with(&network, &options(Criterion::Decrease(1e-12), None), 2).unwrap();
+    let free = adjust_with(&network, &options(Method::TrustRegion(Stop::Decrease(1e-12)), None), 2).unwrap();
     assert_eq!(free.datum, (0..6).map(|unknown| (0, unknown)).collect::<Vec<_>>());
     let fixed = adjusted(&scaled(1.5));
     assert_eq!(free.degrees_of_freedom, fixed.degrees_of_freedom);

@@ -4,7 +4,7 @@
 
 use std::ops::ControlFlow;
 
-use photocore::adjustment::{Criterion, Options, Status};
+use photocore::adjustment::{Method, Options, Published, Status, Stop};
 use photocore::geometry::{ObjectSpace, Photo, Point, RotationSense, Vector3, rotation};
 use photocore::programs::resection::{
     ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError, Solution, three_points,
@@ -12,8 +12,12 @@ use photocore::programs::resection::{
 use rayon::ThreadPoolBuilder;
 
 const C: f64 = -150.0;
-const STRICT: Options =
-    Options { criterion: Criterion::Fraction(1e-8), max_iterations: 50, covariance: true, loss: None };
+const STRICT: Options = Options {
+    method: Method::Damped(Stop::Fraction(1e-8)),
+    max_iterations: 50,
+    covariance: true,
+    loss: None,
+};
 
 /// Numbers in [-1, 1) without a generator.
 fn noise(index: usize) -> f64 {
@@ -176,8 +180,8 @@ fn the_rule_of_the_report_takes_full_steps_until_the_position_moves_little() {
     let mut published = resection(&POSE, &POINTS, 0.02);
     published.partials = Partials::AtMeasured;
     published.start = Some(Pose { position: [400.0, 300.0, 880.0], attitude: [0.0, 0.0, 2.0] });
-    let criterion = Criterion::Length { first: 3 * POINTS.len(), count: 3, limit: 1e-3 };
-    let solution = adjust(&published, &Options { criterion, ..STRICT }).unwrap();
+    let method = Method::Full(Published::Length { first: 3 * POINTS.len(), count: 3, limit: 1e-3 });
+    let solution = adjust(&published, &Options { method, ..STRICT }).unwrap();
     assert_eq!(solution.adjustment.status, Status::Converged);
     let steps: Vec<f64> = solution.history.windows(2).map(|pair| apart(&pair[1], &pair[0])).collect();
     let (last, before) = steps.split_last().unwrap();
@@ -186,7 +190,7 @@ fn the_rule_of_the_report_takes_full_steps_until_the_position_moves_little() {
     let strict = adjust(&resection(&POSE, &POINTS, 0.02), &STRICT).unwrap();
     let size = apart(&solution.pose, &strict.pose);
     assert!(size > 1e-5 && size < 0.05, "{size}");
-    let short = adjust(&published, &Options { criterion, max_iterations: 2, ..STRICT }).unwrap();
+    let short = adjust(&published, &Options { method, max_iterations: 2, ..STRICT }).unwrap();
     assert_eq!((short.adjustment.status, short.history.len()), (Status::NotConverged, 2));
 }
 

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
-use photocore::adjustment::{Criterion, Options as AdjustmentOptions, Status};
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Status, Stop};
 use photocore::geometry::sky::{ARCSEC, REFRACTION};
 use photocore::geometry::{Air, Station};
 use photocore::programs::stellar::{
@@ -87,8 +87,8 @@ fn weighted_night() -> Calibration {
 }
 
 fn adjusted(calibration: &Calibration) -> Result<Solution, StellarError> {
-    let criterion = Criterion::Fraction(1e-9);
-    let adjustment = AdjustmentOptions { criterion, max_iterations: 50, covariance: true, loss: None };
+    let method = Method::Damped(Stop::Fraction(1e-9));
+    let adjustment = AdjustmentOptions { method, max_iterations: 50, covariance: true, loss: None };
     let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     calibration
         .adjust(&Options { adjustment, unit: 1.0, whole: true }, &pool, &mut |_| ControlFlow::Continue(()))

@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 
 use faer::{Mat, Side};
-use photocore::adjustment::{Criterion, Datum, Loss, Model, Options, Problem, Status, adjust, in_datum};
+use photocore::adjustment::{Datum, Loss, Method, Model, Options, Problem, Status, Stop, adjust, in_datum};
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -99,7 +99,12 @@ fn pool() -> ThreadPool {
 }
 
 fn options() -> Options {
-    Options { criterion: Criterion::Decrease(1e-14), max_iterations: 100, covariance: true, loss: None }
+    Options {
+        method: Method::TrustRegion(Stop::Decrease(1e-14)),
+        max_iterations: 100,
+        covariance: true,
+        loss: None,
+    }
 }
 
 fn go<T>(_: T) -> ControlFlow<()> {

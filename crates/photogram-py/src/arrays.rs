@@ -16,6 +16,14 @@ pub fn rows<const N: usize>(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> 
     }
 }
 
+/// The rows of an array of so many columns, as many as only the caller knows.
+pub fn slices(name: &str, array: &PyReadonlyArrayDyn<'_, f64>, columns: usize) -> PyResult<Vec<Vec<f64>>> {
+    match array.shape() {
+        [_, found] if *found == columns => Ok(values(array).chunks(columns).map(<[f64]>::to_vec).collect()),
+        shape => Err(wrong_shape(name, &format!("(n, {columns})"), shape)),
+    }
+}
+
 /// The matrices of an (n, N, N) array.
 pub fn matrices<const N: usize>(
     name: &str,

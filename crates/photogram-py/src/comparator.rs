@@ -1,7 +1,7 @@
 //! Joint calibration of a comparator; its documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
-use photocore::adjustment::{Criterion, Options, Status};
+use photocore::adjustment::{Method, Options, Status, Stop};
 use photocore::programs::comparator::{
     Basis, Calibration, CalibrationError, Case, Comparator, GridPoint, Measurement, Placement, Solution,
 };
@@ -75,8 +75,12 @@ fn adjust_comparator(
             .map(|i| Measurement { case: case_of[i], point: point_of[i], xy: xy[i], sd: sd[i] })
             .collect(),
     };
-    let options =
-        Options { criterion: Criterion::Fraction(limit), max_iterations, covariance: true, loss: None };
+    let options = Options {
+        method: Method::Damped(Stop::Fraction(limit)),
+        max_iterations,
+        covariance: true,
+        loss: None,
+    };
     let workers = Workers::of(0, calibration.measurements.len());
     let solution = watched(py, workers, None, |pool, watch| calibration.adjust(&options, pool, watch))?;
     solution.map(|solution| ComparatorSolution { solution }).map_err(|error| failure(&error))

@@ -2,6 +2,7 @@
 
 use crate::arrays::{check_lengths, from_rows, matrices, numbers, row_major, rows, squares, table};
 use numpy::{PyArray2, PyArray3, PyReadonlyArrayDyn};
+use photocore::geometry::angle_axis::rotation_angle_axis;
 use photocore::geometry::{
     self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Photo, Point, Refraction, RotationSense,
     Water, WaterModel,
@@ -13,6 +14,8 @@ use pyo3::prelude::*;
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(rotation_matrix, module)?)?;
     module.add_function(wrap_pyfunction!(rotation_angles, module)?)?;
+    module.add_function(wrap_pyfunction!(vector_rotations, module)?)?;
+    module.add_function(wrap_pyfunction!(rotation_vectors, module)?)?;
     module.add_function(wrap_pyfunction!(geographic_to_geocentric, module)?)?;
     module.add_function(wrap_pyfunction!(geocentric_to_geographic, module)?)?;
     module.add_function(wrap_pyfunction!(refraction_shift, module)?)?;
@@ -39,6 +42,26 @@ fn rotation_angles<'py>(
     let matrices = self::matrices("matrices", &matrices)?;
     let angles = |matrix| geometry::rotation_angles(&from_rows(matrix));
     table(py, py.detach(|| matrices.into_iter().map(angles).collect()))
+}
+
+#[pyfunction]
+fn vector_rotations<'py>(
+    py: Python<'py>,
+    vectors: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let vectors = rows("vectors", &vectors)?;
+    let matrix = |vector: [f64; 3]| row_major(&geometry::angle_axis_rotation(&vector.into()));
+    squares(py, py.detach(|| vectors.into_iter().map(matrix).collect()))
+}
+
+#[pyfunction]
+fn rotation_vectors<'py>(
+    py: Python<'py>,
+    matrices: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let matrices = self::matrices("matrices", &matrices)?;
+    let vector = |matrix| rotation_angle_axis(&from_rows(matrix)).into();
+    table(py, py.detach(|| matrices.into_iter().map(vector).collect()))
 }
 
 #[pyfunction]

@@ -1,17 +1,18 @@
 //! The extension module `photogram._photocore`: converts arrays, releases the GIL, decides nothing.
 
 mod arrays;
+mod attitude;
 mod comparator;
 mod distributions;
 mod geometry;
 mod memory;
 mod network;
-mod observations;
 mod options;
 mod resection;
 mod similarity;
 mod solution;
 mod stellar;
+mod text;
 mod work;
 
 use pyo3::prelude::*;
@@ -24,10 +25,12 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     memory::arm()?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     distributions::register(module)?;
+    attitude::register(module)?;
     geometry::register(module)?;
     network::register(module)?;
     comparator::register(module)?;
     resection::register(module)?;
     similarity::register(module)?;
-    stellar::register(module)
+    stellar::register(module)?;
+    text::register(module)
 }

@@ -1,7 +1,7 @@
 //! Resection of one photo; its documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
-use photocore::adjustment::{Criterion, Options};
+use photocore::adjustment::{Method, Options, Published, Stop};
 use photocore::programs::resection::{
     AdjustedImage, ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError as Failure,
     Solution,
@@ -71,12 +71,12 @@ fn resect(
         partials: if at_measured { Partials::AtMeasured } else { Partials::AtComputed },
     };
     let position_unknowns = 3 * resection.points.len();
-    let criterion = match criterion {
-        "fraction" => Criterion::Fraction(limit),
-        "position" => Criterion::Length { first: position_unknowns, count: 3, limit },
+    let method = match criterion {
+        "fraction" => Method::Damped(Stop::Fraction(limit)),
+        "position" => Method::Full(Published::Length { first: position_unknowns, count: 3, limit }),
         other => return Err(PyValueError::new_err(format!("criterion cannot be {other:?}"))),
     };
-    run(py, &resection, &Options { criterion, max_iterations, covariance, loss: None })
+    run(py, &resection, &Options { method, max_iterations, covariance, loss: None })
 }
 
 /// Adjusts on the calling thread: one photo is too little work for another one.

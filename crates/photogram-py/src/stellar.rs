@@ -1,7 +1,7 @@
 //! Stellar camera calibration; its documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
-use photocore::adjustment::{Criterion, Options as AdjustmentOptions, Status};
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop, Watch};
 use photocore::geometry::{Air, Station, pointing, pointing_angles};
 use photocore::programs::stellar::{
     Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Observations, Options, Rows,
@@ -13,8 +13,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{check_lengths, from_rows, indices, matrices, numbers, row_major, rows, squares, table};
-use crate::solution::iteration_row;
-use crate::work::{Watch, Workers, watched};
+use crate::solution::{iteration_row, status_name};
+use crate::work::{Workers, watched};
 
 create_exception!(
     _photocore,
@@ -262,9 +262,9 @@ impl StellarProblem {
         progress: Option<Py<PyAny>>,
         whole: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let criterion = Criterion::Fraction(fraction);
+        let method = Method::Damped(Stop::Fraction(fraction));
         let options = Options {
-            adjustment: AdjustmentOptions { criterion, max_iterations, covariance, loss: None },
+            adjustment: AdjustmentOptions { method, max_iterations, covariance, loss: None },
             unit,
             whole,
         };
@@ -273,12 +273,7 @@ impl StellarProblem {
         let solution = watched(py, Workers::of(threads, self.calibration.images.len()), progress, work)?
             .map_err(|error| failure(&error))?;
         let found = observations(py, solution.observations)?;
-        let status = match solution.adjustment.status {
-            Status::Converged => "converged",
-            Status::NotConverged => "not converged",
-            Status::Diverged => "diverged",
-        };
-        found.set_item("status", status)?;
+        found.set_item("status", status_name(solution.adjustment.status))?;
         let iterations: Vec<_> = solution.adjustment.iterations.iter().map(iteration_row).collect();
         found.set_item("iterations", iterations)?;
         found.set_item("initial_sum_of_squares", solution.adjustment.initial_sum_of_squares)?;

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use photocore::adjustment::{Event, Phase};
+use photocore::adjustment::{Event, Phase, Watch};
 use pyo3::prelude::*;
 use rayon::{ThreadBuilder, ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
@@ -20,9 +20,6 @@ const THREADS_EACH: usize = 4;
 /// Observed points up to which work stays on the calling thread, where the number of threads is not asked for: it takes some
 /// milliseconds, and to start threads and to hand work over takes as long.
 const SMALL: usize = 5000;
-
-/// What an adjustment asks for: threads, and something to be told.
-pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
 
 /// Who does work.
 pub enum Workers {

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.absolute_orientation.hints import Fit, find, undecided
-from photogram.absolute_orientation.orientation import Orientation
-from photogram.absolute_orientation.oriented import Trace
+from photogram.absolute_orientation.orientation import Orientation, Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.arrays import names as names_of
@@ -21,7 +20,7 @@ from photogram.arguments.arrays import number, one_of, truth_value, whole_number
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
-from photogram.results.adjusted import Iteration
+from photogram.results.iteration import Iteration
 from photogram.statistics.limits import externally_studentized, global_test
 
 __all__ = ["Method", "Start", "UnitVariance", "orient"]

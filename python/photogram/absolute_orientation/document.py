@@ -10,23 +10,25 @@ import numpy as np
 import orjson
 
 from photogram import _photocore
-from photogram.absolute_orientation.oriented import OrientedModel
+from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
+from photogram.show.ways import document_of
 from photogram.statistics.limits import GlobalTest
 
 __all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
 
 
-def to_json(result: OrientedModel) -> bytes:
+@document_of.register(Orientation)
+def to_json(result: Orientation) -> bytes:
     """Return the whole result as JSON (UTF-8); its points are the stations without control."""
     return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}\n"])
 
 
-def without_points(result: OrientedModel) -> Iterator[bytes]:
+def without_points(result: Orientation) -> Iterator[bytes]:
     """Return the document up to the first of its points, so that any number of them can follow."""
     yield json.to_json(_head(result)).removesuffix(b"\n}\n")
     yield b',\n  "points": ['
@@ -42,7 +44,7 @@ def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> by
     return b"\n    " + b",\n    ".join(objects) if len(positions) else b""
 
 
-def _head(result: OrientedModel) -> dict[str, Any]:
+def _head(result: Orientation) -> dict[str, Any]:
     similarity = result.similarity
     return {
         "program": f"photogram {_photocore.__version__} absolute-orientation",
@@ -105,7 +107,7 @@ def _global_test(test: GlobalTest | None) -> dict[str, Any] | None:
     }
 
 
-def _units(result: OrientedModel) -> dict[str, str]:
+def _units(result: Orientation) -> dict[str, str]:
     ground, model = result.stations.ground_unit, result.stations.model_unit
     return {
         "scale": f"{model} / {ground}",
@@ -123,7 +125,7 @@ def _units(result: OrientedModel) -> dict[str, str]:
     }
 
 
-def _control(result: OrientedModel) -> Iterator[dict[str, Any]]:
+def _control(result: Orientation) -> Iterator[dict[str, Any]]:
     for row in np.flatnonzero(result.took_part).tolist():
         yield {
             "id": result.stations.ids[row],
@@ -138,7 +140,7 @@ def _control(result: OrientedModel) -> Iterator[dict[str, Any]]:
         }
 
 
-def _rejected(result: OrientedModel) -> Iterator[dict[str, Any]]:
+def _rejected(result: Orientation) -> Iterator[dict[str, Any]]:
     left_out = result.stations.given & ~result.used
     differences = np.where(left_out, result.differences, np.nan)
     for row in np.flatnonzero(left_out.any(axis=1)).tolist():

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.absolute_orientation.oriented import OrientedModel
+from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
-from photogram.show.pictures import arrows, new_figure, round_length
+from photogram.show.pictures import arrows, drawn, new_figure, round_length
+from photogram.show.ways import picture_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,13 @@ LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""
 
 
-def figure(result: OrientedModel) -> Figure:
+@picture_of.register(Orientation)
+def picture(result: Orientation) -> bytes:
+    """Return the plan as a picture (PNG)."""
+    return drawn(figure(result))
+
+
+def figure(result: Orientation) -> Figure:
     """Draw plan residuals as arrows and those of elevations as bars, given minus transformed.
 
     Needs matplotlib (`pip install 'photogram[plots]'`).
@@ -50,7 +57,7 @@ def figure(result: OrientedModel) -> Figure:
     return made
 
 
-def _stations(axes: Axes, result: OrientedModel, rows: NDArray[np.intp], plan: Floats) -> None:
+def _stations(axes: Axes, result: Orientation, rows: NDArray[np.intp], plan: Floats) -> None:
     used = result.used[rows]
     full, plan_only = used.all(axis=1), ~used[:, 2]
     kinds = (

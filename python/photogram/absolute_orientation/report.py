@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.absolute_orientation.cards import restart_record, transformation_records
-from photogram.absolute_orientation.oriented import OrientedModel
+from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
 from photogram.show.sections import Section, composed, headline
+from photogram.show.ways import report_of
 
 __all__ = ["report", "summary"]
 
@@ -19,7 +20,8 @@ __all__ = ["report", "summary"]
 AXES = ("X", "Y", "Z")
 
 
-def report(result: OrientedModel) -> str:
+@report_of.register(Orientation)
+def report(result: Orientation) -> str:
     """Return the listing of an orientation."""
     sections = [
         *summary(result),
@@ -33,7 +35,7 @@ def report(result: OrientedModel) -> str:
     return composed(headline("absolute orientation"), sections)
 
 
-def summary(result: OrientedModel) -> list[Section]:
+def summary(result: Orientation) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, figures, parameters, control."""
     return [
         ("Problems", result.problems or ["none"]),
@@ -43,7 +45,7 @@ def summary(result: OrientedModel) -> list[Section]:
     ]
 
 
-def _figures(result: OrientedModel) -> list[str]:
+def _figures(result: Orientation) -> list[str]:
     stations = result.stations
     given = result.used.sum(axis=0)
     sigma0 = "undefined"
@@ -75,7 +77,7 @@ def _figures(result: OrientedModel) -> list[str]:
     return [f"{name:<36}{value}" for name, value in rows]
 
 
-def _parameters(result: OrientedModel) -> list[str]:
+def _parameters(result: Orientation) -> list[str]:
     similarity, stations = result.similarity, result.stations
     covariance = similarity.covariance
     sd = np.full(7, np.nan) if covariance is None else np.sqrt(np.diag(covariance))
@@ -96,7 +98,7 @@ def _row(values: Floats) -> str:
     return "".join(f"{value:>20.12f}" for value in values)
 
 
-def _control(result: OrientedModel) -> list[str]:
+def _control(result: Orientation) -> list[str]:
     unit, ground = result.stations.model_unit, result.stations.ground_unit
     columns = {"redundancy": (result.redundancy, 3), "studentized": (result.studentized, 2)}
     if result.weighted:
@@ -114,7 +116,7 @@ def _control(result: OrientedModel) -> list[str]:
     return [*lines, _limit(result)]
 
 
-def _limit(result: OrientedModel) -> str:
+def _limit(result: Orientation) -> str:
     if not math.isfinite(result.limit):
         return "no test: it takes two degrees of freedom"
     tests = int(np.isfinite(result.tested).sum())
@@ -126,7 +128,7 @@ def _limit(result: OrientedModel) -> str:
     return f"tested: {kind}; limit {result.limit:.2f} (5 percent for all {tests} tests together)"
 
 
-def _model_residuals(result: OrientedModel) -> list[str]:
+def _model_residuals(result: Orientation) -> list[str]:
     unit = result.stations.model_unit
     lines = [f"{'station':<12}" + "".join(f"{f'v{axis} {unit}':>16}" for axis in "xyz")]
     for row in np.flatnonzero(result.took_part).tolist():
@@ -135,7 +137,7 @@ def _model_residuals(result: OrientedModel) -> list[str]:
     return lines
 
 
-def _rejected(result: OrientedModel) -> list[str]:
+def _rejected(result: Orientation) -> list[str]:
     left_out = result.stations.given & ~result.used
     if not left_out.any():
         return []
@@ -150,7 +152,7 @@ def _rejected(result: OrientedModel) -> list[str]:
     return lines
 
 
-def _iterations(result: OrientedModel) -> list[str]:
+def _iterations(result: Orientation) -> list[str]:
     if result.cycles is not None:
         head = f"{'cycle':>6} {'largest correction of an angle, rad':>36}"
         return [head, *(f"{k:>6} {value:>36.3e}" for k, value in enumerate(result.cycles, 1))]
@@ -161,7 +163,7 @@ def _iterations(result: OrientedModel) -> list[str]:
     ]
 
 
-def _points(result: OrientedModel) -> list[str]:
+def _points(result: Orientation) -> list[str]:
     ids, positions, covariances = result.transform_points()
     if not ids:
         return []

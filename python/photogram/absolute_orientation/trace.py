@@ -11,13 +11,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from photogram.absolute_orientation.oriented import OrientedModel, Trace
+from photogram.absolute_orientation.orientation import Orientation, Trace
 from photogram.show.sections import Section, composed, headline
 
 __all__ = ["trace_text"]
 
 
-def trace_text(result: OrientedModel) -> str:
+def trace_text(result: Orientation) -> str:
     """Return what the cycles computed, under the bulletin's names and statement numbers."""
     rows = np.flatnonzero(result.took_part).tolist()
     names = [result.stations.ids[row] for row in rows]

@@ -20,7 +20,7 @@ from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
 from photogram.network.observations import observation_rows
 from photogram.network.refracted import check_cameras, remarks
-from photogram.results.adjusted import Iteration
+from photogram.results.iteration import Iteration
 from photogram.results.result import Result
 
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "teller"]

@@ -29,7 +29,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 from photogram.network.geometry import Spheroid
-from photogram.results.adjusted import Iteration
+from photogram.results.iteration import Iteration
 
 __all__ = ["Pose", "Resection", "resect"]
 

@@ -13,11 +13,10 @@ from photogram.adjustment.adjustment import Ordering, Progress, core_threads, te
 from photogram.adjustment.ends import hidden, rounded, too_coarse
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.collection import PARAMETERS, Collection
+from photogram.collection.collection import Collection
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory
 from photogram.messages import Message, listed
-from photogram.results.adjusted import Iteration
 
 __all__ = ["adjust"]
 
@@ -97,6 +96,7 @@ def adjust(
     row = loss_row(loss, scale)
     try:
         solution = _photocore.adjust_collection(
+            collection.camera,
             collection.photo_parameters,
             collection.photo_sd,
             collection.point_positions,
@@ -116,39 +116,17 @@ def adjust(
         )
     except _photocore.CollectionError as error:
         raise _named(*error.args) from None
-    return AdjustedCollection(
+    return AdjustedCollection.taken_over(
+        solution,
         collection=collection,
-        status=solution.status,
-        messages=_messages(solution) + remark(row, solution.image_weights),
-        initial_weighted_sum_of_squares=solution.initial_sum_of_squares,
-        iterations=[Iteration(*values) for values in solution.iterations],
+        messages=_messages(solution, collection) + remark(row, solution.image_weights),
         loss=row,
         weighted_sum_of_squares=solution.sum_of_squares,
-        degrees_of_freedom=solution.degrees_of_freedom,
-        variance_of_unit_weight=solution.variance_of_unit_weight,
-        photo_parameters=solution.photo_parameters,
-        photo_cofactors=solution.photo_cofactors,
-        photo_redundancy=solution.photo_redundancy,
-        photo_images=solution.photo_images,
-        point_positions=solution.point_positions,
-        point_cofactors=solution.point_cofactors,
-        point_redundancy=solution.point_redundancy,
-        point_rays=solution.point_rays,
-        point_rays_behind=solution.point_rays_behind,
-        residuals=solution.residuals,
-        redundancy=solution.redundancy,
-        standardized=solution.standardized,
-        image_weights=solution.image_weights,
-        datum=[(photo, PARAMETERS[parameter]) for photo, parameter in solution.datum],
-        ordering=solution.ordering,
-        predictions=solution.predictions,
-        operations=solution.operations,
-        formations=solution.formations,
-        seconds=solution.seconds,
+        datum=[(photo, collection.parameters[parameter]) for photo, parameter in solution.datum],
     )
 
 
-def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
+def _messages(solution: _photocore.CollectionSolution, collection: Collection) -> list[Message]:
     """Collect remarks that did not stop the adjustment, the gravest first."""
     messages = []
     if solution.undetermined is not None:
@@ -169,7 +147,8 @@ def _messages(solution: _photocore.CollectionSolution) -> list[Message]:
     behind = solution.point_rays_behind
     messages += hidden(int(behind.sum()), [str(point) for point in np.flatnonzero(behind)], [])
     if solution.datum:
-        held = ", ".join(f"{PARAMETERS[parameter]} of photo {photo}" for photo, parameter in solution.datum)
+        parameters = collection.parameters
+        held = ", ".join(f"{parameters[parameter]} of photo {photo}" for photo, parameter in solution.datum)
         messages.append(Message(f"nothing gives a datum; covariances hold for fixed {held}"))
     return messages
 

@@ -1,21 +1,92 @@
-"""The adjusted collection and the ways to show it."""
+"""The result of the adjustment of a collection: arrays with their covariances, and the ways to show them."""
 
 from __future__ import annotations
 
-from photogram.collection.document import to_json
-from photogram.collection.report import report
-from photogram.collection.solution import CollectionSolution
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.collection.collection import Collection
+from photogram.results.network import AdjustedNetwork
+
+if TYPE_CHECKING:
+    pass
 
 __all__ = ["AdjustedCollection"]
 
 
-class AdjustedCollection(CollectionSolution):
-    """An adjusted collection; the arrays are those of :class:`CollectionSolution`."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AdjustedCollection(AdjustedNetwork):
+    """An adjusted collection; the arrays that every network has are those of `AdjustedNetwork`.
 
-    def report(self) -> str:
-        """Return the report as text."""
-        return report(self)
+    The k unknowns of a photo are its parameters in the collection. Cofactors hold for the datum that the
+    observations and weights give; where these give none, for that of the held parameters in `datum`.
 
-    def to_json(self) -> bytes:
-        """Return the whole result as a JSON document (UTF-8); `docs/collection.md` lists its members."""
-        return to_json(self)
+    Attributes
+    ----------
+    collection
+        What was adjusted.
+    weighted_sum_of_squares
+        Of images and weighted unknowns, weights as the loss has modified them.
+    photo_parameters
+        (P, k) adjusted; see :class:`Collection`.
+    photo_images
+        (P,) number of image points.
+    point_rays_behind
+        (n,) how many image points have the point behind the camera.
+    datum
+        Photos and parameters that were held to give the cofactors a datum.
+    """
+
+    collection: Collection
+    weighted_sum_of_squares: float
+    photo_parameters: Floats
+    photo_images: Indices
+    point_rays_behind: Indices
+    datum: list[tuple[int, str]]
+
+    @property
+    def cost(self) -> float:
+        """Half the sum that was minimised, at the adjusted values."""
+        last = self.iterations[-1].weighted_sum_of_squares if self.iterations else None
+        return 0.5 * (self.initial_weighted_sum_of_squares if last is None else last)
+
+    @property
+    def image_points(self) -> Indices:
+        """(m,) the point of each image."""
+        return self.collection.image_points
+
+    @property
+    def photo_given_sd(self) -> Floats:
+        """(P, k) standard deviations of given parameters as observations: infinite free, zero fixed."""
+        return self.collection.photo_sd
+
+    @property
+    def photo_residuals(self) -> Floats:
+        """(P, k) given minus adjusted parameters; 0 where fixed, NaN where free."""
+        residuals = self.collection.photo_parameters - self.photo_parameters
+        return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
+
+    @property
+    def point_given_sd(self) -> Floats:
+        """(n, 3) standard deviations of given coordinates as observations: infinite free, zero fixed."""
+        return self.collection.point_sd
+
+    @property
+    def point_residuals(self) -> Floats:
+        """(n, 3) given minus adjusted coordinates; 0 where fixed, NaN where free."""
+        residuals = self.collection.point_positions - self.point_positions
+        return np.where(np.isfinite(self.point_given_sd), residuals, np.nan)
+
+    def adjusted(self) -> Collection:
+        """Return the collection at its adjusted values; points that were left out stay as they were."""
+        positions = np.where(
+            self.used_points[:, np.newaxis], self.point_positions, self.collection.point_positions
+        )
+        return self.collection.replace(photo_parameters=self.photo_parameters, point_positions=positions)
+
+
+CollectionSolution = AdjustedCollection
+"""The name that its arrays had when they were a class of their own."""

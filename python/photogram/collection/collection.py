@@ -16,33 +16,39 @@ from photogram.errors import InputError
 __all__ = ["PARAMETERS", "Collection"]
 
 
-PARAMETERS = ("w1", "w2", "w3", "t1", "t2", "t3", "f", "k1", "k2")
-"""Of a photo: angle-axis vector w (rad), translation t, focal length f (pixels), distortion k1, k2."""
+POSE = ("w1", "w2", "w3", "t1", "t2", "t3")
+"""Of a photo: angle-axis vector w (rad) and translation t."""
+PARAMETERS = (*POSE, "f", "k1", "k2")
+"""Of a photo with the camera of "Bundle Adjustment in the Large": also focal length f (pixels), k1, k2."""
 
 
 @dataclass(frozen=True, eq=False)
 class Collection:
     """P photos with unknown cameras, n points, m image points.
 
-    A photo maps a point X to f (1 + k1 p^2 + k2 p^4) p with P = R(w) X + t and p = -(P1, P2) / P3: it looks
-    along its -z axis (Bundler; Agarwal and others 2010). Any unknown may be weighted, from free (infinite
-    standard deviation) to fixed (zero).
+    A photo sees a point X in P = R(w) X + t and looks along its -z axis; its camera, of the model that all
+    photos share, maps P to the image. Any unknown may be weighted, from free (infinite standard deviation) to
+    fixed (zero).
 
     Attributes
     ----------
     photo_parameters
-        (P, 9) w (rad), t (units of the object space), f (pixels), k1, k2.
+        (P, k) w (rad), t (units of the object space), then those of the camera.
     point_positions
         (n, 3).
     image_photos, image_points
         (m,) which photo and which point.
     image_xy
-        (m, 2) pixels from the principal point, x to the right, y up.
+        (m, 2) pixels, as the camera counts them.
     image_sd
         (m, 2) standard deviations, pixels; one number stands for all.
     photo_sd, point_sd
-        (P, 9) and (n, 3) standard deviations of the given values as observations; infinite free, zero
+        (P, k) and (n, 3) standard deviations of the given values as observations; infinite free, zero
         fixed; one number stands for all.
+    camera
+        The model of the cameras. `bal` ("Bundle Adjustment in the Large"; Agarwal and others 2010) has f, k1,
+        k2 and maps P to f (1 + k1 p^2 + k2 p^4) p with p = -(P1, P2) / P3: pixels from the principal point, x
+        to the right, y up. `docs/collection.md` lists the others.
     """
 
     photo_parameters: Floats
@@ -53,17 +59,20 @@ class Collection:
     image_sd: Floats = field(default_factory=lambda: np.array(1.0))
     photo_sd: Floats = field(default_factory=lambda: np.array(np.inf))
     point_sd: Floats = field(default_factory=lambda: np.array(np.inf))
+    camera: str = "bal"
 
     def __post_init__(self) -> None:
+        if self.camera not in _photocore.CAMERAS:
+            raise InputError(f"camera is one of {', '.join(_photocore.CAMERAS)}, not {self.camera!r}")
         photos, points, images = (
             len(np.atleast_1d(rows)) for rows in (self.photo_parameters, self.point_positions, self.image_xy)
         )
         shapes = {
-            "photo_parameters": (photos, 9),
+            "photo_parameters": (photos, len(self.parameters)),
             "point_positions": (points, 3),
             "image_xy": (images, 2),
             "image_sd": (images, 2),
-            "photo_sd": (photos, 9),
+            "photo_sd": (photos, len(self.parameters)),
             "point_sd": (points, 3),
         }
         for name, shape in shapes.items():
@@ -76,14 +85,30 @@ class Collection:
         for name, count in (("image_photos", photos), ("image_points", points)):
             object.__setattr__(self, name, indices(name, getattr(self, name), images, count))
 
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the k parameters of a photo."""
+        return (*POSE, *(name for name, _ in _photocore.camera_model(self.camera)[1]))
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the k parameters: `rad`, `px`; none for numbers and for lengths in the object space."""
+        _, parameters = _photocore.camera_model(self.camera)
+        return ("rad",) * 3 + ("",) * 3 + tuple("px" if in_image else "" for _, in_image in parameters)
+
+    @property
+    def formula(self) -> str:
+        """The image of P, a point in the axes of the photo."""
+        return _photocore.camera_model(self.camera)[0]
+
     def replace(self, **changes: Any) -> Self:
         """Return the collection with other arrays in place of the named ones."""
         return replace(self, **changes)
 
     def computed_xy(self) -> Floats:
         """Return (m, 2) the image coordinates that the present parameters and positions give."""
-        return _photocore.bundler_images(
-            self.photo_parameters[self.image_photos], self.point_positions[self.image_points]
+        return _photocore.collection_images(
+            self.camera, self.photo_parameters[self.image_photos], self.point_positions[self.image_points]
         )
 
     def cost(self) -> float:

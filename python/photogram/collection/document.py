@@ -7,36 +7,36 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.collection.collection import PARAMETERS
-from photogram.collection.solution import CollectionSolution
+from photogram.collection.adjusted import AdjustedCollection
 from photogram.io import json
+from photogram.results.network import Observed
+from photogram.show.ways import document_of
 
 __all__ = ["to_json"]
 
 
-def to_json(result: CollectionSolution) -> bytes:
+@document_of.register(AdjustedCollection)
+def to_json(result: AdjustedCollection) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""
     return json.to_json(_document(result))
 
 
-def _document(result: CollectionSolution) -> dict[str, Any]:
+def _document(result: AdjustedCollection) -> dict[str, Any]:
     return {
         "program": f"photogram {_photocore.__version__}",
         "units": {
-            "w1, w2, w3": "rad",
-            "t1, t2, t3, position": "unit of the object space",
-            "f, residual_px": "pixel",
-            "k1, k2": "1",
+            **_units(result),
             "covariance": "products of these",
             "operations": "multiply-adds, each time the phase is carried out",
             "seconds": "s",
         },
         "conventions": {
-            "camera": "P = R(w) X + t, p = -(P1, P2) / P3, image = f (1 + k1 p^2 + k2 p^4) p",
+            "camera": f"P = R(w) X + t, {result.collection.formula}",
             "residual": "observed minus computed",
             "standardized": "residual / (sd x root of redundancy number), a priori unit weight",
             "covariance": "cofactors times covariance_scale",
             "cost": "half the sum that is minimised",
+            "control, stations": "residual: given minus adjusted; sd 0: fixed, null: free",
         },
         "status": result.status,
         "messages": [str(message) for message in result.messages],
@@ -56,10 +56,13 @@ def _document(result: CollectionSolution) -> dict[str, Any]:
         "variance_of_unit_weight": result.variance_of_unit_weight,
         "covariance_scale": result.covariance_scale,
         "datum": [{"photo": photo, "parameter": parameter} for photo, parameter in result.datum],
-        "parameters": PARAMETERS,
+        "camera": result.collection.camera,
+        "parameters": result.collection.parameters,
         "photos": _photos(result),
         "points": _points(result),
         "observations": _observations(result),
+        "control": _observed(result.control),
+        "stations": _observed(result.stations),
         "ordering": result.ordering,
         "predictions": dict(result.predictions),
         "operations": dict(result.operations),
@@ -67,7 +70,20 @@ def _document(result: CollectionSolution) -> dict[str, Any]:
     }
 
 
-def _photos(result: CollectionSolution) -> list[dict[str, Any]]:
+def _units(result: AdjustedCollection) -> dict[str, str]:
+    """Return the units of parameters, of positions and of residuals, what shares a unit together."""
+    names, units = result.collection.parameters[6:], result.collection.units[6:]
+    lengths = [name for name, unit in zip(names, units, strict=True) if unit]
+    plain = [name for name, unit in zip(names, units, strict=True) if not unit]
+    return {
+        "w1, w2, w3": "rad",
+        "t1, t2, t3, position": "unit of the object space",
+        ", ".join([*lengths, "residual_px"]): "pixel",
+        **({", ".join(plain): "1"} if plain else {}),
+    }
+
+
+def _photos(result: AdjustedCollection) -> list[dict[str, Any]]:
     columns = zip(
         result.photo_parameters, result.photo_covariances, result.photo_images.tolist(), strict=True
     )
@@ -77,7 +93,7 @@ def _photos(result: CollectionSolution) -> list[dict[str, Any]]:
     ]
 
 
-def _points(result: CollectionSolution) -> list[dict[str, Any]]:
+def _points(result: AdjustedCollection) -> list[dict[str, Any]]:
     used = np.flatnonzero(result.used_points)
     columns = zip(
         used.tolist(),
@@ -92,7 +108,7 @@ def _points(result: CollectionSolution) -> list[dict[str, Any]]:
     ]
 
 
-def _observations(result: CollectionSolution) -> list[dict[str, Any]]:
+def _observations(result: AdjustedCollection) -> list[dict[str, Any]]:
     collection, used = result.collection, result.used_images
     columns = zip(
         collection.image_photos[used].tolist(),
@@ -113,4 +129,15 @@ def _observations(result: CollectionSolution) -> list[dict[str, Any]]:
             "weight_factor": weight,
         }
         for photo, point, residual, redundancy, standardized, weight in columns
+    ]
+
+
+def _observed(given: Observed) -> list[dict[str, Any]]:
+    """Return points or photos as observations of their own unknowns."""
+    columns = zip(
+        given.rows.tolist(), given.residuals, given.sd, given.redundancy, given.standardized, strict=True
+    )
+    return [
+        {"number": number, "residual": residual, "sd": sd, "redundancy": redundancy, "standardized": test}
+        for number, residual, sd, redundancy, test in columns
     ]

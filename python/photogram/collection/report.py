@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from photogram.collection.collection import PARAMETERS
-from photogram.collection.solution import CollectionSolution
+from photogram.collection.adjusted import AdjustedCollection
+from photogram.results.observed import image_lines, observed_lines, tested
 from photogram.show.sections import Section, composed, headline, problems
+from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
-from photogram.statistics.outliers import Observations, outliers
-from photogram.statistics.reliability import TESTABLE
+from photogram.statistics.outliers import outliers
 
 __all__ = ["report", "summary"]
 
@@ -19,22 +21,32 @@ SUSPECTS = 20
 """Image points with large standardized residuals that are listed at most."""
 NOTABLE = 3.0
 """Standard deviations."""
-UNITS = ("rad",) * 3 + ("",) * 3 + ("px", "", "")
 
 
-def report(result: CollectionSolution) -> str:
+@report_of.register(AdjustedCollection)
+def report(result: AdjustedCollection) -> str:
     """Return the report of an adjusted collection."""
+    (photos, points), heads = _numbers(result), _heads(result)
     sections = [
         *summary(result),
         ("Iterations", _iterations(result)),
+        (
+            "Weighted and fixed points: given minus adjusted, redundancy, standardized residual",
+            observed_lines("point", points, "XYZ", np.ones(3), result.control),
+        ),
+        (
+            "Weighted and fixed parameters: given minus adjusted, redundancy, standardized residual",
+            observed_lines("photo", photos, heads, np.ones(len(heads)), result.stations),
+        ),
         ("Photos: values and standard deviations", _photos(result)),
         ("Points: standard deviations", _points(result)),
+        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Work", _work(result)),
     ]
     return composed(headline("collection of photos"), sections)
 
 
-def summary(result: CollectionSolution) -> list[Section]:
+def summary(result: AdjustedCollection) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, suspects."""
     return [
         ("Problems", _problems(result)),
@@ -43,25 +55,17 @@ def summary(result: CollectionSolution) -> list[Section]:
     ]
 
 
-def _problems(result: CollectionSolution) -> list[str]:
+def _problems(result: AdjustedCollection) -> list[str]:
     """Return a failed test and outliers before other remarks.
 
     Standard deviations of pixels are guesses: single residuals are tested against all others.
     """
-    collection, omega, freedom = (
-        result.collection,
-        result.weighted_sum_of_squares,
-        result.degrees_of_freedom,
-    )
-
-    def image(index: tuple[int, ...]) -> str:
-        point, photo = collection.image_points[index[0]], collection.image_photos[index[0]]
-        return f"{'xy'[index[1]]} of point {point} on photo {photo}"
-
-    testable = np.where(result.redundancy > TESTABLE, result.standardized, np.nan)
-    tested = Observations("image coordinates", externally_studentized(testable, omega, freedom), image)
+    collection, omega, freedom = result.collection, result.weighted_sum_of_squares, result.degrees_of_freedom
+    photos, points = _numbers(result)
+    groups = tested(result, collection.image_photos, photos, points, collection.parameters, "XYZ")
+    groups = [replace(each, values=externally_studentized(each.values, omega, freedom)) for each in groups]
     found = outliers(
-        [tested], lambda tests: studentized_limit(freedom, tests), "externally studentized residuals"
+        groups, lambda tests: studentized_limit(freedom, tests), "externally studentized residuals"
     )
     return problems(
         [*found, *result.messages],
@@ -71,7 +75,7 @@ def _problems(result: CollectionSolution) -> list[str]:
     )
 
 
-def _adjustment(result: CollectionSolution) -> list[str]:
+def _adjustment(result: AdjustedCollection) -> list[str]:
     collection, variance = result.collection, result.variance_of_unit_weight
     residuals = result.residuals[result.used_images]
     rows = [
@@ -97,7 +101,7 @@ def _adjustment(result: CollectionSolution) -> list[str]:
     return [f"{name:<36}{value}" for name, value in rows]
 
 
-def _suspects(result: CollectionSolution) -> list[str]:
+def _suspects(result: AdjustedCollection) -> list[str]:
     """List the image points that fit worst, in units of what the others have."""
     sigma0 = math.sqrt(result.covariance_scale)
     with np.errstate(invalid="ignore"):
@@ -118,7 +122,7 @@ def _suspects(result: CollectionSolution) -> list[str]:
     return lines
 
 
-def _iterations(result: CollectionSolution) -> list[str]:
+def _iterations(result: AdjustedCollection) -> list[str]:
     head = [" no.            cost   damping", f"   0{0.5 * result.initial_weighted_sum_of_squares:16.6e}"]
     lines = [
         f"{each.number:4d}{0.5 * each.weighted_sum_of_squares:16.6e}{each.damping:10.1e}"
@@ -127,9 +131,26 @@ def _iterations(result: CollectionSolution) -> list[str]:
     return head + lines
 
 
-def _photos(result: CollectionSolution) -> list[str]:
-    head = [f"{name}, {unit}" if unit else name for name, unit in zip(PARAMETERS, UNITS, strict=True)]
-    lines = ["  photo images" + "".join(f"{name:>14}" for name in head)]
+def _images(result: AdjustedCollection) -> list[str]:
+    return image_lines(result, result.collection.image_photos, *_numbers(result), "px")
+
+
+def _numbers(result: AdjustedCollection) -> tuple[Sequence[str], Sequence[str]]:
+    """Return what photos and points are called: numbers from 0."""
+    return [str(photo) for photo in range(len(result.photo_parameters))], [
+        str(point) for point in range(len(result.point_positions))
+    ]
+
+
+def _heads(result: AdjustedCollection) -> list[str]:
+    given = result.collection
+    return [
+        f"{name}, {unit}" if unit else name for name, unit in zip(given.parameters, given.units, strict=True)
+    ]
+
+
+def _photos(result: AdjustedCollection) -> list[str]:
+    lines = ["  photo images" + "".join(f"{name:>14}" for name in _heads(result))]
     for photo, (values, deviations) in enumerate(zip(result.photo_parameters, result.photo_sd, strict=True)):
         lines.append(
             f"{photo:7d}{result.photo_images[photo]:7d}" + "".join(f"{value:14.6g}" for value in values)
@@ -139,7 +160,7 @@ def _photos(result: CollectionSolution) -> list[str]:
     return lines
 
 
-def _points(result: CollectionSolution) -> list[str]:
+def _points(result: AdjustedCollection) -> list[str]:
     """Say how the standard deviations are spread; the JSON document has every one."""
     deviations = result.point_sd[np.isfinite(result.point_sd).all(axis=1)]
     if not len(deviations):
@@ -151,7 +172,7 @@ def _points(result: CollectionSolution) -> list[str]:
     return lines
 
 
-def _work(result: CollectionSolution) -> list[str]:
+def _work(result: AdjustedCollection) -> list[str]:
     tried = ", ".join(f"{name} {operations:.2g}" for name, operations in result.predictions.items())
     return [
         f"ordering                            {result.ordering} (multiply-adds predicted: {tried})",

@@ -88,7 +88,7 @@ def simulate(
     for own in visible:
         own[random.choice(photos, 2, replace=False)] = True
     image_points, image_photos = np.nonzero(visible)
-    exact = _photocore.bundler_images(parameters[image_photos], positions[image_points])
+    exact = _photocore.collection_images("bal", parameters[image_photos], positions[image_points])
     outliers = random.random(len(exact)) < outlier_share
     errors = random.normal(0, noise, exact.shape)
     errors[outliers] += random.normal(0, outlier_size, (int(outliers.sum()), 2))

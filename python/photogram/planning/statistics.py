@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats
 from photogram.planning.locations import LOCATIONS
-from photogram.results.adjusted import AdjustedBlock
+from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
 __all__ = [
@@ -119,7 +119,7 @@ class ControlQuality:
 
 
 def point_quality(
-    result: AdjustedBlock, point_sd: Floats, locations: NDArray[np.str_], new: Bools
+    result: Result, point_sd: Floats, locations: NDArray[np.str_], new: Bools
 ) -> list[PointQuality]:
     """Return the quality of new points by number of rays, by location, and of all; groups without points too.
 
@@ -141,7 +141,7 @@ def point_quality(
     return [_group(result, point_sd, grouping, name, new & chosen) for grouping, name, chosen in groups]
 
 
-def _group(result: AdjustedBlock, point_sd: Floats, grouping: str, group: str, chosen: Bools) -> PointQuality:
+def _group(result: Result, point_sd: Floats, grouping: str, group: str, chosen: Bools) -> PointQuality:
     images = chosen[result.block.image_points]
     redundancy = result.redundancy[images]
     checked = redundancy >= TESTABLE
@@ -159,7 +159,7 @@ def _group(result: AdjustedBlock, point_sd: Floats, grouping: str, group: str, c
     )
 
 
-def photo_quality(result: AdjustedBlock, photo_sd: Floats, axes: tuple[str, str, str]) -> list[PhotoQuality]:
+def photo_quality(result: Result, photo_sd: Floats, axes: tuple[str, str, str]) -> list[PhotoQuality]:
     """Return the quality of the photos in each unknown; `photo_sd` is (P, 6), linear unit and radians."""
     given_sd = np.hstack([result.block.photo_position_sd, result.block.photo_attitude_sd])
     weighted = np.isfinite(given_sd) & (given_sd > 0)
@@ -174,9 +174,7 @@ def photo_quality(result: AdjustedBlock, photo_sd: Floats, axes: tuple[str, str,
     ]
 
 
-def control_quality(
-    result: AdjustedBlock, control_sd: Floats, axes: tuple[str, str, str]
-) -> list[ControlQuality]:
+def control_quality(result: Result, control_sd: Floats, axes: tuple[str, str, str]) -> list[ControlQuality]:
     """Return how control is checked in each component; `control_sd` is (n, 3), linear unit."""
     qualities = []
     for k, name in enumerate(axes):

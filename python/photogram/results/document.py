@@ -10,20 +10,22 @@ import numpy as np
 from photogram import _photocore
 from photogram.io import json
 from photogram.results.report import problems_of
+from photogram.results.result import Result
+from photogram.show.ways import document_of
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.results.adjusted import AdjustedBlock
 
 __all__ = ["to_json"]
 
 
-def to_json(result: AdjustedBlock) -> bytes:
+@document_of.register(Result)
+def to_json(result: Result) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""
     return json.to_json(_document(result))
 
 
-def _document(result: AdjustedBlock) -> dict[str, Any]:
+def _document(result: Result) -> dict[str, Any]:
     sums = result.sums_of_squares
     return {
         "program": f"photogram {_photocore.__version__}",
@@ -81,7 +83,7 @@ def _document(result: AdjustedBlock) -> dict[str, Any]:
     }
 
 
-def _units(result: AdjustedBlock) -> dict[str, str]:
+def _units(result: Result) -> dict[str, str]:
     linear = result.block.linear_unit
     geographic = result.block.geographic
     return {
@@ -104,7 +106,7 @@ def _units(result: AdjustedBlock) -> dict[str, str]:
     }
 
 
-def _outward(result: AdjustedBlock, positions: Floats) -> Floats:
+def _outward(result: Result, positions: Floats) -> Floats:
     """Longitude and latitude in degrees, as the document has them."""
     if not result.block.geographic:
         return positions
@@ -113,7 +115,7 @@ def _outward(result: AdjustedBlock, positions: Floats) -> Floats:
     return outward
 
 
-def _photos(result: AdjustedBlock) -> list[dict[str, Any]]:
+def _photos(result: Result) -> list[dict[str, Any]]:
     columns = zip(
         result.block.photo_ids,
         _outward(result, result.photo_positions).tolist(),
@@ -134,7 +136,7 @@ def _photos(result: AdjustedBlock) -> list[dict[str, Any]]:
     ]
 
 
-def _points(result: AdjustedBlock) -> list[dict[str, Any]]:
+def _points(result: Result) -> list[dict[str, Any]]:
     columns = zip(
         result.block.point_ids,
         _outward(result, result.point_positions).tolist(),
@@ -150,7 +152,7 @@ def _points(result: AdjustedBlock) -> list[dict[str, Any]]:
     ]
 
 
-def _observations(result: AdjustedBlock) -> list[dict[str, Any]]:
+def _observations(result: Result) -> list[dict[str, Any]]:
     block, used = result.block, result.used_images
     columns = zip(
         block.image_photos[used].tolist(),
@@ -174,7 +176,7 @@ def _observations(result: AdjustedBlock) -> list[dict[str, Any]]:
     ]
 
 
-def _beside_images(result: AdjustedBlock) -> list[dict[str, Any]]:
+def _beside_images(result: Result) -> list[dict[str, Any]]:
     return [
         {
             "kind": each.kind,
@@ -193,7 +195,7 @@ def _beside_images(result: AdjustedBlock) -> list[dict[str, Any]]:
     ]
 
 
-def _global_test(result: AdjustedBlock) -> dict[str, Any] | None:
+def _global_test(result: Result) -> dict[str, Any] | None:
     test = result.global_test
     if test is None:
         return None
@@ -206,20 +208,19 @@ def _global_test(result: AdjustedBlock) -> dict[str, Any] | None:
     }
 
 
-def _control(result: AdjustedBlock) -> list[dict[str, Any]]:
-    block = result.block
-    rows = np.flatnonzero(result.used_points & np.isfinite(block.point_sd).any(axis=1))
+def _control(result: Result) -> list[dict[str, Any]]:
+    given = result.control
     columns = zip(
-        rows.tolist(),
-        _outward(result, result.point_residuals[rows]).tolist(),
-        _outward(result, block.point_sd[rows]).tolist(),
-        result.point_redundancy[rows].tolist(),
-        result.point_standardized[rows].tolist(),
+        given.rows.tolist(),
+        _outward(result, given.residuals).tolist(),
+        _outward(result, given.sd).tolist(),
+        given.redundancy.tolist(),
+        given.standardized.tolist(),
         strict=True,
     )
     return [
         {
-            "id": block.point_ids[row],
+            "id": result.block.point_ids[row],
             "position_residual": residual,
             "position_sd": sd,
             "redundancy": redundancy,
@@ -229,23 +230,21 @@ def _control(result: AdjustedBlock) -> list[dict[str, Any]]:
     ]
 
 
-def _stations(result: AdjustedBlock) -> list[dict[str, Any]]:
-    block, given_sd = result.block, result.photo_given_sd
-    rows = np.flatnonzero(np.isfinite(given_sd).any(axis=1))
-    residuals = result.photo_residuals[rows]
+def _stations(result: Result) -> list[dict[str, Any]]:
+    given = result.stations
     columns = zip(
-        rows.tolist(),
-        _outward(result, residuals[:, :3]).tolist(),
-        _outward(result, given_sd[rows, :3]).tolist(),
-        residuals[:, 3:].tolist(),
-        given_sd[rows, 3:].tolist(),
-        result.photo_redundancy[rows].tolist(),
-        result.photo_standardized[rows].tolist(),
+        given.rows.tolist(),
+        _outward(result, given.residuals[:, :3]).tolist(),
+        _outward(result, given.sd[:, :3]).tolist(),
+        given.residuals[:, 3:].tolist(),
+        given.sd[:, 3:].tolist(),
+        given.redundancy.tolist(),
+        given.standardized.tolist(),
         strict=True,
     )
     return [
         {
-            "id": block.photo_ids[row],
+            "id": result.block.photo_ids[row],
             "position_residual": position,
             "position_sd": position_sd,
             "attitude_residual_rad": attitude,
@@ -257,7 +256,7 @@ def _stations(result: AdjustedBlock) -> list[dict[str, Any]]:
     ]
 
 
-def _check_points(result: AdjustedBlock) -> list[dict[str, Any]]:
+def _check_points(result: Result) -> list[dict[str, Any]]:
     check = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
     differences = _outward(result, result.point_differences[check]).tolist()
     return [

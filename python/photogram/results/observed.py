@@ -1,113 +1,138 @@
-"""Observations beside images after the adjustment, kind by kind."""
+"""Observations of every kind, as reports list and test them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
-from photogram.network.block import Block
-from photogram.network.observations import observation_rows
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.results.network import AdjustedNetwork, Observed
+from photogram.statistics.outliers import Observations
+from photogram.statistics.reliability import TESTABLE
 
-if TYPE_CHECKING:
-    from photogram import _photocore
+__all__ = ["image_lines", "observed_lines", "tested"]
 
-__all__ = ["ObservedKind", "observed_kinds"]
+LISTED = 10_000
+"""Image points that a report lists at most; tables and documents have every one."""
 
 
-@dataclass(frozen=True, eq=False)
-class ObservedKind:
-    """The k observations of one kind, of r components each.
+def tested(
+    result: AdjustedNetwork,
+    image_photos: Indices,
+    photos: Sequence[str],
+    points: Sequence[str],
+    unknowns: Sequence[str],
+    axes: Sequence[str],
+) -> list[Observations]:
+    """Return all observations with their standardized residuals, where these say something.
 
-    Components that were not observed are NaN, and so are observations of points that were left out. Arrays
-    cannot be written.
-
-    Attributes
+    Parameters
     ----------
-    kind
-        Its name.
-    rows
-        (k,) which observations of the block they are.
-    names
-        What each is of.
-    components, units
-        Names and units of the r components: the linear unit of the object space, or radians.
-    sd
-        (k, r) standard deviations a priori.
-    residuals
-        (k, r) observed minus computed.
-    redundancy
-        (k, r) redundancy numbers; single ones may leave 0 to 1 where components are correlated.
-    standardized
-        (k, r) standardized residuals, a priori unit weight: with W the inverse of the covariance matrix S of
-        an observation, `(W v)_i / sqrt((W Qvv W)_ii)`, which without correlations is Baarda's w; NaN without
-        redundancy.
-    squares
-        (k,) v' W v, weights as the loss has changed them.
-    weights
-        (k,) factor by which the loss has changed the weight; 1 without a loss.
+    image_photos
+        (m,) the photo of each image.
+    photos, points
+        Their names.
+    unknowns, axes
+        What the unknowns of a photo and the coordinates of a point are called.
     """
 
-    kind: str
-    rows: Indices
-    names: list[str]
-    components: tuple[str, ...]
-    units: tuple[str, ...]
-    sd: Floats
-    residuals: Floats
-    redundancy: Floats
-    standardized: Floats
-    squares: Floats
-    weights: Floats
+    def image(index: tuple[int, ...]) -> str:
+        point, photo = result.image_points[index[0]], image_photos[index[0]]
+        return f"{'xy'[index[1]]} of point {points[point]} on photo {photos[photo]}"
 
-    def __post_init__(self) -> None:
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+    def kind(
+        what: str, standardized: Floats, redundancy: Floats, named: Callable[[tuple[int, ...]], str]
+    ) -> Observations:
+        return Observations(what, np.where(redundancy > TESTABLE, standardized, np.nan), named)
 
-    @property
-    def used(self) -> int:
-        """How many took part."""
-        return int(np.isfinite(self.squares).sum())
-
-    @property
-    def sum_of_squares(self) -> float:
-        """Of those that took part, weighted."""
-        return float(np.nansum(self.squares))
+    return [
+        kind("image coordinates", result.standardized, result.redundancy, image),
+        kind(
+            "components of control",
+            result.point_standardized,
+            result.point_redundancy,
+            lambda index: f"{axes[index[1]]} of control point {points[index[0]]}",
+        ),
+        kind(
+            "components of stations",
+            result.photo_standardized,
+            result.photo_redundancy,
+            lambda index: f"{unknowns[index[1]]} of photo {photos[index[0]]}",
+        ),
+    ]
 
 
-def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str, ObservedKind]:
-    """Return what has become of the observations of a block, by the names of their kinds."""
-    found = iter(solution.adjusted_observations)
-    kinds = {}
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids)
-    for rows, (kind, _, _, covariances) in groups:
-        first = block.observations[rows[0]]
-        components = first.components(geographic=block.geographic)
-        observed = np.ones((len(rows), len(components)), dtype=bool)
-        if kind == "difference":
-            observed = ~np.isnan([block.observations[row].observed for row in rows])
-        tables = np.full((3, *observed.shape), np.nan)
-        single = np.full((2, len(rows)), np.nan)
-        for k in range(len(rows)):
-            adjusted = next(found)
-            if adjusted is not None:
-                tables[:, k, observed[k]] = adjusted[:3]
-                single[:, k] = adjusted[3:]
-        variances = np.diagonal(covariances, axis1=1, axis2=2)
-        kinds[kind] = ObservedKind(
-            kind=kind,
-            rows=np.array(rows, dtype=np.int64),
-            names=[" - ".join(block.observations[row].of) for row in rows],
-            components=components,
-            units=tuple("rad" if name.startswith("rotation") else block.linear_unit for name in components),
-            sd=np.sqrt(np.where(observed, variances, np.nan)),
-            residuals=tables[0].copy(),
-            redundancy=tables[1].copy(),
-            standardized=tables[2].copy(),
-            squares=single[0].copy(),
-            weights=single[1].copy(),
+def image_lines(
+    result: AdjustedNetwork,
+    image_photos: Indices,
+    photos: Sequence[str],
+    points: Sequence[str],
+    unit: str,
+    factor: float = 1.0,
+) -> list[str]:
+    """List the image observations, one point a line: what `tested` has, and residuals times `factor`."""
+    used = np.flatnonzero(result.used_images)
+    parts = (result.residuals * factor, result.redundancy, result.standardized)
+    heads = (f"{axis} {head}" for axis in "xy" for head in (f"residual {unit}", "redundancy", "standardized"))
+    lines = [f"{'photo':<10} {'point':<10}" + "".join(f"{head:>16}" for head in heads)]
+    for image in used[:LISTED].tolist():
+        name = f"{photos[image_photos[image]]:<10} {points[result.image_points[image]]:<10}"
+        figures = "".join(
+            "".join(
+                f"{f'{part[image, axis]:.{decimals}f}' if math.isfinite(part[image, axis]) else '-':>16}"
+                for part, decimals in zip(parts, (2, 3, 2), strict=True)
+            )
+            for axis in (0, 1)
         )
-    return kinds
+        lines.append(name + figures)
+    if len(used) > LISTED:
+        lines.append(f"and {len(used) - LISTED} more; the JSON document and the table of images have all")
+    return lines if len(used) else []
+
+
+def observed_lines(
+    kind: str, names: Sequence[str], columns: Sequence[str], factors: Floats, given: Observed
+) -> list[str]:
+    """List observed components, four lines for each point or photo: what was observed, and how it fits.
+
+    Parameters
+    ----------
+    kind
+        `point` or `photo`.
+    names
+        Of all points or photos.
+    columns, factors
+        The components with their units, and what leads to these.
+    given
+        The observations.
+    """
+    if not len(given.rows):
+        return []
+    sd, residuals = given.sd * factors, given.residuals * factors
+    lines = [f"{kind:<10}{'':<14}" + "".join(f"{column:>18}" for column in columns)]
+    held = np.isfinite(sd)
+    weighted = held & (sd > 0)
+    for row, name in enumerate(names[index] for index in given.rows.tolist()):
+        deviations = [
+            "free" if math.isinf(each) else "fixed" if each == 0 else f"{each:.5f}" for each in sd[row]
+        ]
+        parts = (
+            ("sd", deviations),
+            ("residual", _cells(residuals[row], held[row], 5)),
+            ("redundancy", _cells(given.redundancy[row], weighted[row], 3)),
+            ("standardized", _cells(given.standardized[row], weighted[row], 2)),
+        )
+        lines += [
+            f"{name if part == 'sd' else '':<10}{part:<14}" + "".join(f"{cell:>18}" for cell in cells)
+            for part, cells in parts
+        ]
+    return lines
+
+
+def _cells(values: Floats, there: Bools, decimals: int) -> list[str]:
+    return [
+        f"{value:.{decimals}f}" if use and math.isfinite(value) else "-"
+        for value, use in zip(values, there, strict=True)
+    ]

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.network.structuring import structure
+from photogram.results.beside_images import beside_images_lines
+from photogram.results.observed import image_lines, observed_lines, tested
+from photogram.results.result import Result
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.sections import Section, composed, headline, problems
+from photogram.show.ways import report_of
 from photogram.statistics.limits import normal_limit
 from photogram.statistics.outliers import Observations, outliers
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.results.adjusted import AdjustedBlock
-    from photogram.results.observed import ObservedKind
 
 __all__ = ["bandwidths", "problems_of", "report", "summary"]
 
@@ -34,8 +35,9 @@ _ORDERINGS = {
 }
 
 
+@report_of.register(Result)
 @np.errstate(over="ignore")  # what is too large for its unit is infinite
-def report(result: AdjustedBlock) -> str:
+def report(result: Result) -> str:
     """Return the report of an adjusted block."""
     sections = [
         *summary(result),
@@ -55,17 +57,18 @@ def report(result: AdjustedBlock) -> str:
         ),
         (
             "Observations beside images: observed minus adjusted, redundancy, standardized residual",
-            _beside_images(result),
+            beside_images_lines(result.kinds.values()),
         ),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
+        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Work", _work(result)),
     ]
     return composed(headline("block adjustment", result.block.title), sections)
 
 
 @np.errstate(over="ignore")
-def summary(result: AdjustedBlock) -> list[Section]:
+def summary(result: Result) -> list[Section]:
     """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
     return [
         ("Problems", problems_of(result)),
@@ -75,60 +78,33 @@ def summary(result: AdjustedBlock) -> list[Section]:
     ]
 
 
-def problems_of(result: AdjustedBlock) -> list[str]:
+def problems_of(result: Result) -> list[str]:
     """Return what keeps a reader from using the values: a failed test and outliers before other remarks."""
     found = outliers(_tested(result), normal_limit, "standardized residuals")
     messages = [*found, *result.messages]
     return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
 
 
-def _tested(result: AdjustedBlock) -> list[Observations]:
-    """Return all observations with their standardized residuals, where these say something."""
+def _tested(result: Result) -> list[Observations]:
     block = result.block
-    axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
-    unknowns = (*axes, "omega", "phi", "kappa")
-
-    def image(index: tuple[int, ...]) -> str:
-        point, photo = block.image_points[index[0]], block.image_photos[index[0]]
-        return f"{'xy'[index[1]]} of point {block.point_ids[point]} on photo {block.photo_ids[photo]}"
-
-    def testable(standardized: Floats, redundancy: Floats) -> Floats:
-        return np.where(redundancy > TESTABLE, standardized, np.nan)
-
-    return [
-        Observations("image coordinates", testable(result.standardized, result.redundancy), image),
-        Observations(
-            "components of control",
-            testable(result.point_standardized, result.point_redundancy),
-            lambda index: f"{axes[index[1]]} of control point {block.point_ids[index[0]]}",
-        ),
-        Observations(
-            "components of stations",
-            testable(result.photo_standardized, result.photo_redundancy),
-            lambda index: f"{unknowns[index[1]]} of photo {block.photo_ids[index[0]]}",
-        ),
-        *(
-            Observations(
-                f"components of observations of the kind {each.kind}",
-                testable(each.standardized, each.redundancy),
-                partial(_component_name, each),
-            )
-            for each in result.kinds.values()
-        ),
-    ]
+    unknowns = (*_axes(result), "omega", "phi", "kappa")
+    others = (each.tested() for each in result.kinds.values())
+    own = tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result))
+    return [*own, *others]
 
 
-def _component_name(kind: ObservedKind, index: tuple[int, ...]) -> str:
-    return f"{kind.components[index[1]]} of {kind.kind} {kind.names[index[0]]}"
+def _axes(result: Result) -> tuple[str, str, str]:
+    """Return what the coordinates are called."""
+    return ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
 
 
-def _adjustment(result: AdjustedBlock) -> list[str]:
+def _adjustment(result: Result) -> list[str]:
     block, sums = result.block, result.sums_of_squares
     kinds = result.point_kinds[result.used_points].tolist()
     variance = result.variance_of_unit_weight
     held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
-    axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
-    components = ", ".join(f"{axis} {count}" for axis, count in zip(axes, held.sum(axis=0), strict=True))
+    counts = zip(_axes(result), held.sum(axis=0), strict=True)
+    components = ", ".join(f"{axis} {count}" for axis, count in counts)
     basis = {"free": "cameras free", "constrained": "cameras constrained", "unity": "set to 1"}[
         result.unit_variance
     ]
@@ -164,7 +140,7 @@ def _adjustment(result: AdjustedBlock) -> list[str]:
     return [f"{name:<36}{value}" for name, value in rows]
 
 
-def _residuals(result: AdjustedBlock) -> list[str]:
+def _residuals(result: Result) -> list[str]:
     used = result.used_images
     lines = [
         f"rms of image residuals              {_rms(result.residuals[used][:, axis]) * 1000:.3f} um in {name}"
@@ -188,7 +164,7 @@ def _residuals(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def _iterations(result: AdjustedBlock) -> list[str]:
+def _iterations(result: Result) -> list[str]:
     lines = [f"{'number':>6} {'weighted sum of squares':>24} {'largest change / sd':>20} {'damping':>9}"]
     lines.append(f"{0:>6} {result.initial_weighted_sum_of_squares:>24.6f}")
     lines += [
@@ -198,7 +174,7 @@ def _iterations(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def _suspects(result: AdjustedBlock) -> list[str]:
+def _suspects(result: Result) -> list[str]:
     testable = result.redundancy > TESTABLE
     size = np.where(testable, np.nan_to_num(np.abs(result.standardized)), 0.0)
     images, axes = np.nonzero(size > _BLUNDER)
@@ -217,28 +193,28 @@ def _suspects(result: AdjustedBlock) -> list[str]:
     return lines if images.size == len(order) else [*lines, f"and {images.size - len(order)} more"]
 
 
-def _held_differences(result: AdjustedBlock) -> Floats:
+def _held_differences(result: Result) -> Floats:
     return _differences_where(result, np.isfinite(result.block.point_sd))
 
 
-def _unheld_differences(result: AdjustedBlock) -> Floats:
+def _unheld_differences(result: Result) -> Floats:
     """Return those of components of control that are not held, but have a value to compare with."""
     held = np.isfinite(result.block.point_sd)
     return _differences_where(result, held.any(axis=1, keepdims=True) & ~held)
 
 
-def _check_differences(result: AdjustedBlock) -> Floats:
+def _check_differences(result: Result) -> Floats:
     return _differences_where(result, (result.point_kinds == "check")[:, np.newaxis])
 
 
-def _differences_where(result: AdjustedBlock, which: np.ndarray) -> Floats:
+def _differences_where(result: Result, which: np.ndarray) -> Floats:
     """Return (n, 3) adjusted minus supplied coordinates, NaN where not asked for or not supplied."""
     used = result.used_points[:, np.newaxis]
     differences: Floats = np.where(used & which, result.point_differences, np.nan)
     return differences
 
 
-def _difference_table(result: AdjustedBlock, differences: Floats) -> list[str]:
+def _difference_table(result: Result, differences: Floats) -> list[str]:
     points = np.flatnonzero(np.isfinite(differences).any(axis=1))
     if len(points) == 0:
         return []
@@ -252,103 +228,24 @@ def _difference_table(result: AdjustedBlock, differences: Floats) -> list[str]:
     return lines
 
 
-def _control(result: AdjustedBlock) -> list[str]:
-    rows = np.flatnonzero(result.used_points & np.isfinite(result.block.point_sd).any(axis=1))
-    units, outward = _difference_units(result), _outward(result)
-    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
-    return _observed_table(
-        "point",
-        [result.block.point_ids[row] for row in rows],
-        [f"{axis} {unit}" for axis, unit in zip(axes, units, strict=True)],
-        result.block.point_sd[rows] * outward,
-        result.point_residuals[rows] * outward,
-        result.point_redundancy[rows],
-        result.point_standardized[rows],
-    )
+def _control(result: Result) -> list[str]:
+    columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
+    return observed_lines("point", result.block.point_ids, columns, _outward(result), result.control)
 
 
-def _stations(result: AdjustedBlock) -> list[str]:
-    given_sd = result.photo_given_sd
-    rows = np.flatnonzero(np.isfinite(given_sd).any(axis=1))
-    units, outward = _difference_units(result), np.append(_outward(result), [1.0 / ARCSEC] * 3)
-    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
-    names = [f"{axis} {unit}" for axis, unit in zip(axes, units, strict=True)]
-    return _observed_table(
-        "photo",
-        [result.block.photo_ids[row] for row in rows],
-        [*names, "omega arcsec", "phi arcsec", "kappa arcsec"],
-        given_sd[rows] * outward,
-        result.photo_residuals[rows] * outward,
-        result.photo_redundancy[rows],
-        result.photo_standardized[rows],
-    )
+def _stations(result: Result) -> list[str]:
+    columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
+    columns += ["omega arcsec", "phi arcsec", "kappa arcsec"]
+    outward = np.append(_outward(result), [1.0 / ARCSEC] * 3)
+    return observed_lines("photo", result.block.photo_ids, columns, outward, result.stations)
 
 
-def _observed_table(
-    kind: str,
-    names: list[str],
-    columns: list[str],
-    sd: Floats,
-    residuals: Floats,
-    redundancy: Floats,
-    standardized: Floats,
-) -> list[str]:
-    """Four lines for each of some observed positions: what was observed, and how it fits."""
-    if not names:
-        return []
-    lines = [f"{kind:<10}{'':<14}" + "".join(f"{column:>18}" for column in columns)]
-    held = np.isfinite(sd)
-    weighted = held & (sd > 0)
-    for row, name in enumerate(names):
-        deviations = [
-            "free" if math.isinf(each) else "fixed" if each == 0 else f"{each:.5f}" for each in sd[row]
-        ]
-        parts = (
-            ("sd", deviations),
-            ("residual", _cells(residuals[row], held[row], 5)),
-            ("redundancy", _cells(redundancy[row], weighted[row], 3)),
-            ("standardized", _cells(standardized[row], weighted[row], 2)),
-        )
-        lines += [
-            f"{name if part == 'sd' else '':<10}{part:<14}" + "".join(f"{cell:>18}" for cell in cells)
-            for part, cells in parts
-        ]
-    return lines
+def _images(result: Result) -> list[str]:
+    block = result.block
+    return image_lines(result, block.image_photos, block.photo_ids, block.point_ids, "um", 1000.0)
 
 
-def _cells(values: Floats, there: np.ndarray, decimals: int) -> list[str]:
-    return [
-        f"{value:.{decimals}f}" if use and math.isfinite(value) else "-"
-        for value, use in zip(values, there, strict=True)
-    ]
-
-
-def _beside_images(result: AdjustedBlock) -> list[str]:
-    """Write a line for each component of every observation, rotations in arcsec."""
-    lines = []
-    for each in result.kinds.values():
-        units = ["arcsec" if unit == "rad" else unit for unit in each.units]
-        outward = np.array([1.0 / ARCSEC if unit == "rad" else 1.0 for unit in each.units])
-        columns = ("sd", "residual", "redundancy", "standardized")
-        head = f"{each.kind:<28}{'component':<22}" + "".join(f"{column:>14}" for column in columns)
-        lines += [head]
-        sd, residuals = each.sd * outward, each.residuals * outward
-        for i, k in np.argwhere(~np.isnan(each.residuals)).tolist():
-            cells = (
-                f"{sd[i, k]:>14.5f}",
-                _cell(residuals[i, k], 14, 5),
-                _cell(each.redundancy[i, k], 14, 3),
-                _cell(each.standardized[i, k], 14, 2),
-            )
-            lines.append(f"{each.names[i]:<28}{f'{each.components[k]} {units[k]}':<22}{''.join(cells)}")
-    return lines
-
-
-def _cell(value: float, width: int, decimals: int) -> str:
-    return f"{value:>{width}.{decimals}f}" if math.isfinite(value) else f"{'-':>{width}}"
-
-
-def _photos(result: AdjustedBlock) -> list[str]:
+def _photos(result: Result) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [
         f"{'photo':<10}{_position_head(result)}{'omega deg':>15}{'phi deg':>15}{'kappa deg':>15}",
@@ -367,7 +264,7 @@ def _photos(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def _points(result: AdjustedBlock) -> list[str]:
+def _points(result: Result) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [f"{'point':<10}{_position_head(result)}  rays  kind", f"{'':<10}{_sd_head(result)}"]
     rows = zip(
@@ -385,7 +282,7 @@ def _points(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def _work(result: AdjustedBlock) -> list[str]:
+def _work(result: Result) -> list[str]:
     order = _ORDERINGS[result.ordering]
     lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
     lines += [
@@ -398,7 +295,7 @@ def _work(result: AdjustedBlock) -> list[str]:
     return lines
 
 
-def bandwidths(result: AdjustedBlock) -> list[str]:
+def bandwidths(result: Result) -> list[str]:
     """Return what the 1987 program would have needed, for the order of the input and for the one chosen."""
     images = result.block.image_photos, result.block.image_points
     lines = ["bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)"]
@@ -415,35 +312,34 @@ def _rms(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
 
 
-def _outward(result: AdjustedBlock) -> Floats:
+def _outward(result: Result) -> Floats:
     """Return the factors from inner units to those of the report: arcsec for angles."""
     return np.array([1.0 / ARCSEC, 1.0 / ARCSEC, 1.0] if result.block.geographic else [1.0, 1.0, 1.0])
 
 
-def _difference_units(result: AdjustedBlock) -> tuple[str, str, str]:
+def _difference_units(result: Result) -> tuple[str, str, str]:
     unit = result.block.linear_unit
     return ("arcsec", "arcsec", unit) if result.block.geographic else (unit, unit, unit)
 
 
-def _differences(result: AdjustedBlock, values: Iterable[float]) -> list[str]:
-    axes = ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+def _differences(result: Result, values: Iterable[float]) -> list[str]:
     outward = np.array(list(values)) * _outward(result)
-    triples = zip(axes, outward, _difference_units(result), strict=True)
+    triples = zip(_axes(result), outward, _difference_units(result), strict=True)
     return [f"{axis} {value:.5f} {unit}" for axis, value, unit in triples if math.isfinite(value)]
 
 
-def _position_head(result: AdjustedBlock) -> str:
+def _position_head(result: Result) -> str:
     unit = result.block.linear_unit
     planimetry = ("longitude", "latitude") if result.block.geographic else (f"X {unit}", f"Y {unit}")
     names = (*planimetry, f"height {unit}" if result.block.geographic else f"Z {unit}")
     return "".join(f"{name:>20}" for name in names)
 
 
-def _sd_head(result: AdjustedBlock) -> str:
+def _sd_head(result: Result) -> str:
     return "".join(f"{f'sd {unit}':>20}" for unit in _difference_units(result))
 
 
-def _position_formats(result: AdjustedBlock) -> tuple[Callable[[Floats], str], Callable[[Floats], str]]:
+def _position_formats(result: Result) -> tuple[Callable[[Floats], str], Callable[[Floats], str]]:
     """How positions and their standard deviations are written."""
 
     def position(values: Floats) -> str:
@@ -466,4 +362,4 @@ def _dms(angle: float, decimals: int) -> str:
 
 
 def _number(value: float, decimals: int) -> str:
-    return _cell(value, 16, decimals)
+    return f"{value:>16.{decimals}f}" if math.isfinite(value) else f"{'-':>16}"

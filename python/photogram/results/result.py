@@ -1,68 +1,208 @@
-"""The result of an adjustment: an adjusted block and the ways to show it."""
+"""The result of the adjustment of a block: arrays with their covariances, and the ways to show them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
-from photogram.results.adjusted import AdjustedBlock
-from photogram.results.document import to_json
-from photogram.results.report import report
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.arguments.types import Floats, Indices
+from photogram.messages import Message
+from photogram.network.block import Block
+from photogram.results.beside_images import ObservedKind, observed_kinds
+from photogram.results.network import AdjustedNetwork
+from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Result"]
+    from photogram import _photocore
+
+__all__ = ["Result", "SumsOfSquares"]
 
 
-class Result(AdjustedBlock):
-    """An adjusted block with its tables, report and JSON document."""
+@dataclass(frozen=True)
+class SumsOfSquares:
+    """Weighted sums of squares.
 
-    def photo_table(self) -> pd.DataFrame:
-        """Return adjusted photos as a data frame: values and standard deviations, angles in degrees."""
-        from photogram.results import tables  # pandas takes long to import
+    Attributes
+    ----------
+    camera
+        Of the weighted positions and attitudes of the photos.
+    ground
+        Of the held components of control.
+    plates
+        Of the image coordinates.
+    observations
+        Of the observations beside images.
+    """
 
-        return tables.photo_table(self)
+    camera: float
+    ground: float
+    plates: float
+    observations: float = 0.0
 
-    def point_table(self) -> pd.DataFrame:
-        """Return adjusted points as a data frame: kind, rays, values and standard deviations, in degrees."""
-        from photogram.results import tables  # pandas takes long to import
+    @property
+    def measured(self) -> float:
+        """Of all but photos."""
+        return self.ground + self.plates + self.observations
 
-        return tables.point_table(self)
+    @property
+    def total(self) -> float:
+        """All together."""
+        return self.camera + self.ground + self.plates + self.observations
 
-    def image_table(self) -> pd.DataFrame:
-        """Return image observations as a data frame: residuals, redundancy numbers, test values."""
-        from photogram.results import tables  # pandas takes long to import
 
-        return tables.image_table(self)
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Result(AdjustedNetwork):
+    """An adjusted block; the arrays that every network has are those of `AdjustedNetwork`, with k = 6.
+
+    The unknowns of a photo are its position and omega, phi, kappa. Positions are X, Y, Z or longitude (rad),
+    latitude (rad), height; angles are radians, image coordinates millimetres.
+
+    Attributes
+    ----------
+    block
+        What was adjusted: a copy, which later changes of the caller's lists do not reach.
+    sums_of_squares
+        Weighted sums by group.
+    unit_variance
+        What degrees of freedom and variance of unit weight are based on: `free`, `constrained` or `unity`.
+    photo_corrections
+        (i, P, 6) corrections of position and attitude in each of the i iterations; they lead from the initial
+        to the adjusted values.
+    photo_positions, photo_attitudes
+        (P, 3) adjusted.
+    photo_order
+        (P,) the indices of the photos as they were eliminated.
+    point_last_corrections
+        (n, 3) corrections in the last iteration.
+    kinds
+        Observations beside images: arrays for each kind, by its name.
+    dropped
+        Points left out, with the reason.
+    """
+
+    block: Block
+    sums_of_squares: SumsOfSquares
+    unit_variance: str
+    photo_corrections: Floats
+    photo_positions: Floats
+    photo_attitudes: Floats
+    photo_order: Indices
+    point_last_corrections: Floats
+    kinds: Mapping[str, ObservedKind]
+    dropped: Mapping[str, str]
+
+    @classmethod
+    def from_solution(
+        cls,
+        block: Block,
+        solution: _photocore.BlockSolution,
+        unit_variance: str,
+        loss: tuple[str, float] | None,
+        messages: list[Message],
+    ) -> Self:
+        """Take over what the core found."""
+        return cls.taken_over(
+            solution,
+            block=block.kept(),
+            messages=messages,
+            loss=loss,
+            sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
+            unit_variance=unit_variance,
+            kinds=observed_kinds(block, solution),
+            dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
+        )
+
+    @property
+    def image_points(self) -> Indices:
+        """(m,) the point of each image."""
+        return self.block.image_points
+
+    @property
+    def global_test(self) -> GlobalTest | None:
+        """The test of all residuals together; None without degrees of freedom.
+
+        It takes the observations on which the variance of unit weight is based: with `constrained` cameras
+        all of them, else image coordinates, observations beside these and ground control.
+        """
+        sums = self.sums_of_squares
+        tested = sums.total if self.unit_variance == "constrained" else sums.measured
+        return global_test(tested, self.degrees_of_freedom)
+
+    @property
+    def photo_residuals(self) -> Floats:
+        """(P, 6) observed minus adjusted position and attitude; 0 where fixed, NaN where free.
+
+        Longitudes and attitudes differ by half a turn at the most.
+        """
+        residuals = self._photo_observed - np.hstack([self.photo_positions, self.photo_attitudes])
+        turning = [0, 3, 4, 5] if self.block.geographic else [3, 4, 5]
+        residuals[:, turning] = _least_turns(residuals[:, turning])
+        return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
+
+    @property
+    def _photo_observed(self) -> Floats:
+        block = self.block
+        positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
+        return np.hstack(
+            [
+                block.photo_positions if positions is None else positions,
+                block.photo_attitudes if attitudes is None else attitudes,
+            ]
+        )
+
+    @property
+    def photo_given_sd(self) -> Floats:
+        """(P, 6) standard deviations of observed positions and attitudes: infinite free, zero fixed."""
+        return np.hstack([self.block.photo_position_sd, self.block.photo_attitude_sd])
+
+    @property
+    def point_given_sd(self) -> Floats:
+        """(n, 3) standard deviations of supplied coordinates: infinite not held, zero fixed."""
+        return self.block.point_sd
+
+    @property
+    def point_residuals(self) -> Floats:
+        """(n, 3) observed minus adjusted held components; 0 where fixed, NaN where not held."""
+        return np.where(np.isfinite(self.block.point_sd), -self.point_differences, np.nan)
+
+    @property
+    def point_kinds(self) -> NDArray[np.str_]:
+        """(n,) `control` with a component held, `check` with components known but none held, else `pass`."""
+        held = np.isfinite(self.block.point_sd).any(axis=1)
+        known = np.isfinite(self.block.point_positions).any(axis=1)
+        return np.where(held, "control", np.where(known, "check", "pass"))
+
+    @property
+    def point_differences(self) -> Floats:
+        """(n, 3) adjusted minus supplied coordinates; NaN where none were supplied.
+
+        Longitudes differ by half a turn at the most, on whichever side of the antimeridian they are counted.
+        """
+        differences = self.point_positions - self.block.point_positions
+        if self.block.geographic:
+            differences[:, 0] = _least_turns(differences[:, 0])
+        return differences
 
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""
-        from photogram.results import tables  # pandas takes long to import
-
-        return tables.check_table(self)
-
-    def control_table(self) -> pd.DataFrame:
-        """Return control as a data frame: residuals of held components, redundancy numbers, test values."""
-        from photogram.results import tables  # pandas takes long to import
-
-        return tables.control_table(self)
-
-    def station_table(self) -> pd.DataFrame:
-        """Return weighted and fixed stations as a data frame: residuals, redundancy numbers, test values."""
-        from photogram.results import tables  # pandas takes long to import
-
-        return tables.station_table(self)
+        return self._table("check")
 
     def observation_table(self) -> pd.DataFrame:
         """Return observations beside images as a data frame, a row for each component."""
-        from photogram.results import tables  # pandas takes long to import
+        return self._table("observation")
 
-        return tables.observation_table(self)
 
-    def report(self) -> str:
-        """Return the adjustment report as text."""
-        return report(self)
+def _least_turns(angles: Floats) -> Floats:
+    """Take away whole turns."""
+    return np.asarray(angles - math.tau * np.round(angles / math.tau))
 
-    def to_json(self) -> bytes:
-        """Return the whole result as a JSON document (UTF-8); `docs/json.md` lists its members."""
-        return to_json(self)
+
+AdjustedBlock = Result
+"""The name that its arrays had when they were a class of their own."""

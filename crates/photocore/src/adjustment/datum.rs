@@ -85,8 +85,8 @@ pub fn in_datum<M: Model>(
     transformation.apply(problem.layout(), &mut cofactors);
     let moved = Mat::from_fn(count, 1, |i, _| unknowns[i] - reference[i]);
     let back = &f * (b.transpose() * moved);
-    let unknowns = unknowns.iter().enumerate().map(|(i, x)| x - back[(i, 0)]).collect();
-    Ok(InDatum { unknowns, cofactors })
+    let step: Vec<f64> = (0..count).map(|i| -back[(i, 0)]).collect();
+    Ok(InDatum { unknowns: problem.advanced(unknowns, &step), cofactors })
 }
 
 /// G (B^T G)^-1; None where the carriers do not carry all null vectors. B^T G is the sum over the carriers of the squares of G,

@@ -53,9 +53,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod damped;
 mod datum;
 mod distributions;
 mod loss;
+mod method;
 mod normal_equations;
 mod options;
 mod problem;
@@ -63,7 +65,6 @@ mod published;
 mod result;
 mod run;
 mod statistics;
-mod strict;
 mod trust_region;
 mod walk;
 
@@ -72,8 +73,9 @@ pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
 };
 pub use loss::Loss;
+pub use method::{Method, Published, Stop};
 pub use normal_equations::NormalEquations;
-pub use options::{Criterion, Event, Iteration, Options, Phase, Status};
+pub use options::{Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Problem};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};

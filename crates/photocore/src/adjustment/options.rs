@@ -1,42 +1,13 @@
 //! How to adjust, and what is told while it goes on.
 
 use super::loss::Loss;
-
-/// When to stop.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Criterion {
-    /// When no unknown changes by more than this fraction of its standard deviation (a priori unit weight), or when the rate of
-    /// convergence shows that none would in the next iteration. Steps that raise the sum of squares are damped
-    /// (Levenberg-Marquardt).
-    Fraction(f64),
-    /// When the weighted sum of squares changes by less than this percentage from one iteration to the next, as in the
-    /// 1987 program (GIANT guide, section 6); no damping.
-    Percent(f64),
-    /// When the corrections of some unknowns, taken as one vector, are shorter than `limit`, as in program W5344 (USGS Computer
-    /// Contribution 2, 1969); no damping. The cofactors are those of the normal equations that gave the last corrections.
-    Length {
-        /// The first of these unknowns, in the order of the layout.
-        first: usize,
-        /// How many there are.
-        count: usize,
-        /// In their units.
-        limit: f64,
-    },
-    /// When a step lowers the sum of squares, or would by the linearized equations, by less than this fraction of it. Steps are damped
-    /// from the first one on, by how well the linearized equations predict what they do (Levenberg-Marquardt with the gain
-    /// ratio of Nielsen 1999): for far starts, and for networks without a datum, whose cofactors are those of the
-    /// datum that [`super::Model::datum`] chooses.
-    Decrease(f64),
-}
-
-/// Damping of the first step of [`Criterion::Decrease`].
-pub(super) const FIRST_DAMPING: f64 = 1e-4;
+use super::method::Method;
 
 /// How to adjust. By default: squares, to a hundred-thousandth of the standard deviations, with cofactors.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
-    /// When to stop.
-    pub criterion: Criterion,
+    /// Which steps to take, and when to stop.
+    pub method: Method,
     /// Iterations at the most.
     pub max_iterations: usize,
     /// Whether to compute cofactors and redundancy numbers.
@@ -47,14 +18,14 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { criterion: Criterion::Fraction(1e-5), max_iterations: 100, covariance: true, loss: None }
+        Self { method: Method::default(), max_iterations: 100, covariance: true, loss: None }
     }
 }
 
 /// How an adjustment ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// The criterion was met.
+    /// The rule of the method was met.
     Converged,
     /// The iterations ran out.
     NotConverged,

@@ -20,6 +20,12 @@ pub trait Model: Sync {
     /// The same for the observations of a tie. Not called where the layout has no ties.
     fn observe_tie(&self, _prepared: &Self::Prepared, _tie: usize, _rows: &mut TieRows<'_>) {}
 
+    /// Applies a step to the unknowns. By default it is added; a model whose unknowns are not the numbers that the columns of its partials
+    /// belong to (an attitude that is kept in angles and steps by a rotation) says here what a step makes of them.
+    fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
+        unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+    }
+
     /// Computes the local unknowns afresh from the others, where the model knows how; false where it does not. Far from the
     /// solution this often leads back into the region where linearized steps do.
     fn relocate(&self, _unknowns: &mut [f64]) -> bool {
@@ -90,6 +96,15 @@ impl<M> Problem<M> {
     }
 }
 
+impl<M: Model> Problem<M> {
+    /// The unknowns after a step.
+    pub(super) fn advanced(&self, unknowns: &[f64], step: &[f64]) -> Vec<f64> {
+        let mut values = unknowns.to_vec();
+        self.model.advance(&mut values, step);
+        values
+    }
+}
+
 /// The equations of a problem at given values of the unknowns: weighted to unit weight, by a loss besides, without fixed unknowns.
 pub(super) struct Linearized<'a, M: Model> {
     problem: &'a Problem<M>,
@@ -115,7 +130,6 @@ impl<'a, M: Model> Linearized<'a, M> {
     /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).
     pub fn decrease(&self, pool: &ThreadPool, prior: &Prior, step: &[f64]) -> f64 {
         let layout = self.problem.layout();
-        let border = &step[layout.border_range()];
         let observed = self.problem.for_locals(pool, |buffers, local| {
             let own = &step[layout.local_range(local)];
             let mut sum = 0.0;
@@ -123,12 +137,12 @@ impl<'a, M: Model> Linearized<'a, M> {
                 let mut rows = buffers.rows(layout, group);
                 self.write(local, group, &mut rows);
                 let kept = &step[layout.kept_range(layout.kept_of(group))];
-                let common = &border[layout.border_of(group)];
+                let common: Vec<f64> = layout.common_columns(group).map(|unknown| step[unknown]).collect();
                 for row in 0..layout.rows() {
                     let part = |values: &[f64], unknowns: &[f64]| {
                         dot(&values[row * unknowns.len()..][..unknowns.len()], unknowns)
                     };
-                    let change = part(rows.local, own) + part(rows.kept, kept) + part(rows.border, common);
+                    let change = part(rows.local, own) + part(rows.kept, kept) + part(rows.common, &common);
                     sum += change * (2.0 * rows.constant[row] - change);
                 }
             }
@@ -155,17 +169,13 @@ impl<M: Model> Equations for Linearized<'_, M> {
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let layout = self.problem.layout();
         self.problem.model.observe(&self.prepared, local, group, rows);
-        let start = layout.border_range().start;
-        let border = layout.border_of(group);
         let sd = &self.problem.observation_sd[group * layout.rows()..][..layout.rows()];
-        let kept = layout.kept_range(layout.kept_of(group));
-        let mut parts = [&mut *rows.local, &mut *rows.kept, &mut *rows.border];
-        self.weight(sd, rows.constant, &mut parts);
+        self.weight(sd, rows.constant, &mut [&mut *rows.local, &mut *rows.kept, &mut *rows.common]);
         if let Some(fixed) = &self.fixed {
-            let columns = [layout.local_range(local), kept, start + border.start..start + border.end];
-            for (part, range) in parts.into_iter().zip(columns) {
-                leave_out(part, sd.len(), range.map(|unknown| fixed[unknown]));
-            }
+            let of = |unknown: usize| fixed[unknown];
+            leave_out(rows.local, sd.len(), layout.local_range(local).map(of));
+            leave_out(rows.kept, sd.len(), layout.kept_range(layout.kept_of(group)).map(of));
+            leave_out(rows.common, sd.len(), layout.common_columns(group).map(of));
         }
     }
 

@@ -6,9 +6,11 @@ use std::time::Instant;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::loss::Reweighting;
-use super::options::{Criterion, Event, FIRST_DAMPING, Iteration, Options, Phase, Status};
+use super::method::Method;
+use super::options::{Event, Iteration, Options, Phase, Status};
 use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
+use super::trust_region::FIRST_DAMPING;
 use crate::normals::{Cofactors, Factor, Inversion, Prior, Stopped};
 
 /// Whoever is told on the calling thread what is going on; breaking stops the work.
@@ -63,17 +65,16 @@ pub fn adjust<M: Model>(
         weak: vec![],
         collapsed: vec![],
     };
-    let damping = if matches!(options.criterion, Criterion::Decrease(_)) { FIRST_DAMPING } else { 0.0 };
+    let damping = if let Method::TrustRegion(_) = options.method { FIRST_DAMPING } else { 0.0 };
     let start = run.form(problem.initial.clone(), damping)?;
     if !start.sum_of_squares.is_finite() {
         return Err(AdjustError::NotFinite);
     }
     let initial_sum_of_squares = start.sum_of_squares;
-    let end = match options.criterion {
-        Criterion::Fraction(fraction) => run.strictly(start, fraction)?,
-        Criterion::Percent(percent) => run.as_published(start, percent)?,
-        Criterion::Length { first, count, limit } => run.until_short(start, first..first + count, limit)?,
-        Criterion::Decrease(fraction) => run.by_trust_region(start, fraction)?,
+    let end = match options.method {
+        Method::Full(rule) => run.full_steps(start, rule)?,
+        Method::Damped(stop) => run.damped_steps(start, stop)?,
+        Method::TrustRegion(stop) => run.in_trust_region(start, stop)?,
     };
     run.finish(end, initial_sum_of_squares)
 }
@@ -120,9 +121,20 @@ pub(super) struct End<'a, M: Model> {
 }
 
 impl<'a, M: Model> End<'a, M> {
+    /// At given values, with what their cofactors are computed from.
+    pub fn at(status: Status, unknowns: Vec<f64>, basis: Option<Basis<'a, M>>) -> Self {
+        Self { status, unknowns, basis, undetermined: None, last: None }
+    }
+
+    /// After one more step, with the cofactors of the equations that have given it.
+    pub fn after(status: Status, unknowns: Vec<f64>, solved: Solved<'a, M>, iteration: Iteration) -> Self {
+        let last = Some((iteration, solved.step));
+        Self { last, ..Self::at(status, unknowns, Some(solved.basis)) }
+    }
+
     /// Diverged to values that leave unknowns undetermined.
     pub fn lost(unknowns: Vec<f64>, undetermined: Option<AdjustError>) -> Self {
-        Self { status: Status::Diverged, unknowns, basis: None, undetermined, last: None }
+        Self { undetermined, ..Self::at(Status::Diverged, unknowns, None) }
     }
 }
 
@@ -158,7 +170,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             Ok(()) => {
                 let State { equations, prior, factor, .. } = state;
                 let basis = Some(Basis { equations, prior, factor });
-                Ok(End { status, unknowns, basis, undetermined: None, last: None })
+                Ok(End::at(status, unknowns, basis))
             }
             Err(error) => {
                 let status = if status == Status::Converged { status } else { Status::Diverged };
@@ -245,7 +257,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let problem = self.problem;
         let mut unknowns = end.unknowns.clone();
         if let Some((_, step)) = &end.last {
-            unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+            problem.model.advance(&mut unknowns, step);
         }
         let residuals = problem.residuals(self.pool, &unknowns);
         if let Some((last, _)) = end.last {

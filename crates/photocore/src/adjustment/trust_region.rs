@@ -1,11 +1,14 @@
 //! Levenberg-Marquardt: steps damped by how well the linearized equations predict what they do (Nielsen 1999; Madsen, Nielsen and
 //! Tingleff 2004, section 3.2).
 
-use super::options::{FIRST_DAMPING, Iteration, Status};
+use super::method::Stop;
+use super::options::{Iteration, Status};
 use super::problem::Model;
 use super::result::AdjustError;
-use super::run::{End, Run, State};
+use super::run::{End, Run, Solved, State};
 
+/// Damping of the first step.
+pub(super) const FIRST_DAMPING: f64 = 1e-4;
 /// Less would leave the seven pivots of a network without datum among rounding errors.
 const LEAST_DAMPING: f64 = 1e-10;
 /// With this damping a step follows the gradient; if that does not lower the sum of squares, nothing will.
@@ -21,6 +24,16 @@ const NEGLIGIBLE: f64 = 1e-6;
 struct Damping {
     value: f64,
     rise: f64,
+}
+
+/// A step that may fail.
+struct Trial {
+    unknowns: Vec<f64>,
+    sum_of_squares: f64,
+    /// By how much the linearized equations let it lower the sum of squares.
+    predicted: f64,
+    /// No unknown changes by more than this multiple of its standard deviation.
+    change: f64,
 }
 
 impl Damping {
@@ -39,14 +52,14 @@ impl Damping {
 }
 
 impl<'a, M: Model> Run<'a, '_, M> {
-    /// Damped steps until one lowers the sum of squares by less than `fraction` of it.
+    /// Steps damped by how well they are predicted.
     ///
-    /// A step counts for this when it is not much shortened, the damping being no larger than at first; where the predicted
-    /// decrease drowns in rounding errors, any does.
-    pub(super) fn by_trust_region(
+    /// A step counts for the rule that stops when it is not much shortened, the damping being no larger than at first; where the
+    /// predicted decrease drowns in rounding errors, any does.
+    pub(super) fn in_trust_region(
         &mut self,
         start: State<'a, M>,
-        fraction: f64,
+        stop: Stop,
     ) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
         let mut lowest = state.sum_of_squares;
@@ -61,31 +74,23 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 state = self.form(unknowns, damping.value)?;
                 continue;
             };
-            let predicted = solved.basis.equations.decrease(self.pool, &solved.basis.prior, &solved.step);
-            solved.basis.factor.recycle(&self.problem.system);
-            let whole = used <= FIRST_DAMPING && predicted <= fraction * lowest;
-            let trial: Vec<f64> = unknowns.iter().zip(&solved.step).map(|(x, dx)| x + dx).collect();
-            let sum_of_squares = self.objective(&trial);
-            let gain = (lowest - sum_of_squares) / predicted;
+            let trial = self.tried(&unknowns, solved);
+            let whole = used <= FIRST_DAMPING;
+            let last = whole && (stop.at_change(trial.change) || stop.at_decrease(trial.predicted, lowest));
+            let gain = (lowest - trial.sum_of_squares) / trial.predicted;
             // Written so that a gain that is not a number is a failure.
-            if gain > LEAST_GAIN && sum_of_squares <= lowest {
-                let decrease = lowest - sum_of_squares;
-                let number = self.iterations.len() + 1;
-                let iteration =
-                    Iteration { number, sum_of_squares, largest_change: solved.change, damping: used };
-                self.accept(iteration, &unknowns, &trial)?;
-                self.collapsed = self.problem.model.collapsed(&unknowns, &trial);
-                if !self.collapsed.is_empty() {
-                    let status = Status::NotConverged;
-                    return Ok(End { status, unknowns: trial, basis: None, undetermined: None, last: None });
+            if gain > LEAST_GAIN && trial.sum_of_squares <= lowest {
+                let decrease = lowest - trial.sum_of_squares;
+                if let Some(end) = self.keep(&unknowns, &trial, used)? {
+                    return Ok(end);
                 }
-                lowest = sum_of_squares;
+                lowest = trial.sum_of_squares;
                 damping.fall(gain);
-                if whole || used <= FIRST_DAMPING && decrease <= fraction * lowest {
-                    return self.rest(trial, Status::Converged);
+                if last || whole && stop.at_decrease(decrease, lowest) {
+                    return self.rest(trial.unknowns, Status::Converged);
                 }
-                state = self.form(trial, damping.value)?;
-            } else if whole || predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE) {
+                state = self.form(trial.unknowns, damping.value)?;
+            } else if last || trial.predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE) {
                 return self.rest(unknowns, Status::Converged);
             } else {
                 damping.rise();
@@ -95,11 +100,37 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.rest(state.unknowns, Status::NotConverged)
     }
 
+    /// Where a step leads, and by how much it was predicted to lower the sum of squares.
+    fn tried(&self, before: &[f64], solved: Solved<'a, M>) -> Trial {
+        let Solved { basis, step, change } = solved;
+        let predicted = basis.equations.decrease(self.pool, &basis.prior, &step);
+        basis.factor.recycle(&self.problem.system);
+        let unknowns = self.problem.advanced(before, &step);
+        let sum_of_squares = self.objective(&unknowns);
+        Trial { unknowns, sum_of_squares, predicted, change }
+    }
+
+    /// Keeps a step; the end where it has led local blocks to where they harm all others.
+    fn keep(
+        &mut self,
+        before: &[f64],
+        trial: &Trial,
+        damping: f64,
+    ) -> Result<Option<End<'a, M>>, AdjustError> {
+        let number = self.iterations.len() + 1;
+        let &Trial { sum_of_squares, change: largest_change, .. } = trial;
+        let iteration = Iteration { number, sum_of_squares, largest_change, damping };
+        self.accept(iteration, before, &trial.unknowns)?;
+        self.collapsed = self.problem.model.collapsed(before, &trial.unknowns);
+        let ends = !self.collapsed.is_empty();
+        Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone(), None)))
+    }
+
     /// Ends at the values reached, in the datum that the model chooses.
     fn rest(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a, M>, AdjustError> {
         self.datum = self.problem.model.datum(&unknowns);
         if !self.options.covariance {
-            return Ok(End { status, unknowns, basis: None, undetermined: None, last: None });
+            return Ok(End::at(status, unknowns, None));
         }
         self.curved = false;
         let state = self.form(unknowns, 0.0)?;

@@ -12,7 +12,7 @@ pub(super) struct Buffers {
     constant: Vec<f64>,
     local: Vec<f64>,
     kept: Vec<f64>,
-    border: Vec<f64>,
+    common: Vec<f64>,
 }
 
 impl Buffers {
@@ -22,12 +22,12 @@ impl Buffers {
         self.constant.resize(rows, 0.0);
         self.local.resize(rows * layout.local_dim(), 0.0);
         self.kept.resize(rows * layout.kept_dim(layout.kept_of(group)), 0.0);
-        self.border.resize(rows * layout.border_of(group).len(), 0.0);
+        self.common.resize(rows * layout.common_width(group), 0.0);
         GroupRows {
             constant: &mut self.constant,
             local: &mut self.local,
             kept: &mut self.kept,
-            border: &mut self.border,
+            common: &mut self.common,
         }
     }
 }

@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 
 use super::angle_axis::{angle_axis_rotation, right_jacobian_inverse, rotation_angle_axis};
-use super::rotation::rotation;
+use super::rotation::{nearest_turns, rotation, rotation_angles};
 use super::{Matrix3, Vector3};
 
 /// The sense of omega, phi, kappa.
@@ -18,6 +18,29 @@ pub enum RotationSense {
     GroundToPhoto,
     /// u = M^T d
     PhotoToGround,
+}
+
+impl RotationSense {
+    /// omega, phi, kappa of A Exp(rho), A being the attitude of the given ones.
+    ///
+    /// Of all angles that give the matrix (whole turns; 180 degrees - phi with omega and kappa half a turn on) those nearest to the
+    /// given: a photo does not change its angles because phi passes 90 degrees. They give the matrix to rounding there, too.
+    ///
+    /// ```
+    /// use photocore::geometry::{RotationSense, Vector3};
+    ///
+    /// let rho = Vector3::new(0.0, 0.02, 0.0);
+    /// let [omega, phi, kappa] = RotationSense::GroundToPhoto.stepped([0.0, 1.56, 0.0], &rho);
+    /// assert!((phi - 1.58).abs() < 1e-14 && omega.abs() < 1e-12 && kappa.abs() < 1e-12);
+    /// ```
+    pub fn stepped(self, angles: [f64; 3], rho: &Vector3) -> [f64; 3] {
+        let numbers = AttitudeNumbers::OmegaPhiKappa(self);
+        let found = numbers.regular_numbers(&(numbers.attitude(angles) * angle_axis_rotation(rho)));
+        let other = [found[0] + PI, PI - found[1], found[2] + PI];
+        let [found, other] = [found, other].map(|triple| nearest_turns(triple, angles));
+        let apart = |triple: &[f64; 3]| (Vector3::from(*triple) - Vector3::from(angles)).norm_squared();
+        if apart(&other) < apart(&found) { other } else { found }
+    }
 }
 
 /// Vision axes (x right, y down, z forward) from photo axes, and back.
@@ -121,12 +144,9 @@ impl AttitudeNumbers {
     fn regular_numbers(&self, a: &Matrix3) -> [f64; 3] {
         // M = A^T: m_ij = a_ji
         let m = |i: usize, j: usize| a[(j - 1, i - 1)];
-        let sequential = |m: &dyn Fn(usize, usize) -> f64| {
-            [(-m(3, 2)).atan2(m(3, 3)), m(3, 1).atan2(m(1, 1).hypot(m(2, 1))), (-m(2, 1)).atan2(m(1, 1))]
-        };
         match self {
-            Self::OmegaPhiKappa(RotationSense::GroundToPhoto) => sequential(&m),
-            Self::OmegaPhiKappa(RotationSense::PhotoToGround) => sequential(&|i, j| a[(i - 1, j - 1)]),
+            Self::OmegaPhiKappa(RotationSense::GroundToPhoto) => rotation_angles(&a.transpose()),
+            Self::OmegaPhiKappa(RotationSense::PhotoToGround) => rotation_angles(a),
             Self::PhiOmegaKappa => {
                 [m(3, 1).atan2(m(3, 3)), (-m(3, 2)).atan2(m(1, 2).hypot(m(2, 2))), m(1, 2).atan2(m(2, 2))]
             }
@@ -210,4 +230,9 @@ fn wrapped(angle: f64) -> f64 {
 /// The partials of the unit quaternion w, x, y, z of A with respect to rho: dq = 1/2 q (0, rho), as the rows of w, x, y, z.
 pub fn quaternion_by_step([w, x, y, z]: [f64; 4]) -> [Vector3; 4] {
     [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]].map(|row| 0.5 * Vector3::from(row))
+}
+
+/// The same of R = F A^T, vision from object (COLMAP's): dq = 1/2 (0, -F rho) q, F being [`vision_axes`].
+pub fn vision_quaternion_by_step([w, x, y, z]: [f64; 4]) -> [Vector3; 4] {
+    [[-x, -y, -z], [w, z, -y], [-z, w, x], [y, -x, w]].map(|[a, b, c]| 0.5 * Vector3::new(-a, b, c))
 }

@@ -20,9 +20,6 @@ pub enum NetworkError {
     /// A camera has more or fewer standard deviations than parameters.
     #[error("camera {0} has not as many standard deviations as parameters")]
     CameraDeviations(usize),
-    /// Several photos share a camera that is not held.
-    #[error("camera {0} has unknown parameters and belongs to several photos")]
-    SharedCamera(usize),
     /// An observation that contradicts itself or the network.
     #[error("observation {index}, of kind {kind}, {fault}")]
     Observation {
@@ -45,9 +42,9 @@ pub enum NetworkError {
     /// Points whose image points do not determine them.
     #[error("{} points are not determined by their image points", .0.len())]
     UndeterminedPoints(Vec<usize>),
-    /// Photos whose unknowns the observations do not determine; one list for each undetermined combination.
-    #[error("{} combinations of the photos' unknowns are not determined", .0.len())]
-    UndeterminedPhotos(Vec<Vec<usize>>),
+    /// Combinations of the unknowns of photos and of cameras that the observations do not determine.
+    #[error("{} combinations of the unknowns of photos and cameras are not determined", .0.len())]
+    Undetermined(Vec<Combination>),
     /// The initial values put a point into the plane of a projection centre, so that its image is not finite.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
@@ -73,6 +70,15 @@ pub enum NetworkError {
     Layout(#[from] LayoutError),
 }
 
+/// What a combination of unknowns moves.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Combination {
+    /// Photos, by their pose or a camera that is theirs alone.
+    pub photos: Vec<usize>,
+    /// Cameras that several photos share.
+    pub cameras: Vec<usize>,
+}
+
 impl NetworkError {
     /// What stopped the adjustment, in terms of the network.
     pub(super) fn new(error: AdjustError, assembled: &Assembled) -> Self {
@@ -90,19 +96,25 @@ impl NetworkError {
         }
     }
 
-    /// Combinations of kept blocks: those that move photos by these, else the points that they move.
+    /// Combinations of kept blocks: those that move photos and cameras by these, else the points that they move.
     fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
         let model = &assembled.problem.model;
-        let photos = model.cameras.len();
-        let of_photos: Vec<Vec<usize>> = combinations
-            .iter()
-            .map(|blocks| blocks.iter().copied().filter(|&block| block < photos).collect())
-            .filter(|blocks: &Vec<usize>| !blocks.is_empty())
-            .collect();
-        if !of_photos.is_empty() {
-            return Self::UndeterminedPhotos(of_photos);
+        let (photos, stations) = (model.cameras.len(), model.stations());
+        let of_stations = |blocks: &Vec<usize>| {
+            let mut found = Combination::default();
+            for &block in blocks.iter().filter(|&&block| block < stations) {
+                match block.checked_sub(photos) {
+                    None => found.photos.push(block),
+                    Some(shared) => found.cameras.push(model.shared[shared]),
+                }
+            }
+            (found != Combination::default()).then_some(found)
+        };
+        let found: Vec<Combination> = combinations.iter().filter_map(of_stations).collect();
+        if !found.is_empty() {
+            return Self::Undetermined(found);
         }
-        let point = |block: usize| assembled.points[model.locals + block - photos];
+        let point = |block: usize| assembled.points[model.locals + block - stations];
         let mut points: Vec<usize> = combinations.into_iter().flatten().map(point).collect();
         points.sort_unstable();
         points.dedup();

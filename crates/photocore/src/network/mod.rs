@@ -50,6 +50,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod cameras;
 mod error;
 mod model;
 mod neighbourhood;
@@ -68,7 +69,8 @@ use crate::adjustment::{self, Adjustment, Event};
 use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
-pub use error::NetworkError;
+pub use cameras::AdjustedCamera;
+pub use error::{Combination, NetworkError};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub use screening::{Dropped, Reason};
@@ -92,7 +94,7 @@ pub struct Photo {
 pub struct Camera {
     /// The camera with its initial (and, where weighted, observed) parameters.
     pub camera: geometry::Camera,
-    /// Standard deviations of the parameters: infinite free, zero fixed. A camera with other ones than zeros belongs to one photo.
+    /// Standard deviations of the parameters: infinite free, zero fixed.
     pub sd: Vec<f64>,
 }
 
@@ -265,16 +267,14 @@ impl Network {
         if let Some(bad) = self.images.iter().position(outside) {
             return Err(NetworkError::Index(bad));
         }
-        let mut users = vec![0_usize; self.cameras.len()];
         for (index, photo) in self.photos.iter().enumerate() {
-            *users.get_mut(photo.camera).ok_or(NetworkError::NoCamera(index))? += 1;
+            if photo.camera >= self.cameras.len() {
+                return Err(NetworkError::NoCamera(index));
+            }
         }
-        for (index, (camera, users)) in self.cameras.iter().zip(users).enumerate() {
+        for (index, camera) in self.cameras.iter().enumerate() {
             if camera.sd.len() != camera.camera.parameter_names().len() {
                 return Err(NetworkError::CameraDeviations(index));
-            }
-            if users > 1 && !camera.is_held() {
-                return Err(NetworkError::SharedCamera(index));
             }
         }
         for (index, observation) in self.observations.iter().enumerate() {

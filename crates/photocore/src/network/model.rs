@@ -9,13 +9,14 @@ use super::{Image, Point};
 use crate::adjustment::Model;
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
-    self, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction, Vertical,
+    self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
+    RotationSense, Vector3, Vertical,
 };
 use crate::normals::{GroupRows, Tie, TieRows};
 
 /// Images of points by photos, and other observations of these: the local blocks are the points that no such observation touches, the
-/// kept blocks the photos with their pose and, unless it is held, their camera, then all other points. The images of these are ties,
-/// and so are the observations, in this order.
+/// kept blocks the photos with their pose and, unless it is held or shared, their camera, then the cameras that several photos share,
+/// then all other points. The images of these are ties, and so are the observations, in this order.
 #[derive(Debug)]
 pub struct Bundle {
     pub space: ObjectSpace,
@@ -24,8 +25,13 @@ pub struct Bundle {
     pub refraction: Option<Refraction>,
     /// Of each photo, with the parameters that it starts from.
     pub cameras: Vec<Camera>,
-    /// The unknowns of photo i are `first[i]..first[i + 1]` of the kept ones: six of the pose, then those of the camera.
+    /// The unknowns of kept block i are `first[i]..first[i + 1]` of the kept ones: photos (six of the pose, then those of a camera of
+    /// their own), then shared cameras.
     pub first: Vec<usize>,
+    /// The cameras that several photos share, as the network numbers them.
+    pub shared: Vec<usize>,
+    /// The kept block of each photo's camera where that is shared.
+    pub camera_block: Vec<Option<usize>>,
     /// What coordinates are counted from.
     pub origin: [f64; 3],
     /// The points, local ones first; coordinates counted from the origin.
@@ -40,6 +46,8 @@ pub struct Bundle {
     pub order: Vec<usize>,
     /// How many images each photo has.
     pub images_on: Vec<usize>,
+    /// Which photos step by a rotation vector about their own axes: those with free angles.
+    pub turning: Vec<bool>,
     /// What else was observed.
     pub observations: Vec<TiedObservation>,
     /// Whether the position of anything is weighted, fixed or observed: then the datum is the user's.
@@ -102,7 +110,7 @@ fn write<C: CameraModel>(
 ) {
     let u = orientation.sight(point);
     let projection = orientation.projection(&u, &camera.linearize(&u), point);
-    let width = rows.kept.len() / 2;
+    let (width, shared) = (rows.kept.len() / 2, rows.common.len() / 2);
     for row in 0..2 {
         rows.constant[row] = image.xy[row] - projection.xy[row];
         rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
@@ -110,6 +118,11 @@ fn write<C: CameraModel>(
         if width > 6 {
             rows.kept[width * row + 6..][..width - 6].copy_from_slice(projection.camera[row].as_ref());
         }
+    }
+    if shared > 0 {
+        (0..2).for_each(|row| {
+            rows.common[shared * row..][..shared].copy_from_slice(projection.camera[row].as_ref());
+        });
     }
 }
 
@@ -130,33 +143,73 @@ struct Approach {
     share: f64,
 }
 
+/// What the points that a photo sees have as shares in what its station learns.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shares {
+    sum: f64,
+    largest: f64,
+}
+
+impl Shares {
+    fn add(&mut self, share: f64) {
+        self.sum += share;
+        self.largest = self.largest.max(share);
+    }
+
+    /// A share in those of the others in the mean, of so many images; None unless it is much larger.
+    fn ratio(&self, own: f64, images: usize) -> Option<f64> {
+        let others = (self.sum - own).max(0.0) / (images as f64 - 1.0).max(1.0);
+        (others > 0.0 && own > ON_ITS_WAY * others).then(|| own / others)
+    }
+}
+
 impl Bundle {
-    /// The unknowns that are those of photos, of all.
-    pub fn of_photos(&self) -> Range<usize> {
+    /// The unknowns that are those of photos and shared cameras, of all.
+    pub fn of_stations(&self) -> Range<usize> {
         let start = 3 * self.locals;
-        start..start + self.first[self.cameras.len()]
+        start..start + self.first[self.stations()]
+    }
+
+    /// Number of photos and shared cameras: the first kept blocks.
+    pub fn stations(&self) -> usize {
+        self.first.len() - 1
+    }
+
+    /// The unknowns of a photo or shared camera, of all.
+    pub fn of_block(&self, block: usize) -> Range<usize> {
+        let start = 3 * self.locals;
+        start + self.first[block]..start + self.first[block + 1]
+    }
+
+    /// Whether a photo has a camera with unknown parameters that is no other's.
+    pub fn has_own_camera(&self, photo: usize) -> bool {
+        self.of_block(photo).len() > 6
     }
 
     /// Where the coordinates of a point stand among the unknowns.
     pub fn of_point(&self, point: usize) -> Range<usize> {
-        let start = if point < self.locals { 0 } else { self.of_photos().len() };
+        let start = if point < self.locals { 0 } else { self.of_stations().len() };
         start + 3 * point..start + 3 * point + 3
     }
 
     /// The coordinates of all points, counted from the origin, at given values of the unknowns.
     pub fn coordinates<'a>(&self, unknowns: &'a [f64]) -> impl Iterator<Item = &'a [f64; 3]> + use<'a> {
-        let photos = self.of_photos();
+        let photos = self.of_stations();
         let (local, tied) = (&unknowns[..photos.start], &unknowns[photos.end..]);
         local.as_chunks().0.iter().chain(tied.as_chunks().0)
     }
 
     /// The ties: images of points that are not local, then observations.
     pub fn ties(&self) -> Vec<Tie> {
-        let photos = self.cameras.len();
-        let block = |&point: &usize| (photos + point - self.locals) as u32;
+        let block = |&point: &usize| (self.stations() + point - self.locals) as u32;
         let images = self.images[self.start[self.locals]..].iter().enumerate().map(|(tie, image)| {
             let point = self.point_of(self.start[self.locals] + tie);
-            Tie { rows: 2, kept: vec![block(&point), image.photo as u32], border: 0..0 }
+            let camera = self.camera_block[image.photo].map(|block| block as u32);
+            Tie {
+                rows: 2,
+                kept: [block(&point), image.photo as u32].into_iter().chain(camera).collect(),
+                border: 0..0,
+            }
         });
         let observations = self.observations.iter().map(|tied| Tie {
             rows: tied.root.nrows(),
@@ -178,29 +231,53 @@ impl Bundle {
 
     /// Writes the equations of an image whose point is not local.
     fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut TieRows<'_>) {
-        let width = rows.coefficients.len() / 2 - 3;
-        let (mut local, mut kept) = ([0.0; 6], vec![0.0; 2 * width]);
-        let mut apart =
-            GroupRows { constant: &mut *rows.constant, local: &mut local, kept: &mut kept, border: &mut [] };
+        let all = rows.coefficients.len() / 2;
+        let width = self.of_block(self.images[image].photo).len();
+        let shared = all - 3 - width;
+        let (mut local, mut kept, mut common) = ([0.0; 6], vec![0.0; 2 * width], vec![0.0; 2 * shared]);
+        let constant = &mut *rows.constant;
+        let mut apart = GroupRows { constant, local: &mut local, kept: &mut kept, common: &mut common };
         self.observe(stations, self.point_of(image), image, &mut apart);
-        for (row, both) in rows.coefficients.chunks_exact_mut(3 + width).enumerate() {
-            both[..3].copy_from_slice(&local[3 * row..][..3]);
-            both[3..].copy_from_slice(&kept[width * row..][..width]);
+        for (row, together) in rows.coefficients.chunks_exact_mut(all).enumerate() {
+            together[..3].copy_from_slice(&local[3 * row..][..3]);
+            together[3..3 + width].copy_from_slice(&kept[width * row..][..width]);
+            together[3 + width..].copy_from_slice(&common[shared * row..][..shared]);
         }
     }
 
-    /// The photos at given values of their unknowns.
+    /// The photos at given values of the unknowns of photos and shared cameras.
     pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
         let photo = |photo: usize| {
             let (pose, camera) = unknowns[self.first[photo]..self.first[photo + 1]].split_at(6);
             let pose = std::array::from_fn(|k| pose[k]);
-            let own = self.cameras[photo];
+            let shared = self.camera_block[photo].map(|block| self.first[block]..self.first[block + 1]);
+            let (own, camera) = (self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
             Station {
-                orientation: Orientation::new(self.poses, self.space, &pose),
+                orientation: self.orientation(photo, &pose),
                 camera: own.with_parameters(camera).unwrap_or(own),
             }
         };
         (0..self.cameras.len()).map(photo).collect()
+    }
+
+    /// The orientation of a photo, its pose given, with the columns of its unknowns.
+    fn orientation(&self, photo: usize, pose: &[f64; 6]) -> Orientation {
+        let [x, y, z, omega, phi, kappa] = *pose;
+        match self.turning_sense(photo) {
+            Some(sense) => {
+                let local = AttitudeNumbers::OmegaPhiKappa(sense).attitude([omega, phi, kappa]);
+                Orientation::stepping(self.space, [x, y, z], &local)
+            }
+            None => Orientation::new(self.poses, self.space, pose),
+        }
+    }
+
+    /// The sense of the angles of a photo that steps by a rotation vector; None for all others.
+    pub fn turning_sense(&self, photo: usize) -> Option<RotationSense> {
+        match self.poses {
+            PoseNumbers::Angles(sense) if self.turning[photo] => Some(sense),
+            PoseNumbers::Angles(_) | PoseNumbers::Vectors => None,
+        }
     }
 
     /// The images of a point.
@@ -217,16 +294,18 @@ impl Bundle {
             let centre = stations.photos[image.photo].orientation.centre();
             (stations.points[point].position() - centre).norm_squared().recip()
         };
-        let mut shares = vec![0.0; stations.photos.len()];
+        let mut shares = vec![Shares::default(); stations.photos.len()];
         for point in 0..self.points.len() {
-            self.images_of(point).iter().for_each(|image| shares[image.photo] += share(point, image));
+            self.images_of(point).iter().for_each(|image| shares[image.photo].add(share(point, image)));
+        }
+        let has_near = |(shares, &images): (&Shares, &usize)| shares.ratio(shares.largest, images).is_some();
+        if !shares.iter().zip(&self.images_on).any(has_near) {
+            return vec![];
         }
         let approach = |point: usize, image: &Image| {
-            let own = share(point, image);
-            let others =
-                (shares[image.photo] - own).max(0.0) / (self.images_on[image.photo] as f64 - 1.0).max(1.0);
-            let near = others > 0.0 && own > ON_ITS_WAY * others;
-            near.then(|| Approach { point, photo: image.photo, share: own / others })
+            let photo = image.photo;
+            let share = shares[photo].ratio(share(point, image), self.images_on[photo])?;
+            Some(Approach { point, photo, share })
         };
         let of_point = |point| self.images_of(point).iter().filter_map(move |image| approach(point, image));
         (0..self.points.len()).flat_map(of_point).collect()
@@ -257,8 +336,8 @@ impl Model for Bundle {
     type Prepared = Stations;
 
     fn prepare(&self, unknowns: &[f64]) -> Stations {
-        let photos = &unknowns[self.of_photos()];
-        let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_photos().end..]);
+        let photos = &unknowns[self.of_stations()];
+        let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
         let tied = tied.as_chunks().0.to_vec();
         let refracted = self.refraction.map(|refraction| Refracted {
             refraction,
@@ -280,9 +359,22 @@ impl Model for Bundle {
         Stations { photos: self.photos(photos), points, tied, refracted }
     }
 
+    /// Angles of photos that step by a rotation vector go by way of their matrix.
+    fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
+        let start = self.of_stations().start + 3;
+        let turn = |photo: usize| {
+            let (first, sense) = (start + self.first[photo], self.turning_sense(photo)?);
+            let [angles, rho] = [&*unknowns, step].map(|values| std::array::from_fn(|k| values[first + k]));
+            Some((first, sense.stepped(angles, &Vector3::from(rho))))
+        };
+        let turned: Vec<(usize, [f64; 3])> = (0..self.cameras.len()).filter_map(turn).collect();
+        unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+        turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
+    }
+
     /// Intersects the points anew.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
-        let photos = self.of_photos();
+        let photos = self.of_stations();
         let Ok(coordinates) = self.intersect(&self.photos(&unknowns[photos.clone()])) else { return false };
         let (local, tied) = coordinates.split_at(self.locals);
         unknowns[..photos.start].copy_from_slice(local.as_flattened());
@@ -329,7 +421,7 @@ impl Model for Bundle {
     /// The pose of the first photo and, unless an observation gives the scale, the component of another's position or translation that
     /// changes most when the scale does.
     fn datum(&self, unknowns: &[f64]) -> Vec<usize> {
-        let kept = self.of_photos();
+        let kept = self.of_stations();
         let photos = self.photos(&unknowns[kept.clone()]);
         let with_images = || (0..photos.len()).filter(|&photo| self.images_on[photo] > 0);
         let (false, Some(first)) = (self.placed, with_images().next()) else { return vec![] };

@@ -2,10 +2,15 @@
 
 use std::ops::Range;
 
+use nalgebra::DMatrix;
+
 use super::problem::Assembled;
-use super::{AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options, Point, UnitVariance};
+use super::{
+    AdjustedCamera, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options, Point,
+    UnitVariance,
+};
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
-use crate::geometry::PoseNumbers;
+use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::network::model::Bundle;
 
 /// An adjusted photo.
@@ -15,7 +20,7 @@ pub struct AdjustedPhoto {
     pub pose: [f64; 6],
     /// The parameters of its camera.
     pub camera: Vec<f64>,
-    /// Cofactors (a priori unit weight) of pose and, unless it is held, camera, row by row; NaN where there are none.
+    /// Cofactors (a priori unit weight) of pose and, unless it is held or shared, camera, row by row; NaN where there are none.
     pub cofactors: Vec<f64>,
     /// Redundancy numbers of these unknowns as observations of themselves; zero unless weighted, NaN where there are no cofactors.
     pub redundancy: Vec<f64>,
@@ -70,6 +75,8 @@ impl SumsOfSquares {
 pub struct Solution {
     /// The photos.
     pub photos: Vec<AdjustedPhoto>,
+    /// The cameras.
+    pub cameras: Vec<AdjustedCamera>,
     /// For every iteration, the corrections of the unknowns of all photos, one photo after the other.
     pub photo_corrections: Vec<Vec<f64>>,
     /// The points; None for those that were left out.
@@ -87,6 +94,8 @@ pub struct Solution {
     /// What a combination of unknowns moves that is determined so weakly that no step could follow it to its end, photo and
     /// unknown (0 to 5: pose, then camera); none where the adjustment ended otherwise.
     pub weak: Vec<(usize, usize)>,
+    /// The same for cameras that several photos share, camera and parameter.
+    pub weak_cameras: Vec<(usize, usize)>,
     /// What was held to give the cofactors a datum: photo and unknown.
     pub datum: Vec<(usize, usize)>,
     /// The points that were left out at first.
@@ -127,10 +136,12 @@ impl Solution {
         for (group, &image) in problem.model.order.iter().enumerate() {
             images[image] = Some(adjustment.observed(group, network.images[image].sd));
         }
-        let photos_end = problem.model.of_photos().len();
+        let photos_end = problem.model.first[network.photos.len()];
         let of_photo = |&unknown: &usize| of_photo(problem, unknown);
+        let photos = photos(network, assembled, &adjustment, &unknowns);
         let mut solution = Self {
-            photos: photos(network, assembled, &adjustment, &unknowns),
+            cameras: network.adjusted_cameras(assembled, &adjustment, &unknowns, &photos),
+            photos,
             photo_corrections: adjustment.corrections().map(|all| all[..photos_end].to_vec()).collect(),
             points: adjusted_points(network, assembled, &adjustment, &unknowns),
             images,
@@ -139,6 +150,7 @@ impl Solution {
             behind: vec![],
             undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, assembled)),
             weak: adjustment.weak.iter().filter_map(of_photo).collect(),
+            weak_cameras: adjustment.weak.iter().filter_map(|&unknown| of_camera(problem, unknown)).collect(),
             datum: adjustment.datum.iter().filter_map(of_photo).collect(),
             dropped: dropped.clone(),
             collapsed,
@@ -156,7 +168,7 @@ impl Solution {
     /// Finds the images whose point stands behind the camera.
     fn find_behind(&mut self, Assembled { problem, points, .. }: &Assembled, unknowns: &[f64]) {
         let model = &problem.model;
-        let photos = model.photos(&unknowns[model.of_photos()]);
+        let photos = model.photos(&unknowns[model.of_stations()]);
         for ((&point, &at), images) in
             points.iter().zip(model.coordinates(unknowns)).zip(model.start.windows(2))
         {
@@ -174,12 +186,25 @@ impl Solution {
     }
 }
 
-/// The photo and the number of one of its unknowns; None for unknowns of points.
+/// The photo and the number of one of its unknowns; None for unknowns of anything else.
 fn of_photo(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
-    let model = &problem.model;
-    let kept = unknown.checked_sub(model.of_photos().start).filter(|&kept| kept < model.of_photos().len())?;
-    let photo = model.first.partition_point(|&start| start <= kept) - 1;
-    Some((photo, kept - model.first[photo]))
+    let (block, number) = of_block(problem, unknown)?;
+    (block < problem.model.cameras.len()).then_some((block, number))
+}
+
+/// The shared camera and the number of one of its parameters; None for unknowns of anything else.
+fn of_camera(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
+    let (block, parameter) = of_block(problem, unknown)?;
+    let shared = block.checked_sub(problem.model.cameras.len())?;
+    Some((problem.model.shared[shared], parameter))
+}
+
+/// The photo or shared camera, and the number of one of its unknowns; None for unknowns of points.
+fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
+    let all = model.of_stations();
+    let kept = all.contains(&unknown).then(|| unknown - all.start)?;
+    let block = model.first.partition_point(|&start| start <= kept) - 1;
+    Some((block, kept - model.first[block]))
 }
 
 /// The observations beside images.
@@ -209,7 +234,7 @@ fn photos(
     unknowns: &[f64],
 ) -> Vec<AdjustedPhoto> {
     let model = &problem.model;
-    let (locals, origin) = (model.of_photos().start, model.origin);
+    let (locals, origin) = (model.of_stations().start, model.origin);
     let positions = if let PoseNumbers::Angles(_) = network.poses { 3 } else { 0 };
     let mut start = 0;
     let photo = |(index, photo): (usize, &super::Photo)| {
@@ -217,8 +242,10 @@ fn photos(
         let values = &unknowns[first..end];
         let (count, given) = ((end - first).pow(2), start);
         start += count;
+        let angles = reported_angles(model, index, values);
         let absolute = |k: usize| {
             let counted = if k < positions { values[k] + origin[k] } else { values[k] };
+            let counted = angles.filter(|_| k >= 3).map_or(counted, |angles| angles[k - 3]);
             // Fixed ones as they were given, to the last bit.
             if k < positions && photo.sd[k] == 0.0 { photo.pose[k] } else { counted }
         };
@@ -228,15 +255,44 @@ fn photos(
         let redundancy = adjustment.prior_redundancy.as_ref();
         AdjustedPhoto {
             pose: std::array::from_fn(absolute),
-            camera: if values.len() > 6 { values[6..].to_vec() } else { model.cameras[index].parameters() },
-            cofactors: cofactors
-                .map_or_else(|| vec![f64::NAN; count], |all| all.kept[given..given + count].to_vec()),
+            camera: match model.camera_block[index] {
+                Some(block) => unknowns[model.of_block(block)].to_vec(),
+                None if values.len() > 6 => values[6..].to_vec(),
+                None => model.cameras[index].parameters(),
+            },
+            cofactors: cofactors.map_or_else(
+                || vec![f64::NAN; count],
+                |all| in_angles(model, index, values, &all.kept[given..given + count]),
+            ),
             redundancy: redundancy
                 .map_or_else(|| vec![f64::NAN; end - first], |all| all[first..end].to_vec()),
             images: model.images_on[index],
         }
     };
     network.photos.iter().enumerate().map(photo).collect()
+}
+
+/// The angles of a photo that steps by a rotation vector; at a singular attitude kappa is zero and omega takes the sum.
+fn reported_angles(model: &Bundle, photo: usize, values: &[f64]) -> Option<[f64; 3]> {
+    let numbers = AttitudeNumbers::OmegaPhiKappa(model.turning_sense(photo)?);
+    let angles = [values[3], values[4], values[5]];
+    Some(if numbers.is_singular(angles) { numbers.numbers(&numbers.attitude(angles)) } else { angles })
+}
+
+/// Cofactors of a photo's unknowns: where its attitude has stepped by a rotation vector rho = K d(angles), taken to the angles by
+/// diag(I, K^-1, I). NaN for angles that are not determined, phi being 90 degrees.
+fn in_angles(model: &Bundle, photo: usize, values: &[f64], cofactors: &[f64]) -> Vec<f64> {
+    let Some(sense) = model.turning_sense(photo) else { return cofactors.to_vec() };
+    let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [values[3], values[4], values[5]]);
+    let inverse = numbers.rates(angles).try_inverse().filter(|_| !numbers.is_singular(angles));
+    let inverse = inverse.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
+    let width = values.len();
+    let mut found = DMatrix::from_row_slice(width, width, cofactors);
+    let rows = inverse * found.fixed_rows::<3>(3);
+    found.fixed_rows_mut::<3>(3).copy_from(&rows);
+    let columns = found.fixed_columns::<3>(3) * inverse.transpose();
+    found.fixed_columns_mut::<3>(3).copy_from(&columns);
+    ((&found + found.transpose()) / 2.0).as_slice().to_vec()
 }
 
 fn adjusted_points(
@@ -287,13 +343,13 @@ fn sums_of_squares(
     unknowns: &[f64],
     observations: &[Option<AdjustedObservation>],
 ) -> SumsOfSquares {
-    let photos = problem.model.of_photos();
+    let stations = problem.model.of_stations();
     let squares = |range: Range<usize>| range.map(|i| problem.prior_square(i, unknowns[i])).sum::<f64>();
     let rows = problem.layout().rows();
     let of_images = &problem.observation_sd[..rows * problem.model.images.len()];
     SumsOfSquares {
-        camera: squares(photos.clone()),
-        ground: squares(0..photos.start) + squares(photos.end..unknowns.len()),
+        camera: squares(stations.clone()),
+        ground: squares(0..stations.start) + squares(stations.end..unknowns.len()),
         plates: adjustment.reweighted_sum_of_squares(of_images, rows),
         observations: observations.iter().flatten().fold(0.0, |sum, own| sum + own.square),
     }
@@ -307,8 +363,8 @@ fn degrees_of_freedom(
     adjustment: &Adjustment,
 ) -> i64 {
     let counts = adjustment.counts;
-    let photos = problem.model.of_photos();
-    let weighted_cameras = photos.filter(|&unknown| problem.is_weighted(unknown)).count();
+    let stations = problem.model.of_stations();
+    let weighted_cameras = stations.filter(|&unknown| problem.is_weighted(unknown)).count();
     let weighted = match unit_variance {
         UnitVariance::Constrained => counts.weighted,
         UnitVariance::Free | UnitVariance::Unity => counts.weighted - weighted_cameras,

@@ -9,10 +9,10 @@ use super::equations::{Equations, Prior};
 use super::incidence::Stacks;
 use super::layout::Layout;
 use super::selected::SelectedInverse;
-use super::stack::{Slot, Stack, dot};
+use super::stack::{Part, Slot, Stack, dot};
 use super::system::System;
 use super::tie_equations::TieEquations;
-use super::vectorised::{Kernel, run, size};
+use super::vectorised::{Kernel, Rows, run, size};
 use super::watch::Control;
 use super::workspace::zeros;
 
@@ -114,7 +114,7 @@ impl AtHome {
             for run in stacks.iter().take_while(|_| !control.stopped()) {
                 stack.gather(system, equations, run);
                 stack.eliminate(layout, prior, 0.0);
-                others.gather(&stack, front, height, system.border_row(index));
+                others.gather(&stack, front, height);
                 others.cofactors(&stack, layout, &mut part);
                 control.count(run.len());
             }
@@ -160,11 +160,11 @@ fn ties_at_home<E: Equations>(
     found
 }
 
-/// Everything that the local blocks of a stack are tied to: kept blocks in the order of the slots, then segments of the border.
+/// Everything that the local blocks of a stack are tied to: main blocks in the order of the slots, then segments.
 #[derive(Default)]
 struct Others {
     /// The first row in the front, the first row here and the width of each.
-    parts: Vec<(usize, usize, usize)>,
+    strips: Vec<(usize, usize, usize)>,
     width: usize,
     /// Q, the inverse over them, full square.
     inverse: Vec<f64>,
@@ -176,26 +176,25 @@ struct Others {
 
 impl Others {
     /// Collects the inverse over everything that a stack is tied to; it stays as it is where the last stack was tied to the same.
-    fn gather(&mut self, stack: &Stack, front: &[f64], height: usize, border: usize) {
+    fn gather(&mut self, stack: &Stack, front: &[f64], height: usize) {
         let slots = stack.slots.iter().map(|slot| (slot.row, slot.dim));
-        let segments = stack.segments.iter();
-        let segments = segments.map(|segment| (border + segment.border.start, segment.border.len()));
+        let segments = stack.segments.iter().map(|segment| (segment.row, segment.unknowns.len()));
         let all = slots.chain(segments);
-        if self.parts.iter().map(|&(row, _, width)| (row, width)).eq(all.clone()) {
+        if self.strips.iter().map(|&(row, _, width)| (row, width)).eq(all.clone()) {
             return;
         }
-        self.parts.clear();
+        self.strips.clear();
         self.width = 0;
         for (row, width) in all {
-            self.parts.push((row, self.width, width));
+            self.strips.push((row, self.width, width));
             self.width += width;
         }
         self.inverse.resize(self.width * self.width, 0.0);
-        for &(from_column, to_column, columns) in &self.parts {
+        for &(from_column, to_column, columns) in &self.strips {
             for k in 0..columns {
                 let source = &front[(from_column + k) * height..][..height];
                 let target = &mut self.inverse[(to_column + k) * self.width..][..self.width];
-                for &(from_row, to_row, rows) in &self.parts {
+                for &(from_row, to_row, rows) in &self.strips {
                     target[to_row..to_row + rows].copy_from_slice(&source[from_row..from_row + rows]);
                 }
             }
@@ -230,7 +229,7 @@ impl Others {
             }
         }
         found.local.extend_from_slice(own.as_flattened());
-        for (slot, &(_, start, _)) in stack.slots.iter().zip(&self.parts) {
+        for (slot, &(_, start, _)) in stack.slots.iter().zip(&self.strips) {
             for (k, p) in slot.groups.clone().enumerate() {
                 for row in 0..size::<R>(rows) {
                     found.equations.push(self.equation::<R, L, D>(
@@ -266,18 +265,33 @@ impl Others {
             let tied = dot(&self.hq[d * self.width + start..][..dim], kept.1);
             q += a[d] * (dot(&own[d], a) - 2.0 * tied);
         }
-        let place = &stack.places[p];
-        if !place.border.is_empty() {
-            let (width, segment) = (place.border.len(), place.segment);
-            let shift = place.border.start - stack.segments[segment].border.start;
-            let start = self.parts[stack.slots.len() + segment].1 + shift;
-            let common = (start, &stack.border_rows(t, p, rows)[row * width..][..width]);
+        for (index, part) in stack.parts(p).iter().enumerate() {
+            let common = self.common(stack, (t, p, row), rows, part);
             q += self.product(common, common) + 2.0 * self.product(kept, common);
             for d in 0..L {
-                q -= 2.0 * a[d] * dot(&self.hq[d * self.width + start..][..width], common.1);
+                q -= 2.0 * a[d] * dot(&self.hq[d * self.width + common.0..][..common.1.len()], common.1);
+            }
+            for other in &stack.parts(p)[..index] {
+                q += 2.0 * self.product(common, self.common(stack, (t, p, row), rows, other));
             }
         }
         q
+    }
+
+    /// Where a part of what group `p` of the pattern has in common with others stands here, and its coefficients in one row, for local
+    /// block `t` of the stack.
+    #[inline(always)]
+    fn common<'s>(
+        &self,
+        stack: &'s Stack,
+        (t, p, row): (usize, usize, usize),
+        rows: usize,
+        part: &Part,
+    ) -> (usize, &'s [f64]) {
+        let equation = t * rows + row;
+        let Rows { values, width, .. } = stack.part_rows(p, part, equation..equation + 1).rows;
+        let start = self.strips[stack.slots.len() + part.segment].1 + part.shift;
+        (start, &values[..width])
     }
 
     /// Computes H = L^-T V and its product with the inverse, for local block `t` of the stack.
@@ -286,8 +300,8 @@ impl Others {
         let width = self.width;
         self.h.resize(L * width, 0.0);
         let slots = stack.slots.iter().map(|slot| stack.slot_coupling::<L, D>(slot));
-        let segments = stack.segments.iter().map(|segment| stack.segment_coupling::<L>(segment, 0));
-        for (v, &(_, start, _)) in slots.chain(segments).zip(&self.parts) {
+        let segments = stack.segments.iter().map(|segment| stack.segment_coupling::<L>(segment));
+        for (v, &(_, start, _)) in slots.chain(segments).zip(&self.strips) {
             for d in 0..L {
                 let row = &v.rows.values[(t * L + d) * v.rows.width..][..v.rows.width];
                 self.h[d * width + start..][..row.len()].copy_from_slice(row);

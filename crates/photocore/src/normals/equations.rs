@@ -29,10 +29,11 @@ pub struct GroupRows<'a> {
     pub constant: &'a mut [f64],
     /// Coefficients of the local block (rows x local unknowns).
     pub local: &'a mut [f64],
-    /// Coefficients of the kept block (rows x its unknowns).
+    /// Coefficients of the main kept block (rows x its unknowns).
     pub kept: &'a mut [f64],
-    /// Coefficients of the group's range of the border (rows x its length).
-    pub border: &'a mut [f64],
+    /// Coefficients of what the group has in common with others (rows x [`Layout::common_width`]): those of its further kept blocks in
+    /// their order, then those of its range of the border.
+    pub common: &'a mut [f64],
 }
 
 /// Weights of the unknowns themselves: equations `x_i = constant_i` of the given weight. Both have the length of the

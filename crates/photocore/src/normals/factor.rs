@@ -222,7 +222,7 @@ impl<E: Equations> Formation<'_, E> {
             for run in stacks.iter() {
                 if !control.stopped() {
                     self.fill(&mut stack, run);
-                    stack.add_to(&mut front.columns(), &system.layout, system.border_row(index));
+                    stack.add_to(&mut front.columns(), &system.layout);
                     sums.add(&mut stack);
                 }
             }
@@ -236,7 +236,7 @@ impl<E: Equations> Formation<'_, E> {
             filled.par_iter_mut().zip(runs).for_each(|(stack, run)| self.fill(stack, run));
             front.parts(&starts).into_par_iter().for_each(|mut columns| {
                 for stack in &*filled {
-                    stack.add_to(&mut columns, &system.layout, system.border_row(index));
+                    stack.add_to(&mut columns, &system.layout);
                 }
             });
             filled.iter_mut().for_each(|stack| sums.add(stack));

@@ -140,10 +140,10 @@ impl Columns<'_> {
     /// Adds `sign` A^T b to the right-hand side.
     #[inline(always)]
     pub fn add_right<const D: usize>(&mut self, sign: f64, a: Strip<'_>, b: &[f64]) {
-        let width = size::<D>(a.rows.width);
+        let (width, stride) = (size::<D>(a.rows.width), size::<D>(a.rows.stride));
         let target = &mut self.right[a.at - self.columns.start..][..width];
         for row in 0..a.rows.count {
-            let (values, factor) = (&a.rows.values[row * width..][..width], sign * b[row]);
+            let (values, factor) = (&a.rows.values[row * stride..][..width], sign * b[row]);
             for k in 0..width {
                 target[k] += factor * values[k];
             }
@@ -153,10 +153,10 @@ impl Columns<'_> {
     /// Adds the squares of the elements of A to the diagonal before elimination.
     #[inline(always)]
     pub fn add_diagonal<const D: usize>(&mut self, a: Strip<'_>) {
-        let width = size::<D>(a.rows.width);
+        let (width, stride) = (size::<D>(a.rows.width), size::<D>(a.rows.stride));
         let target = &mut self.diagonal[a.at - self.columns.start..][..width];
         for row in 0..a.rows.count {
-            let values = &a.rows.values[row * width..][..width];
+            let values = &a.rows.values[row * stride..][..width];
             for k in 0..width {
                 target[k] += values[k] * values[k];
             }

@@ -21,8 +21,8 @@ impl Graph {
         }
         let mut locals_of = vec![Vec::new(); kept];
         for local in 0..layout.locals() {
-            for group in layout.groups_of(local) {
-                let list: &mut Vec<usize> = &mut locals_of[layout.kept_of(group)];
+            for block in layout.groups_of(local).flat_map(|group| layout.blocks_of(group)) {
+                let list: &mut Vec<usize> = &mut locals_of[block];
                 if list.last() != Some(&local) {
                     list.push(local);
                 }
@@ -41,7 +41,7 @@ impl Graph {
                 }
             };
             for &local in locals {
-                layout.groups_of(local).for_each(|group| join(layout.kept_of(group)));
+                layout.groups_of(local).flat_map(|group| layout.blocks_of(group)).for_each(&mut join);
             }
             for &tie in &ties_of[block] {
                 layout.ties()[tie].kept.iter().for_each(|&other| join(other as usize));

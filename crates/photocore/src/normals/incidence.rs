@@ -6,9 +6,9 @@ use super::symbolic::Symbolic;
 /// Local blocks that are eliminated side by side at the most: their equations stay in the cache.
 const MOST: usize = 16;
 
-/// The groups of every local block by the position of their kept blocks in the order of elimination, and the local blocks by
-/// their *home*: the supernode of the first of these positions. All kept blocks of a local block are in the pattern of
-/// its home, so that what the elimination of the local block leaves goes into one front.
+/// The groups of every local block by the position of their main blocks in the order of elimination, and the local blocks by
+/// their *home*: the supernode of the first position of all kept blocks they touch. All of them are in the pattern of
+/// the home, so that what the elimination of the local block leaves goes into one front.
 #[derive(Debug)]
 pub(super) struct Incidence {
     groups: Vec<u32>,
@@ -31,18 +31,18 @@ impl Incidence {
             sorted[start..].sort_unstable();
         }
         let (positions, groups): (Vec<u32>, Vec<u32>) = sorted.into_iter().unzip();
-        let home = |local: u32| match layout.groups_of(local as usize) {
-            groups if groups.is_empty() => symbolic.supernode_count(),
-            groups => symbolic.supernode_of(positions[groups.start] as usize),
-        };
+        let home = homes(layout, symbolic, &positions);
         let mut by_home: Vec<u32> = (0..layout.locals() as u32).collect();
-        // Ascending positions, so ascending homes; a block without any comes last.
-        by_home.sort_unstable_by_key(|&local| {
-            let groups = layout.groups_of(local as usize);
-            (groups.is_empty(), &positions[groups], local)
+        let further = |local: u32| {
+            let own = if layout.has_further() { layout.groups_of(local as usize) } else { 0..0 };
+            groups[own].iter().map(|&group| layout.further_of(group as usize))
+        };
+        let key = |local: u32| (home[local as usize], &positions[layout.groups_of(local as usize)]);
+        by_home.sort_unstable_by(|&a, &b| {
+            key(a).cmp(&key(b)).then_with(|| further(a).cmp(further(b))).then(a.cmp(&b))
         });
         let mut home_ptr = vec![0; symbolic.supernode_count() + 2];
-        by_home.iter().for_each(|&local| home_ptr[home(local) + 1] += 1);
+        by_home.iter().for_each(|&local| home_ptr[home[local as usize] + 1] += 1);
         for index in 1..home_ptr.len() {
             home_ptr[index] += home_ptr[index - 1];
         }
@@ -59,10 +59,10 @@ impl Incidence {
 
     /// Whether the equations of two local blocks touch the same unknowns in the same way.
     fn alike(&self, layout: &Layout, a: usize, b: usize) -> bool {
-        let border = |group: &u32| layout.border_of(*group as usize);
-        let borders = |local: usize| self.groups_of(layout, local).iter().map(border);
+        let common = |&group: &u32| (layout.further_of(group as usize), layout.border_of(group as usize));
+        let commons = |local: usize| self.groups_of(layout, local).iter().map(common);
         self.positions_of(layout, a) == self.positions_of(layout, b)
-            && (layout.border_dim() == 0 || borders(a).eq(borders(b)))
+            && (!layout.has_common() || commons(a).eq(commons(b)))
     }
 
     /// The groups of a local block, by position.
@@ -70,7 +70,7 @@ impl Incidence {
         &self.groups[layout.groups_of(local)]
     }
 
-    /// The positions of the groups of a local block.
+    /// The positions of the main blocks of the groups of a local block.
     pub fn positions_of(&self, layout: &Layout, local: usize) -> &[u32] {
         &self.positions[layout.groups_of(local)]
     }
@@ -96,6 +96,18 @@ impl Incidence {
         let (first, last) = (place(self.home_ptr[supernode]), place(self.home_ptr[supernode + 1]));
         Stacks { locals: &self.by_home, ptr: &self.stack_ptr[first..=last] }
     }
+}
+
+/// The home of every local block, from the positions of its main blocks; after the last supernode where it has no equations.
+fn homes(layout: &Layout, symbolic: &Symbolic, positions: &[u32]) -> Vec<usize> {
+    let home = |local: usize| {
+        let groups = layout.groups_of(local);
+        let further = groups.clone().flat_map(|group| layout.further_of(group));
+        let further = further.map(|&block| symbolic.position(block as usize));
+        let main = positions[groups].iter().map(|&position| position as usize);
+        main.chain(further).min().map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
+    };
+    (0..layout.locals()).map(home).collect()
 }
 
 /// Consecutive stacks.

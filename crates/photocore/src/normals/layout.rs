@@ -1,5 +1,6 @@
 //! Which unknowns there are, and which equations touch which of them.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use thiserror::Error;
@@ -7,8 +8,12 @@ use thiserror::Error;
 /// The unknowns and the equations of a system.
 ///
 /// The vector of unknowns is `[local blocks | kept blocks | border]`. A group of `rows` equations touches one local
-/// block, one kept block and a (possibly empty) range of the border; the groups of a local block are consecutive.
+/// block, its main kept block and what it has in common with others: *further* kept blocks (the camera of several photographs)
+/// and a range of the border, both possibly none. The groups of a local block are consecutive.
 /// A [`Tie`] touches any kept blocks and a range of the border, but no local block.
+///
+/// Kernels are made for the main blocks, so what nearly every group touches belongs among the further ones: a block that is further
+/// in any group is the main one of none.
 #[derive(Debug, Clone)]
 pub struct Layout {
     rows: usize,
@@ -18,6 +23,9 @@ pub struct Layout {
     border_dim: usize,
     group_ptr: Vec<usize>,
     group_kept: Vec<u32>,
+    /// The further blocks of group `g` are `further[further_ptr[g]..further_ptr[g + 1]]`; both are empty where no group has any.
+    further_ptr: Vec<usize>,
+    further: Vec<u32>,
     group_border: Vec<Range<u32>>,
     ties: Vec<Tie>,
     /// Where the equations of each tie start among those of all ties; one more at the end.
@@ -65,6 +73,21 @@ pub enum LayoutError {
         places: usize,
         /// How many blocks there are.
         blocks: usize,
+    },
+    /// The pointers to the further blocks do not run from zero to their number without falling, one for each group and one more.
+    #[error(
+        "the pointers to further blocks must rise from 0 to their number, {0}, one for each group and one more"
+    )]
+    FurtherPointers(usize),
+    /// A group names a further block that does not exist, that it names already, or that is the main block of a group.
+    #[error(
+        "group {group} has kept block {kept} among its further ones, which does not exist, is named twice or is the main one of a group"
+    )]
+    Further {
+        /// The group.
+        group: usize,
+        /// The block it names.
+        kept: usize,
     },
     /// A group touches unknowns beyond the end of the border.
     #[error("group {group} touches the border up to {end} of {border}")]
@@ -127,6 +150,8 @@ impl Layout {
             border_dim: 0,
             group_ptr,
             group_kept,
+            further_ptr: Vec::new(),
+            further: Vec::new(),
             group_border,
             ties: Vec::new(),
             tie_ptr: vec![0],
@@ -141,6 +166,29 @@ impl Layout {
             return Err(LayoutError::Places { places: places.len(), blocks: self.kept() });
         }
         self.places = Some(places);
+        Ok(self)
+    }
+
+    /// Adds further kept blocks: group `g` touches `blocks[ptr[g]..ptr[g + 1]]` besides its main one, in an order of its own, in which
+    /// its coefficients are written.
+    pub fn with_further(mut self, ptr: Vec<usize>, blocks: Vec<u32>) -> Result<Self, LayoutError> {
+        let rising = ptr.is_sorted() && ptr.first() == Some(&0) && ptr.last() == Some(&blocks.len());
+        if !rising || ptr.len() != self.groups() + 1 {
+            return Err(LayoutError::FurtherPointers(blocks.len()));
+        }
+        let mut possible = vec![true; self.kept()];
+        self.group_kept.iter().for_each(|&main| possible[main as usize] = false);
+        for group in 0..self.groups() {
+            let own = &blocks[ptr[group]..ptr[group + 1]];
+            for (k, &kept) in own.iter().enumerate() {
+                if possible.get(kept as usize) != Some(&true) || own[..k].contains(&kept) {
+                    return Err(LayoutError::Further { group, kept: kept as usize });
+                }
+            }
+        }
+        if !blocks.is_empty() {
+            (self.further_ptr, self.further) = (ptr, blocks);
+        }
         Ok(self)
     }
 
@@ -265,9 +313,54 @@ impl Layout {
         self.group_ptr[i]..self.group_ptr[i + 1]
     }
 
-    /// The kept block that a group touches.
+    /// The main kept block that a group touches.
     pub fn kept_of(&self, group: usize) -> usize {
         self.group_kept[group] as usize
+    }
+
+    /// Whether any group touches further kept blocks.
+    pub fn has_further(&self) -> bool {
+        !self.further.is_empty()
+    }
+
+    /// Whether any group may touch more than its main kept block.
+    pub(super) fn has_common(&self) -> bool {
+        self.has_further() || self.border_dim > 0
+    }
+
+    /// The further kept blocks that a group touches, in its order.
+    pub fn further_of(&self, group: usize) -> &[u32] {
+        match self.further_ptr.get(group..group + 2) {
+            Some(ends) => &self.further[ends[0]..ends[1]],
+            None => &[],
+        }
+    }
+
+    /// All kept blocks that a group touches, the main one first.
+    pub fn blocks_of(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
+        std::iter::once(self.kept_of(group)).chain(self.further_of(group).iter().map(|&block| block as usize))
+    }
+
+    /// The unknowns that a group touches in its further kept blocks, block by block in its order, then in the border: the columns of
+    /// what its equations have in common with others.
+    pub fn common_columns(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
+        let (start, border) = (self.border_range().start, self.border_of(group));
+        let further = self.further_of(group).iter().flat_map(|&block| self.kept_range(block as usize));
+        further.chain(start + border.start..start + border.end)
+    }
+
+    /// How many they are.
+    pub fn common_width(&self, group: usize) -> usize {
+        let further = self.further_of(group).iter().map(|&block| self.kept_dim(block as usize));
+        further.sum::<usize>() + self.border_of(group).len()
+    }
+
+    /// The unknowns of kept blocks, a main one counted for each of its groups, that lose products when local block `i` is reduced out.
+    pub(super) fn reduced_width(&self, i: usize) -> usize {
+        let main: usize = self.groups_of(i).map(|group| self.kept_dim(self.kept_of(group))).sum();
+        let groups = self.groups_of(i).filter(|_| self.has_further());
+        let further: BTreeSet<u32> = groups.flat_map(|group| self.further_of(group)).copied().collect();
+        main + further.into_iter().map(|block| self.kept_dim(block as usize)).sum::<usize>()
     }
 
     /// The part of the border that a group touches, counted from the start of the border.

@@ -148,15 +148,14 @@ impl<E: Equations> Work<'_, E> {
         stack: &'s Stack,
     ) -> impl Iterator<Item = (Range<usize>, Rows<'s>)> {
         let symbolic = &*self.system.symbolic;
-        let border = symbolic.unknowns() - self.system.layout.border_dim();
         let slots = stack
             .slots
             .iter()
             .map(move |slot| (symbolic.range(slot.position), stack.slot_coupling::<L, D>(slot).rows));
-        slots.chain(stack.segments.iter().map(move |segment| {
-            let range = border + segment.border.start..border + segment.border.end;
-            (range, stack.segment_coupling::<L>(segment, 0).rows)
-        }))
+        let segments = stack.segments.iter();
+        slots.chain(
+            segments.map(move |segment| (segment.range(symbolic), stack.segment_coupling::<L>(segment).rows)),
+        )
     }
 }
 

@@ -191,7 +191,7 @@ impl Symbolic {
     pub fn operations(&self, layout: &Layout) -> Operations {
         let reduction = (0..layout.locals())
             .map(|local| {
-                let width: usize = layout.groups_of(local).map(|g| layout.kept_dim(layout.kept_of(g))).sum();
+                let width = layout.reduced_width(local);
                 (width * (width + 6) / 2 * layout.local_dim()) as f64
             })
             .sum();

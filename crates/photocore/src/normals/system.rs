@@ -55,7 +55,6 @@ impl System {
 /// Time for forming and eliminating a local block, in multiply-adds of a factorisation: those of its own, which run at a lower rate,
 /// and its equations.
 fn formation_work(layout: &Layout, local: usize) -> f64 {
-    let groups = layout.groups_of(local);
-    let width: usize = groups.clone().map(|group| layout.kept_dim(layout.kept_of(group))).sum();
-    (2 * width * width * layout.local_dim() + 500 * groups.len()) as f64
+    let width = layout.reduced_width(local);
+    (2 * width * width * layout.local_dim() + 500 * layout.groups_of(local).len()) as f64
 }

@@ -75,6 +75,8 @@ pub(super) const LANES: usize = 8;
 pub(super) struct Rows<'a> {
     pub values: &'a [f64],
     pub width: usize,
+    /// From the start of a row to that of the next.
+    pub stride: usize,
     pub count: usize,
 }
 
@@ -182,8 +184,8 @@ fn sum<S: Simd, const C: usize>(
     rows: Range<usize>,
 ) {
     for row in rows {
-        let vectors = S::as_simd_f64s(&a.values[row * a.width + i..][..LANES]).0;
-        let factors = &b.values[row * b.width + j..][..C];
+        let vectors = S::as_simd_f64s(&a.values[row * a.stride + i..][..LANES]).0;
+        let factors = &b.values[row * b.stride + j..][..C];
         for c in 0..C {
             let factor = simd.splat_f64s(sign * factors[c]);
             for k in 0..LANES / S::F64_LANES {

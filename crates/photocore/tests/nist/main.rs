@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use num_complex::Complex64;
-use photocore::adjustment::{AdjustError, Adjustment, Criterion, Model, Options, Problem, Status, adjust};
+use photocore::adjustment::{AdjustError, Adjustment, Method, Model, Options, Problem, Status, Stop, adjust};
 use photocore::normals::{GroupRows, Layout, Ordering, System};
 use rayon::ThreadPoolBuilder;
 
@@ -70,7 +70,7 @@ impl Model for Curve<'_> {
 }
 
 /// Adjusts a problem from a start. Observations get their certified standard deviation.
-fn run(certified: &Certified, start: &[f64], criterion: Criterion) -> Result<Adjustment, AdjustError> {
+fn run(certified: &Certified, start: &[f64], method: Method) -> Result<Adjustment, AdjustError> {
     let count = certified.x.len();
     let layout = Layout::new(1, 1, &[start.len()], vec![0, count], vec![0; count]).unwrap();
     let initial = [&[0.0], start].concat();
@@ -82,7 +82,7 @@ fn run(certified: &Certified, start: &[f64], criterion: Criterion) -> Result<Adj
         sd: [vec![0.0], vec![f64::INFINITY; start.len()]].concat(),
         initial,
     };
-    let options = Options { criterion, max_iterations: 5000, covariance: true, loss: None };
+    let options = Options { method, max_iterations: 5000, covariance: true, loss: None };
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     adjust(&problem, &options, &pool, &mut |_| ControlFlow::Continue(()))
 }
@@ -123,15 +123,16 @@ fn certified_values_come_out_from_both_starts() {
     println!("|---|---|---:|---|---|---:|---:|---:|---:|");
     for certified in &PROBLEMS {
         for (number, start) in certified.starts.iter().enumerate() {
-            for (name, criterion) in
-                [("corrections", Criterion::Fraction(1e-9)), ("decrease", Criterion::Decrease(1e-14))]
-            {
-                let adjusted = run(certified, start, criterion).unwrap();
+            for (name, method) in [
+                ("corrections", Method::Damped(Stop::Fraction(1e-9))),
+                ("decrease", Method::TrustRegion(Stop::Decrease(1e-14))),
+            ] {
+                let adjusted = run(certified, start, method).unwrap();
                 let head = format!("| {} | {} | {}", certified.name, certified.level, number + 1);
                 let (ended, count) = (adjusted.status, adjusted.iterations.len());
                 let case = format!("{head} | {name} | {ended:?} | {count} |");
                 let solved = ended == Status::Converged && adjusted.cofactors.is_some();
-                let by_steps = matches!(criterion, Criterion::Fraction(_));
+                let by_steps = matches!(method, Method::Damped(Stop::Fraction(_)));
                 if (certified.name, number) == PLATEAU || (by_steps && (certified.name, number) == FAR) {
                     assert!(!solved, "{case}");
                     assert!(ended != Status::Converged || adjusted.undetermined.is_some(), "{case}");
@@ -143,6 +144,19 @@ fn certified_values_come_out_from_both_starts() {
                 assert!(found.iter().all(|&digits| digits > WANTED), "{case} {found:?}");
                 println!("{case} {:.1} | {:.1} | {:.1} |", found[0], found[1], found[2]);
             }
+        }
+    }
+}
+
+#[test]
+fn any_control_of_steps_goes_with_any_rule_that_stops_it() {
+    let rules = [Stop::Fraction(1e-9), Stop::Decrease(1e-14)];
+    for certified in PROBLEMS.iter().filter(|certified| certified.name != PLATEAU.0) {
+        for method in rules.into_iter().flat_map(|rule| [Method::Damped(rule), Method::TrustRegion(rule)]) {
+            let adjusted = run(certified, certified.starts[1], method).unwrap();
+            assert_eq!(adjusted.status, Status::Converged, "{} {method:?}", certified.name);
+            let found = agreement(certified, &adjusted);
+            assert!(found.iter().all(|&digits| digits > WANTED), "{} {method:?} {found:?}", certified.name);
         }
     }
 }

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import Space, Values, fixed
 from photogram.giant.listing.pages import Page, headed, paginate
-from photogram.results.adjusted import Iteration
+from photogram.results.iteration import Iteration
 
 __all__ = ["iteration_pages"]
 

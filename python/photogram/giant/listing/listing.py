@@ -21,12 +21,12 @@ from photogram.giant.listing.points import point_pages, propagated_point_pages
 from photogram.giant.listing.residuals import PointResiduals, residual_pages, statistics
 from photogram.giant.listing.stations import station_pages
 from photogram.giant.listing.warnings import warning_pages
+from photogram.results.result import Result
 
 if TYPE_CHECKING:
     from photogram.giant.contents import Contents
     from photogram.giant.limits import Limits
     from photogram.network.block import Block
-    from photogram.results.adjusted import AdjustedBlock
 
 __all__ = ["listing"]
 
@@ -40,7 +40,7 @@ NOTICES = {
 def listing(
     project: Contents,
     block: Block,
-    result: AdjustedBlock,
+    result: Result,
     *,
     as_published: bool = False,
     limits: Limits | None = None,
@@ -111,7 +111,7 @@ def _input_pages(project: Contents, block: Block, space: Space) -> Iterator[Page
 
 
 def _result_pages(
-    project: Contents, block: Block, result: AdjustedBlock, space: Space, as_published: bool
+    project: Contents, block: Block, result: Result, space: Space, as_published: bool
 ) -> Iterator[Page]:
     common = project.common
     closing = statistics(result.sums_of_squares, result.degrees_of_freedom, result.variance_of_unit_weight)
@@ -137,7 +137,7 @@ def _result_pages(
     yield from _corrections(project, block, result, space, as_published)
 
 
-def _residuals(block: Block, result: AdjustedBlock) -> Iterator[PointResiduals]:
+def _residuals(block: Block, result: Result) -> Iterator[PointResiduals]:
     """Return the points in processing order, that of the block, each with its images by frame."""
     order = np.argsort(block.image_points, kind="stable")
     bounds = np.searchsorted(block.image_points[order], np.arange(len(block.point_ids) + 1))
@@ -147,9 +147,7 @@ def _residuals(block: Block, result: AdjustedBlock) -> Iterator[PointResiduals]:
         yield PointResiduals(block.point_ids[point], frames, result.residuals[rows])
 
 
-def _points(
-    project: Contents, block: Block, result: AdjustedBlock, space: Space, propagated: bool
-) -> list[Page]:
+def _points(project: Contents, block: Block, result: Result, space: Space, propagated: bool) -> list[Page]:
     rows = np.flatnonzero(result.used_points).tolist()
     if project.common.sort_points:
         rows.sort(key=lambda row: printed_order(block.point_ids[row]))
@@ -162,7 +160,7 @@ def _points(
 
 
 def _corrections(
-    project: Contents, block: Block, result: AdjustedBlock, space: Space, as_published: bool
+    project: Contents, block: Block, result: Result, space: Space, as_published: bool
 ) -> list[Page]:
     index = {block.point_ids[row]: row for row in np.flatnonzero(result.used_points).tolist()}
     names = list(dict.fromkeys(point.name for point in project.ground if point.name in index))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from photogram.arguments.types import Floats
 from photogram.giant.listing.formats import fixed
 from photogram.giant.listing.pages import Page, headed, paginate
-from photogram.results.adjusted import SumsOfSquares
+from photogram.results.result import SumsOfSquares
 
 __all__ = ["PointResiduals", "residual_pages", "statistics"]
 

@@ -1,6 +1,6 @@
 //! The camera of Bundler and of "Bundle Adjustment in the Large" (Agarwal, Snavely, Seitz and Szeliski 2010).
 
-use super::{CameraModel, Image};
+use super::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
 /// Radial distortion, forward: a function of ideal coordinates.
@@ -46,6 +46,11 @@ impl Bal {
 
 impl CameraModel for Bal {
     type Parameters = [f64; 3];
+
+    const NAME: &'static str = "bal";
+    const PARAMETERS: &'static [(&'static str, Unit)] =
+        &[("f", Unit::Image), ("k1", Unit::One), ("k2", Unit::One)];
+    const FORMULA: &'static str = "p = -(P1, P2) / P3, image = f (1 + k1 p^2 + k2 p^4) p";
 
     fn with_parameters([focal_length, k1, k2]: [f64; 3]) -> Self {
         Self { focal_length, radial: [k1, k2] }

@@ -2,13 +2,7 @@
 //!
 //! Each camera is a file with a type that implements [`CameraModel`], and a line of `cameras!` below.
 
-mod bal;
-mod perspective;
-
 use super::Vector3;
-
-pub use bal::Bal;
-pub use perspective::Perspective;
 
 /// How a camera maps u, a point in the photo's axes (it looks along -z), to image coordinates.
 ///
@@ -16,6 +10,13 @@ pub use perspective::Perspective;
 pub trait CameraModel: Copy {
     /// Its interior parameters, an array of numbers.
     type Parameters: Copy + AsRef<[f64]> + for<'a> TryFrom<&'a [f64]>;
+
+    /// What the model is called.
+    const NAME: &'static str;
+    /// What its parameters are called and measured in, in their order.
+    const PARAMETERS: &'static [(&'static str, Unit)];
+    /// The image of P, a point in the photo's axes, as documents say it.
+    const FORMULA: &'static str;
 
     /// The camera with the given parameters.
     fn with_parameters(parameters: Self::Parameters) -> Self;
@@ -36,6 +37,15 @@ pub trait CameraModel: Copy {
     fn direction(&self, xy: [f64; 2]) -> Option<Vector3>;
 }
 
+/// What a parameter of a camera is measured in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// The unit of image coordinates.
+    Image,
+    /// None: a number.
+    One,
+}
+
 /// An image position and its partials; the first index is x or y.
 #[derive(Debug, Clone, Copy)]
 pub struct Image<P> {
@@ -48,7 +58,10 @@ pub struct Image<P> {
 }
 
 macro_rules! cameras {
-    ($d:tt $($name:ident: $parameters:expr;)*) => {
+    ($d:tt $($file:ident::$name:ident;)*) => {
+        $(mod $file;
+        pub use $file::$name;)*
+
         /// A camera of any kind.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum Camera {
@@ -62,20 +75,25 @@ macro_rules! cameras {
         })*
 
         impl Camera {
-            /// What its parameters are called, in their order.
-            pub fn parameter_names(&self) -> &'static [&'static str] {
-                match self {
-                    $(Self::$name(_) => &$parameters,)*
+            /// What the models are called.
+            pub const NAMES: &'static [&'static str] = &[$($name::NAME),*];
+
+            /// Formula and parameters of a model, [`CameraModel::FORMULA`] and [`CameraModel::PARAMETERS`]; None where no model has
+            /// the name.
+            pub fn model(name: &str) -> Option<(&'static str, &'static [(&'static str, Unit)])> {
+                match name {
+                    $($name::NAME => Some(($name::FORMULA, $name::PARAMETERS)),)*
+                    _ => None,
                 }
             }
 
-            /// A camera of the same kind with other parameters; None unless they are as many.
-            pub fn with_parameters(&self, parameters: &[f64]) -> Option<Self> {
-                match self {
-                    $(Self::$name(_) => {
-                        let parameters = parameters.try_into().ok()?;
-                        Some(Self::$name(<$name as CameraModel>::with_parameters(parameters)))
+            /// The camera of the model that has the name; None where there is none, or it has not as many parameters.
+            pub fn named(name: &str, parameters: &[f64]) -> Option<Self> {
+                match name {
+                    $($name::NAME => {
+                        Some($name::with_parameters(parameters.try_into().ok()?).into())
                     })*
+                    _ => None,
                 }
             }
         }
@@ -95,11 +113,33 @@ macro_rules! cameras {
 }
 
 cameras! { $
-    Perspective: ["c"];
-    Bal: ["f", "k1", "k2"];
+    perspective::Perspective;
+    bal::Bal;
+    radial::Radial;
 }
 
 impl Camera {
+    /// What its model is called.
+    pub fn name(&self) -> &'static str {
+        fn of<C: CameraModel>(_: &C) -> &'static str {
+            C::NAME
+        }
+        each_camera!(self, camera => of(camera))
+    }
+
+    /// What its parameters are called and measured in, in their order.
+    pub fn parameter_names(&self) -> &'static [(&'static str, Unit)] {
+        fn of<C: CameraModel>(_: &C) -> &'static [(&'static str, Unit)] {
+            C::PARAMETERS
+        }
+        each_camera!(self, camera => of(camera))
+    }
+
+    /// A camera of the same kind with other parameters; None unless they are as many.
+    pub fn with_parameters(&self, parameters: &[f64]) -> Option<Self> {
+        Self::named(self.name(), parameters)
+    }
+
     /// Its parameters.
     pub fn parameters(&self) -> Vec<f64> {
         each_camera!(self, camera => camera.parameters().as_ref().to_vec())
@@ -113,6 +153,14 @@ impl Camera {
     /// See [`CameraModel::image`].
     pub fn image(&self, u: &Vector3) -> [f64; 2] {
         each_camera!(self, camera => camera.image(u))
+    }
+
+    /// See [`CameraModel::linearize`].
+    pub fn linearize(&self, u: &Vector3) -> Image<Vec<f64>> {
+        each_camera!(self, camera => {
+            let Image { xy, by_u, by_parameters } = camera.linearize(u);
+            Image { xy, by_u, by_parameters: by_parameters.map(|row| row.as_ref().to_vec()) }
+        })
     }
 
     /// See [`CameraModel::direction`].

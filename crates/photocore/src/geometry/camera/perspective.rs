@@ -1,6 +1,6 @@
 //! The central perspective without distortion.
 
-use super::{CameraModel, Image};
+use super::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
 /// x = c u1/u3, y = c u2/u3, measured from the principal point. With either sign of c the camera looks along its -z axis (GIANT
@@ -29,6 +29,10 @@ impl Perspective {
 
 impl CameraModel for Perspective {
     type Parameters = [f64; 1];
+
+    const NAME: &'static str = "perspective";
+    const PARAMETERS: &'static [(&'static str, Unit)] = &[("c", Unit::Image)];
+    const FORMULA: &'static str = "image = c (P1, P2) / P3";
 
     fn with_parameters([principal_distance]: [f64; 1]) -> Self {
         Self { principal_distance }

@@ -4,14 +4,7 @@
 //! computed, and the partials of the computed values by positions and rotations; [`Rows`] turns these into the columns of the unknowns.
 
 mod adjusted;
-mod attitude;
-mod control;
-mod difference;
-mod distance;
-mod equal_height;
-mod position;
 mod precision;
-mod relative;
 mod rows;
 mod tied;
 
@@ -57,7 +50,8 @@ pub trait ObservationModel {
 
 macro_rules! kinds {
     ($($module:ident::$name:ident;)*) => {
-        $(pub use $module::$name;)*
+        $(mod $module;
+        pub use $module::$name;)*
 
         /// An observation of any kind.
         #[derive(Debug, Clone, PartialEq)]

@@ -45,7 +45,7 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use crate::adjustment::{self, AdjustError, Criterion, Event, Problem, Status};
+use crate::adjustment::{self, AdjustError, Event, Problem, Status, Stop};
 use crate::geometry::Vector3;
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
@@ -210,7 +210,7 @@ fn adjust(
     let weighted = Weighted::new(stations, &chosen)?;
     let problem = problem(&weighted.stations, &start)?;
     let engine = adjustment::Options {
-        criterion: Criterion::Fraction(options.tolerance),
+        method: adjustment::Method::Damped(Stop::Fraction(options.tolerance)),
         max_iterations: if cycles.is_some() { 0 } else { options.max_iterations },
         covariance: true,
         loss: None,

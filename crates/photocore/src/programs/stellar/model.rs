@@ -309,7 +309,7 @@ impl Model for StarImages<'_> {
             for (k, value) in rows.kept[3 * row..][..3].iter_mut().enumerate() {
                 *value = mix(found.pointing[0][k], found.pointing[1][k]);
             }
-            for (k, value) in rows.border[COMMON * row..][..COMMON].iter_mut().enumerate() {
+            for (k, value) in rows.common[COMMON * row..][..COMMON].iter_mut().enumerate() {
                 *value = mix(found.common[0][k], found.common[1][k]);
             }
         }

@@ -1,0 +1,183 @@
+//! Gauss-Newton with step control: full steps, damped where they fail.
+
+use std::ops::ControlFlow;
+
+use super::method::Stop;
+use super::options::{Iteration, Status};
+use super::problem::Model;
+use super::result::AdjustError;
+use super::run::{End, Run, Solved, State};
+
+/// A step is accepted when the sum of squares does not rise by more than its own rounding error.
+const ROUNDING: f64 = 1e-12;
+/// A Gauss-Newton step that changes no unknown by more than this multiple of its standard deviation is accepted as it is:
+/// it lowers the sum of squares by less than the square of this, which may drown in the rounding errors of the computed
+/// observations (geocentric coordinates are good to a nanometre only).
+const NEGLIGIBLE: f64 = 1e-3;
+/// The sum of squares stands still where three damped steps lower it by less than this multiple of the variance of unit weight: a
+/// hundredth of a standard deviation of the combination of unknowns that they follow.
+const STILL: f64 = 1e-4;
+/// A step that changes the unknowns by more than this multiple of their standard deviations, in the mean, is so long that local
+/// unknowns are better computed afresh than linearized.
+const FAR: f64 = 30.0;
+/// First damping after a step that failed; it falls by ten after a success, and below [`LEAST_DAMPING`] to zero.
+const FIRST_DAMPING: f64 = 1e-3;
+const LEAST_DAMPING: f64 = 1e-5;
+/// With this damping a step follows the gradient; if that does not lower the sum of squares, nothing will.
+const MOST_DAMPING: f64 = 1e9;
+
+/// What the control of the steps remembers from one to the next.
+struct Control {
+    stop: Stop,
+    /// The lowest sum of squares.
+    best: f64,
+    /// What it was when a full step failed last.
+    refused: Option<f64>,
+}
+
+/// The damping after a step that failed.
+fn harder(damping: f64) -> f64 {
+    (10.0 * damping).max(FIRST_DAMPING)
+}
+
+/// The damping after a step that did not.
+fn relaxed(damping: f64) -> f64 {
+    if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 }
+}
+
+/// The next values, or the end.
+type Next<'a, M> = Result<ControlFlow<End<'a, M>, State<'a, M>>, AdjustError>;
+
+impl<'a, M: Model> Run<'a, '_, M> {
+    /// Gauss-Newton with step control.
+    ///
+    /// With dx the step and N the normal matrix, dx_i^2 <= q_ii dx^T N dx (Cauchy-Schwarz), and dx^T N dx is the predicted
+    /// decrease of the sum of squares: its root bounds every correction in standard deviations, without an inverse.
+    pub(super) fn damped_steps(
+        &mut self,
+        start: State<'a, M>,
+        stop: Stop,
+    ) -> Result<End<'a, M>, AdjustError> {
+        let mut state = start;
+        let mut control = Control { stop, best: state.sum_of_squares, refused: None };
+        while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
+            match self.step_from(state, &mut control)? {
+                ControlFlow::Continue(next) => state = next,
+                ControlFlow::Break(end) => return Ok(end),
+            }
+        }
+        let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
+        self.stay(state, status)
+    }
+
+    /// Solves, and takes the step or ends with it.
+    fn step_from(&mut self, state: State<'a, M>, control: &mut Control) -> Next<'a, M> {
+        let (unknowns, damping, curved) = (state.unknowns.clone(), state.damping, state.curved);
+        let Some(solved) = self.solve_unless_lost(state)? else {
+            return self.refuse(unknowns, damping, control, vec![]);
+        };
+        let number = self.iterations.len() + 1;
+        let largest_change = solved.change;
+        let iteration = Iteration { number, sum_of_squares: control.best, largest_change, damping };
+        if damping == 0.0 && self.is_last(control.stop, solved.change) {
+            let end = if curved {
+                self.stay_after(iteration, &unknowns, &solved.step)?
+            } else {
+                End::after(Status::Converged, unknowns, solved, iteration)
+            };
+            return Ok(ControlFlow::Break(end));
+        }
+        self.take(iteration, unknowns, solved, control)
+    }
+
+    /// Takes a step, unless it fails.
+    fn take(
+        &mut self,
+        iteration: Iteration,
+        unknowns: Vec<f64>,
+        solved: Solved<'a, M>,
+        control: &mut Control,
+    ) -> Next<'a, M> {
+        let (damping, Solved { basis, step, change }) = (iteration.damping, solved);
+        let trial = self.problem.advanced(&unknowns, &step);
+        let moved = (damping == 0.0).then(|| basis.factor.moved(&self.problem.system, &step));
+        basis.factor.recycle(&self.problem.system);
+        let far = change > FAR * (unknowns.len() as f64).sqrt();
+        let next = self.form(if far { self.relocated(trial) } else { trial }, relaxed(damping))?;
+        let negligible = damping == 0.0 && change <= NEGLIGIBLE;
+        let highest = if negligible { f64::MAX } else { control.best * (1.0 + ROUNDING) };
+        // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
+        if !(next.sum_of_squares <= highest && next.factor.deficient_locals.is_empty()) {
+            return self.refuse(unknowns, damping, control, moved.unwrap_or_default());
+        }
+        let sum = next.sum_of_squares;
+        let decrease = std::mem::replace(&mut control.best, sum) - sum;
+        self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &next.unknowns)?;
+        if damping == 0.0 && control.stop.at_decrease(decrease, sum) {
+            return self.stay(next, Status::Converged).map(ControlFlow::Break);
+        }
+        Ok(ControlFlow::Continue(next))
+    }
+
+    /// Goes on from the same values with more damping; or ends there, where the sum of squares has stood still although full steps,
+    /// which move the unknowns `moved` most, have failed.
+    fn refuse(
+        &mut self,
+        unknowns: Vec<f64>,
+        damping: f64,
+        control: &mut Control,
+        moved: Vec<usize>,
+    ) -> Next<'a, M> {
+        if damping == 0.0 && self.stands_still(&mut control.refused, control.best) {
+            self.weak = moved;
+            let state = self.form(unknowns, 0.0)?;
+            return self.stay(state, Status::Converged).map(ControlFlow::Break);
+        }
+        self.form(unknowns, harder(damping)).map(ControlFlow::Continue)
+    }
+
+    /// Whether a full step is the last one, by its length or by those that would follow.
+    fn is_last(&self, stop: Stop, change: f64) -> bool {
+        stop.at_change(change)
+            || matches!(stop, Stop::Fraction(fraction) if self.leaves_less_than(fraction, change))
+    }
+
+    /// Whether the sum of squares has stood still between two full steps that failed, `refused` at the first and `sum` at the second:
+    /// what it still falls by, damped, no unknown is determined well enough to show.
+    fn stands_still(&self, refused: &mut Option<f64>, sum: f64) -> bool {
+        let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
+        let least = STILL * (sum / freedom).max(1.0);
+        refused.replace(sum).is_some_and(|before| before - sum <= least)
+    }
+
+    /// Whether a step is negligible itself and, the steps falling at the rate of the last two, all further ones together would be
+    /// well below a limit (Hairer and Wanner 1996, section IV.8).
+    fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
+        let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
+        let rate = before.map_or(1.0, |iteration| change / iteration.largest_change);
+        change <= NEGLIGIBLE && rate < 1.0 && rate / (1.0 - rate) * change <= limit / 10.0
+    }
+
+    /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.
+    fn relocated(&self, unknowns: Vec<f64>) -> Vec<f64> {
+        let mut other = unknowns.clone();
+        let relocated = self.pool.install(|| self.problem.model.relocate(&mut other));
+        let lower = relocated && self.objective(&other) < self.objective(&unknowns);
+        if lower { other } else { unknowns }
+    }
+
+    /// Takes the last step and ends there.
+    fn stay_after(
+        &mut self,
+        last: Iteration,
+        unknowns: &[f64],
+        step: &[f64],
+    ) -> Result<End<'a, M>, AdjustError> {
+        let values = self.problem.advanced(unknowns, step);
+        let sum_of_squares = self.objective(&values);
+        self.accept(Iteration { sum_of_squares, ..last }, unknowns, &values)?;
+        self.curved = false;
+        let state = self.form(values, 0.0)?;
+        self.stay(state, Status::Converged)
+    }
+}

@@ -1,0 +1,118 @@
+//! What the elimination of a stack leaves, added to a front.
+
+use pulp::Simd;
+
+use super::Stack;
+use crate::normals::front::{Columns, Strip};
+use crate::normals::layout::Layout;
+use crate::normals::vectorised::{Kernel, Rows, run, size};
+
+impl Stack {
+    /// Adds what the elimination leaves to columns of the front of the home.
+    pub fn add_to(&self, columns: &mut Columns<'_>, layout: &Layout) {
+        run(layout, self.kept_dim(), AddTo { stack: self, columns, rows: layout.rows() });
+    }
+
+    #[inline(always)]
+    fn add_sized<S: Simd, const L: usize, const D: usize>(
+        &self,
+        simd: S,
+        columns: &mut Columns<'_>,
+        rows: usize,
+    ) {
+        for (index, slot) in self.slots.iter().enumerate() {
+            if !columns.contain(slot.row) {
+                continue;
+            }
+            let v = self.slot_coupling::<L, D>(slot);
+            let own = self.slot_rows::<D>(slot, rows);
+            let constants = &self.constants[slot.constants..][..slot.groups.len() * self.locals.len() * rows];
+            columns.add_difference(simd, own, v, self.locals.len());
+            columns.add_diagonal::<D>(own);
+            columns.add_right::<D>(1.0, own, constants);
+            columns.add_right::<D>(-1.0, v, &self.reduced);
+            for other in &self.slots[index + 1..] {
+                columns.add_product(simd, -1.0, self.slot_coupling::<L, D>(other), v);
+            }
+            for segment in self.segments.iter().filter(|segment| segment.row > slot.row) {
+                columns.add_product(simd, -1.0, self.segment_coupling::<L>(segment), v);
+            }
+        }
+        if !self.segments.is_empty() {
+            self.add_parts::<S, D>(simd, columns, rows);
+            self.add_segments::<S, L, D>(simd, columns);
+        }
+    }
+
+    /// Adds the products of what groups have in common with others: with itself and with their main blocks.
+    #[inline(always)]
+    fn add_parts<S: Simd, const D: usize>(&self, simd: S, columns: &mut Columns<'_>, rows: usize) {
+        for slot in &self.slots {
+            let width = size::<D>(slot.dim);
+            // Where each local block has one group on the main block, the equations of all of them stand one after the other.
+            let together = if slot.groups.len() == 1 { self.locals.len() } else { 1 };
+            let count = together * rows;
+            for (k, p) in slot.groups.clone().enumerate() {
+                for t in (0..self.locals.len()).step_by(together) {
+                    let at = (t * slot.groups.len() + k) * rows;
+                    let values = &self.kept_rows[slot.kept + at * width..];
+                    let kept = Strip { at: slot.row, rows: Rows { values, width, stride: width, count } };
+                    let constants = &self.constants[slot.constants + at..][..count];
+                    for (index, part) in self.parts(p).iter().enumerate() {
+                        let equations = t * rows..t * rows + count;
+                        let own = self.part_rows(p, part, equations.clone());
+                        add_below(simd, columns, own, kept);
+                        for other in &self.parts(p)[..index] {
+                            add_below(simd, columns, own, self.part_rows(p, other, equations.clone()));
+                        }
+                        if columns.contain(own.at) {
+                            columns.add_product(simd, 1.0, own, own);
+                            columns.add_diagonal::<0>(own);
+                            columns.add_right::<0>(1.0, own, constants);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes off what the elimination takes in the columns of the segments.
+    #[inline(always)]
+    fn add_segments<S: Simd, const L: usize, const D: usize>(&self, simd: S, columns: &mut Columns<'_>) {
+        for (index, segment) in self.segments.iter().enumerate() {
+            if !columns.contain(segment.row) {
+                continue;
+            }
+            let v = self.segment_coupling::<L>(segment);
+            columns.add_right::<0>(-1.0, v, &self.reduced);
+            for other in &self.segments[index..] {
+                columns.add_product(simd, -1.0, self.segment_coupling::<L>(other), v);
+            }
+            for slot in self.slots.iter().filter(|slot| slot.row > segment.row) {
+                columns.add_product(simd, -1.0, self.slot_coupling::<L, D>(slot), v);
+            }
+        }
+    }
+}
+
+/// Adds A^T B, or its transpose: what stands lower in the front gives the rows.
+#[inline(always)]
+fn add_below<S: Simd>(simd: S, columns: &mut Columns<'_>, a: Strip<'_>, b: Strip<'_>) {
+    let (lower, upper) = if a.at > b.at { (a, b) } else { (b, a) };
+    if columns.contain(upper.at) {
+        columns.add_product(simd, 1.0, lower, upper);
+    }
+}
+
+struct AddTo<'a, 'b> {
+    stack: &'a Stack,
+    columns: &'a mut Columns<'b>,
+    rows: usize,
+}
+
+impl Kernel for AddTo<'_, '_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
+        self.stack.add_sized::<S, L, D>(simd, self.columns, size::<R>(self.rows));
+    }
+}

@@ -1,0 +1,159 @@
+//! The equations of a stack, gathered.
+
+use pulp::Simd;
+
+use super::{Part, Place, Segment, Slot, Stack};
+use crate::normals::equations::{Equations, GroupRows};
+use crate::normals::layout::Layout;
+use crate::normals::symbolic::Symbolic;
+use crate::normals::system::System;
+use crate::normals::triangle::Triangle;
+use crate::normals::vectorised::{Kernel, LANES, run_unsized};
+
+impl Stack {
+    /// Gathers the equations of local blocks of one pattern.
+    pub fn gather(&mut self, system: &System, equations: &impl Equations, locals: &[u32]) {
+        self.place(system, locals);
+        run_unsized(Gather { stack: self, system, equations });
+    }
+
+    #[inline(always)]
+    fn write(&mut self, system: &System, equations: &impl Equations) {
+        let (rows, l) = (system.layout.rows(), system.layout.local_dim());
+        for (t, &local) in self.locals.iter().enumerate() {
+            let groups = system.incidence.groups_of(&system.layout, local as usize);
+            for slot in &self.slots {
+                for (k, p) in slot.groups.clone().enumerate() {
+                    let at = t * slot.groups.len() + k;
+                    let Place { width, rows: common, .. } = self.places[p];
+                    let mut part = GroupRows {
+                        constant: &mut self.constants[slot.constants + at * rows..][..rows],
+                        local: &mut self.local_rows[(t * groups.len() + p) * rows * l..][..rows * l],
+                        kept: &mut self.kept_rows[slot.kept + at * rows * slot.dim..][..rows * slot.dim],
+                        common: &mut self.common_rows[common + t * rows * width..][..rows * width],
+                    };
+                    equations.write(local as usize, groups[p] as usize, &mut part);
+                }
+            }
+        }
+    }
+
+    /// Lays out the buffers for local blocks of one pattern.
+    fn place(&mut self, system: &System, locals: &[u32]) {
+        let (layout, symbolic) = (&system.layout, &*system.symbolic);
+        let (rows, l, depth) = (layout.rows(), layout.local_dim(), locals.len());
+        self.locals.clear();
+        self.locals.extend_from_slice(locals);
+        self.slots.clear();
+        self.places.clear();
+        self.parts.clear();
+        let Some(&first) = locals.first() else { return };
+        let groups = system.incidence.groups_of(layout, first as usize);
+        let positions = system.incidence.positions_of(layout, first as usize);
+        let mut common = 0;
+        for (p, (&group, &position)) in groups.iter().zip(positions).enumerate() {
+            match self.slots.last_mut() {
+                Some(slot) if slot.position == position as usize => slot.groups.end += 1,
+                _ => self.slots.push(Slot {
+                    position: position as usize,
+                    row: 0,
+                    dim: symbolic.dim(position as usize),
+                    groups: p..p + 1,
+                    constants: 0,
+                    kept: 0,
+                    coupling: 0,
+                }),
+            }
+            let start = self.parts.len();
+            let width = self.place_parts(layout, symbolic, group as usize);
+            self.places.push(Place { parts: start..self.parts.len(), width, rows: common });
+            common += depth * rows * width;
+        }
+        let further = self.parts.iter().map(|part| part.position);
+        let home = further.chain(positions.first().map(|&main| main as usize)).min();
+        let home = home.map_or(0, |first| symbolic.supernode_of(first));
+        let (mut kept, mut coupling) = (0, 0);
+        for slot in &mut self.slots {
+            // Every kept block of a local block is in the pattern of its home.
+            slot.row = symbolic.panel_row(home, slot.position).unwrap_or_default();
+            slot.constants = slot.groups.start * rows * depth;
+            (slot.kept, slot.coupling) = (kept, coupling);
+            kept += slot.groups.len() * rows * depth * slot.dim;
+            coupling += l * depth * slot.dim;
+        }
+        coupling = self.place_segments(symbolic, home, l * depth, coupling);
+        self.constants.resize(groups.len() * rows * depth, 0.0);
+        self.local_rows.resize(groups.len() * rows * depth * l, 0.0);
+        // Products read beyond the end.
+        self.kept_rows.resize(kept + LANES, 0.0);
+        self.common_rows.resize(common + LANES, 0.0);
+        self.coupling.resize(coupling + LANES, 0.0);
+        self.reduced.resize(l * depth, 0.0);
+        self.triangles.resize(depth, Triangle::default());
+    }
+
+    /// Appends the parts of what a group has in common with others; returns how many unknowns they have.
+    fn place_parts(&mut self, layout: &Layout, symbolic: &Symbolic, group: usize) -> usize {
+        let mut width = 0;
+        let further = layout.further_of(group).iter().map(|&block| {
+            let position = symbolic.position(block as usize);
+            (position, 0..symbolic.dim(position))
+        });
+        // The border is the last block.
+        let border = std::iter::once((symbolic.blocks() - 1, layout.border_of(group)));
+        for (position, unknowns) in further.chain(border.filter(|(_, unknowns)| !unknowns.is_empty())) {
+            let column = width;
+            width += unknowns.len();
+            self.parts.push(Part { position, unknowns, segment: 0, shift: 0, column });
+        }
+        width
+    }
+
+    /// Unites the parts that overlap or meet in one block; each segment takes `depth` rows of the coupling from `start` on.
+    fn place_segments(&mut self, symbolic: &Symbolic, home: usize, depth: usize, start: usize) -> usize {
+        self.segments.clear();
+        let mut parts: Vec<&Part> = self.parts.iter().collect();
+        parts.sort_unstable_by_key(|part| (part.position, part.unknowns.start));
+        for part in parts {
+            match self.segments.last_mut() {
+                Some(last) if part.position == last.position && part.unknowns.start <= last.unknowns.end => {
+                    last.unknowns.end = last.unknowns.end.max(part.unknowns.end);
+                }
+                _ => self.segments.push(Segment {
+                    position: part.position,
+                    unknowns: part.unknowns.clone(),
+                    row: 0,
+                    coupling: 0,
+                }),
+            }
+        }
+        let mut coupling = start;
+        for segment in &mut self.segments {
+            let first = symbolic.panel_row(home, segment.position).unwrap_or_default();
+            segment.row = first + segment.unknowns.start;
+            segment.coupling = coupling;
+            coupling += depth * segment.unknowns.len();
+        }
+        for part in &mut self.parts {
+            let key = (part.position, part.unknowns.start);
+            let after =
+                self.segments.partition_point(|segment| (segment.position, segment.unknowns.start) <= key);
+            part.segment = after.saturating_sub(1);
+            part.shift = part.unknowns.start - self.segments[part.segment].unknowns.start;
+        }
+        coupling
+    }
+}
+
+struct Gather<'a, E> {
+    stack: &'a mut Stack,
+    system: &'a System,
+    equations: &'a E,
+}
+
+impl<E: Equations> Kernel for Gather<'_, E> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+        self.stack.write(self.system, self.equations);
+    }
+}

@@ -1,0 +1,163 @@
+//! Local blocks whose equations touch the same unknowns, gathered and eliminated side by side.
+
+mod add;
+mod eliminate;
+mod gather;
+mod solve;
+
+use std::ops::Range;
+
+use super::front::Strip;
+use super::symbolic::Symbolic;
+use super::triangle::Triangle;
+use super::vectorised::{Rows, size};
+
+/// A main kept block that the local blocks are tied to.
+#[derive(Debug, Clone)]
+pub(super) struct Slot {
+    /// Its place in the order of elimination.
+    pub position: usize,
+    /// Its first row in the front.
+    pub row: usize,
+    /// Its unknowns.
+    pub dim: usize,
+    /// Its groups, counted in the pattern.
+    pub groups: Range<usize>,
+    constants: usize,
+    kept: usize,
+    coupling: usize,
+}
+
+/// Consecutive unknowns of a further kept block or of the border that the local blocks are tied to. They stand in the order of their
+/// positions, and so of their rows in the front.
+#[derive(Debug, Clone)]
+pub(super) struct Segment {
+    /// Place of the block in the order of elimination.
+    pub position: usize,
+    /// Counted from the start of the block.
+    pub unknowns: Range<usize>,
+    /// Its first row in the front.
+    pub row: usize,
+    coupling: usize,
+}
+
+impl Segment {
+    /// Where its unknowns stand in the order of elimination.
+    pub fn range(&self, symbolic: &Symbolic) -> Range<usize> {
+        let start = symbolic.range(self.position).start;
+        start + self.unknowns.start..start + self.unknowns.end
+    }
+}
+
+/// A group of equations in the pattern: what it has in common with others.
+#[derive(Debug, Clone)]
+struct Place {
+    /// Among the parts of the stack.
+    parts: Range<usize>,
+    /// Of all its parts.
+    width: usize,
+    rows: usize,
+}
+
+/// A part of what a group has in common with others: a further kept block, or a range of the border.
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    position: usize,
+    unknowns: Range<usize>,
+    /// The segment that it lies in, and how far from its start.
+    pub segment: usize,
+    pub shift: usize,
+    /// The first of its columns among those that the group has in common with others.
+    column: usize,
+}
+
+impl Part {
+    /// How many unknowns it has.
+    pub fn width(&self) -> usize {
+        self.unknowns.len()
+    }
+}
+
+/// The equations of some local blocks of one pattern and what their elimination leaves: for each of them, with N = L L^T its
+/// normal matrix, v = L^-1 n and V = L^-1 N_local,other. The normal equations of the others lose V^T V, their right-hand side V^T v.
+///
+/// What belongs to one kept block stands together, local block by local block.
+#[derive(Debug, Default)]
+pub(super) struct Stack {
+    pub locals: Vec<u32>,
+    pub slots: Vec<Slot>,
+    pub segments: Vec<Segment>,
+    pub triangles: Vec<Triangle>,
+    /// Sum of squares of the right-hand sides of the equations.
+    pub sum_of_squares: f64,
+    /// Sum of |v|^2: the decrease of the sum of squares that the local unknowns bring about.
+    pub decrease: f64,
+    /// Local blocks that their equations do not determine.
+    pub deficient: Vec<usize>,
+    places: Vec<Place>,
+    parts: Vec<Part>,
+    constants: Vec<f64>,
+    local_rows: Vec<f64>,
+    kept_rows: Vec<f64>,
+    common_rows: Vec<f64>,
+    coupling: Vec<f64>,
+    reduced: Vec<f64>,
+}
+
+impl Stack {
+    /// Unknowns of every main block that the local blocks are tied to, where all have the same number: kernels are chosen by it.
+    pub fn kept_dim(&self) -> Option<usize> {
+        let dim = self.slots.first()?.dim;
+        self.slots.iter().all(|slot| slot.dim == dim).then_some(dim)
+    }
+
+    /// The coupling to a main block, local block by local block.
+    #[inline(always)]
+    pub fn slot_coupling<const L: usize, const D: usize>(&self, slot: &Slot) -> Strip<'_> {
+        let (width, count) = (size::<D>(slot.dim), self.locals.len() * L);
+        let values = &self.coupling[slot.coupling..];
+        Strip { at: slot.row, rows: Rows { values, width, stride: width, count } }
+    }
+
+    /// The coupling to a segment, local block by local block.
+    #[inline(always)]
+    pub fn segment_coupling<const L: usize>(&self, segment: &Segment) -> Strip<'_> {
+        let (width, count) = (segment.unknowns.len(), self.locals.len() * L);
+        let values = &self.coupling[segment.coupling..];
+        Strip { at: segment.row, rows: Rows { values, width, stride: width, count } }
+    }
+
+    /// The coefficients of a main block in all its equations, local block by local block.
+    #[inline(always)]
+    pub fn slot_rows<const D: usize>(&self, slot: &Slot, rows: usize) -> Strip<'_> {
+        let (width, count) = (size::<D>(slot.dim), slot.groups.len() * self.locals.len() * rows);
+        let values = &self.kept_rows[slot.kept..];
+        Strip { at: slot.row, rows: Rows { values, width, stride: width, count } }
+    }
+
+    /// The coefficients of local block `t` of the stack in group `p` of the pattern.
+    #[inline(always)]
+    pub fn local_rows<const L: usize>(&self, t: usize, p: usize, rows: usize) -> &[[f64; L]] {
+        self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L].as_chunks().0
+    }
+
+    /// What group `p` of the pattern has in common with others.
+    #[inline(always)]
+    pub fn parts(&self, p: usize) -> &[Part] {
+        &self.parts[self.places[p].parts.clone()]
+    }
+
+    /// The coefficients of a part of group `p` of the pattern in some of its equations, which are counted local block by local block.
+    #[inline(always)]
+    pub fn part_rows(&self, p: usize, part: &Part, equations: Range<usize>) -> Strip<'_> {
+        let Place { width: stride, rows: start, .. } = self.places[p];
+        let values = &self.common_rows[start + equations.start * stride + part.column..];
+        let at = self.segments[part.segment].row + part.shift;
+        Strip { at, rows: Rows { values, width: part.width(), stride, count: equations.len() } }
+    }
+}
+
+#[inline(always)]
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}

@@ -1,0 +1,160 @@
+//! Cameras: partials against complex steps and differences, ways back, names, golden data.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
+
+use num_complex::Complex64 as C;
+use photocore::geometry::{Bal, Camera, CameraModel, Unit, Vector3};
+use proptest::prelude::*;
+use serde_json::Value;
+
+/// A camera of the model, its parameters chosen by what they are measured in from numbers between -1 and 1.
+fn sample(name: &str, numbers: &[f64]) -> Camera {
+    let (_, parameters) = Camera::model(name).unwrap();
+    let value = |(&(_, unit), number): (&(&str, Unit), &f64)| match unit {
+        Unit::Image => 900.0 + 600.0 * number,
+        Unit::One => 0.1 * number,
+    };
+    let values: Vec<f64> = parameters.iter().zip(numbers.iter().cycle()).map(value).collect();
+    Camera::named(name, &values).unwrap()
+}
+
+/// The image written out once more for complex arguments: u, then the parameters; None for a model that is not here.
+fn written_out(name: &str, v: &[C]) -> Option<[C; 2]> {
+    let radial = |k1: C, k2: C| {
+        let p = [-v[0] / v[2], -v[1] / v[2]];
+        let q = p[0] * p[0] + p[1] * p[1];
+        p.map(|p| v[3] * (1.0 + k1 * q + k2 * q * q) * p)
+    };
+    match name {
+        "perspective" => Some([v[3] * v[0] / v[2], v[3] * v[1] / v[2]]),
+        "bal" => Some(radial(v[4], v[5])),
+        "radial" => {
+            let [x, y] = radial(v[6], v[7]);
+            Some([v[4] + x, v[5] - y])
+        }
+        _ => None,
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn every_camera_sees_directions_and_has_the_partials_of_its_image(
+        sight in (prop::array::uniform2(-0.6..0.6f64), -8.0..-1.0f64),
+        numbers in prop::array::uniform5(-1.0..1.0f64),
+    ) {
+        let ([x, y], z) = sight;
+        let u = Vector3::new(-z * x, -z * y, z);
+        for name in Camera::NAMES {
+            let camera = sample(name, &numbers);
+            let image = camera.linearize(&u);
+            prop_assert_eq!(image.xy, camera.image(&u));
+            let values: Vec<f64> = u.iter().copied().chain(camera.parameters()).collect();
+            for row in 0..2 {
+                let by_u = image.by_u[row];
+                prop_assert!(by_u.dot(&u).abs() < 1e-12 * by_u.norm() * u.norm());
+                let found: Vec<f64> = by_u.iter().chain(&image.by_parameters[row]).copied().collect();
+                prop_assert_eq!(found.len(), values.len());
+                let scale = by_u.norm().max(1.0);
+                for (k, partial) in found.iter().enumerate() {
+                    let (expected, near) = partial_of(name, &values, k, row);
+                    prop_assert!((partial - expected).abs() < near * scale, "{name} {k}: {partial} {expected}");
+                }
+            }
+            let direction = camera.direction(image.xy);
+            let back = direction.map(|direction| (direction - u.normalize()).amax());
+            prop_assert!(back.is_some_and(|apart| apart < 1e-12), "{camera:?}: {direction:?}");
+            prop_assert_eq!(camera.with_parameters(&camera.parameters()), Some(camera));
+            prop_assert_eq!(camera.name(), *name);
+        }
+    }
+}
+
+/// A partial by a complex step where the model is written out, else by a central difference; and how near it is.
+fn partial_of(name: &str, values: &[f64], k: usize, row: usize) -> (f64, f64) {
+    const STEP: f64 = 1e-100;
+    let mut stepped: Vec<C> = values.iter().map(|&value| C::new(value, 0.0)).collect();
+    stepped[k].im = STEP;
+    if let Some(image) = written_out(name, &stepped) {
+        return (image[row].im / STEP, 1e-10);
+    }
+    let step = 1e-6 * values[k].abs().max(1.0);
+    let at = |step: f64| {
+        let mut moved = values.to_vec();
+        moved[k] += step;
+        let (u, parameters) = moved.split_at(3);
+        Camera::named(name, parameters).unwrap().image(&Vector3::from_column_slice(u))[row]
+    };
+    ((at(step) - at(-step)) / (2.0 * step), 1e-5)
+}
+
+#[test]
+fn a_camera_has_a_name_and_as_many_parameters_as_its_model() {
+    assert_eq!(Camera::named("nothing", &[]), None);
+    assert_eq!(Camera::model("nothing"), None);
+    for name in Camera::NAMES {
+        let (formula, parameters) = Camera::model(name).unwrap();
+        assert!(formula.contains("image = "), "{name}");
+        assert!(Camera::named(name, &vec![1.0; parameters.len() + 1]).is_none());
+        let camera = Camera::named(name, &vec![1.0; parameters.len()]).unwrap();
+        assert_eq!(camera.parameter_names(), parameters);
+        assert_eq!(camera.with_parameters(&[]), None);
+    }
+}
+
+#[test]
+fn a_lens_beyond_which_nothing_is_seen_says_so() {
+    let barrel = Bal { focal_length: 1000.0, radial: [-0.3, 0.0] };
+    // r (1 - 0.3 r^2) rises to r = 1.054.
+    let edge = 1000.0 * (1.0f64 / 0.9).sqrt() * 2.0 / 3.0;
+    assert!(barrel.direction([edge - 1.0, 0.0]).is_some());
+    assert!(barrel.direction([edge + 1.0, 0.0]).is_none());
+    assert!(barrel.direction([f64::NAN, 0.0]).is_none());
+    assert_eq!(barrel.direction([0.0, 0.0]), Some(-Vector3::z()));
+}
+
+fn list(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+}
+
+/// Images to 1e-12 of their size, partials to 1e-10 of the largest of their row, and the way back.
+fn agrees(name: &str, model: &Value, ray: &str, axes: Vector3) {
+    let camera = Camera::named(name, &list(&model["values"])).unwrap();
+    for entry in model["rays"].as_array().unwrap() {
+        let u = Vector3::from_vec(list(&entry[ray])).component_mul(&axes);
+        let (image, expected) = (camera.linearize(&u), list(&entry["image"]));
+        for row in 0..2 {
+            let size = expected[0].hypot(expected[1]).max(1.0);
+            assert!((image.xy[row] - expected[row]).abs() < 1e-12 * size, "{name} {u}");
+            let by_ray = Vector3::from_vec(list(&entry["d_image_d_ray"][row])).component_mul(&axes);
+            assert!((image.by_u[row] - by_ray).amax() < 1e-10 * by_ray.amax(), "{name} {u}");
+            let by_parameters = list(&entry["d_image_d_params"][row]);
+            let largest = by_parameters.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+            for (found, expected) in image.by_parameters[row].iter().zip(&by_parameters) {
+                assert!((found - expected).abs() < 1e-10 * largest, "{name} {u}");
+            }
+        }
+        if u.z < 0.0 {
+            let direction = camera.direction([expected[0], expected[1]]).unwrap();
+            assert!((direction - u.normalize()).amax() < 1e-12, "{name} {u}");
+        }
+    }
+}
+
+#[test]
+fn cameras_agree_with_the_golden_data() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/network/camera_models.json");
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) => return eprintln!("skipped: {path}: {error}"),
+    };
+    let data: Value = serde_json::from_str(&text).unwrap();
+    agrees("bal", &data["bal"], "ray_photo_axes", Vector3::new(1.0, 1.0, 1.0));
+    let vision = Vector3::new(1.0, -1.0, -1.0);
+    agrees("radial", &data["forward"]["RADIAL"], "ray", vision);
+    // SIMPLE_RADIAL is the same camera with its last parameter held at zero.
+    let mut simple = data["forward"]["SIMPLE_RADIAL"].clone();
+    simple["values"].as_array_mut().unwrap().push(0.0.into());
+    agrees("radial", &simple, "ray", vision);
+}

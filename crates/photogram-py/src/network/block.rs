@@ -1,0 +1,125 @@
+//! What an adjustment of a block is given: photos whose cameras are known, poses in angles.
+
+use numpy::PyReadonlyArrayDyn;
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
+use photocore::geometry::{Perspective, PoseNumbers};
+use photocore::network::{Camera, Network, Options, Photo, Start, UnitVariance};
+use pyo3::prelude::*;
+
+use super::observations::{Group, observations};
+use super::solution::BlockSolution;
+use super::{BlockError, adjusted, failure, images, points};
+use crate::arrays::{check_lengths, numbers, rows};
+use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
+use crate::options::{named_loss, named_ordering, unknown};
+
+/// Adds the function to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(adjust_block, module)?)
+}
+
+#[pyfunction]
+#[pyo3(signature = (
+    photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
+    principal_distances, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
+    covariance, loss, ordering, unit_variance, threads, memory, progress
+))]
+fn adjust_block(
+    py: Python<'_>,
+    photo_positions: PyReadonlyArrayDyn<'_, f64>,
+    photo_attitudes: PyReadonlyArrayDyn<'_, f64>,
+    photo_positions_observed: PyReadonlyArrayDyn<'_, f64>,
+    photo_attitudes_observed: PyReadonlyArrayDyn<'_, f64>,
+    photo_position_sd: PyReadonlyArrayDyn<'_, f64>,
+    photo_attitude_sd: PyReadonlyArrayDyn<'_, f64>,
+    principal_distances: PyReadonlyArrayDyn<'_, f64>,
+    point_positions: PyReadonlyArrayDyn<'_, f64>,
+    point_sd: PyReadonlyArrayDyn<'_, f64>,
+    image_photos: PyReadonlyArrayDyn<'_, i64>,
+    image_points: PyReadonlyArrayDyn<'_, i64>,
+    image_xy: PyReadonlyArrayDyn<'_, f64>,
+    image_sd: PyReadonlyArrayDyn<'_, f64>,
+    observation_groups: Vec<Group<'_>>,
+    spheroid: Option<(f64, f64)>,
+    photo_to_ground: bool,
+    refraction: Option<RefractionRow>,
+    criterion: &str,
+    limit: f64,
+    max_iterations: usize,
+    covariance: bool,
+    loss: Option<(&str, f64)>,
+    ordering: &str,
+    unit_variance: &str,
+    threads: usize,
+    memory: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<BlockSolution> {
+    let positions = rows("photo_positions", &photo_positions)?;
+    let attitudes = rows("photo_attitudes", &photo_attitudes)?;
+    let positions_observed = rows("photo_positions_observed", &photo_positions_observed)?;
+    let attitudes_observed = rows("photo_attitudes_observed", &photo_attitudes_observed)?;
+    let position_sd = rows("photo_position_sd", &photo_position_sd)?;
+    let attitude_sd = rows("photo_attitude_sd", &photo_attitude_sd)?;
+    let distances = numbers("principal_distances", &principal_distances)?;
+    check_lengths(
+        ("photo_positions", positions.len()),
+        &[
+            ("photo_attitudes", attitudes.len()),
+            ("photo_positions_observed", positions_observed.len()),
+            ("photo_attitudes_observed", attitudes_observed.len()),
+            ("photo_position_sd", position_sd.len()),
+            ("photo_attitude_sd", attitude_sd.len()),
+            ("principal_distances", distances.len()),
+        ],
+    )?;
+    let mut cameras: Vec<f64> = Vec::new();
+    let photo = |i: usize| {
+        if cameras.last() != Some(&distances[i]) {
+            cameras.push(distances[i]);
+        }
+        Photo {
+            pose: six(positions[i], attitudes[i]),
+            observed: six(positions_observed[i], attitudes_observed[i]),
+            sd: six(position_sd[i], attitude_sd[i]),
+            camera: cameras.len() - 1,
+        }
+    };
+    let photos = (0..positions.len()).map(photo).collect();
+    let camera = |principal_distance| Camera::held(Perspective { principal_distance }.into());
+    let network = Network {
+        space: object_space(spheroid)?,
+        poses: PoseNumbers::Angles(rotation_sense(photo_to_ground)),
+        refraction: refraction.map(refraction_of).transpose()?,
+        cameras: cameras.into_iter().map(camera).collect(),
+        photos,
+        points: points(&point_positions, &point_sd)?,
+        images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
+        observations: observations(&observation_groups)?,
+    };
+    let method = match criterion {
+        "fraction" => Method::Damped(Stop::Fraction(limit)),
+        "percent" => Method::Full(Published::Percent(limit)),
+        other => return Err(unknown("criterion", other)),
+    };
+    let options = Options {
+        adjustment: AdjustmentOptions { method, max_iterations, covariance, loss: named_loss(loss)? },
+        ordering: named_ordering(ordering)?,
+        unit_variance: match unit_variance {
+            "free" => UnitVariance::Free,
+            "constrained" => UnitVariance::Constrained,
+            "unity" => UnitVariance::Unity,
+            other => return Err(unknown("unit_variance", other)),
+        },
+        start: Start::Intersected,
+        hold_unused: false,
+        memory,
+    };
+    let solution = adjusted(py, &network, &options, threads, progress)?;
+    solution
+        .map(|solution| BlockSolution { solution, unknowns: 6 })
+        .map_err(|error| BlockError::new_err(failure(&error, "block")))
+}
+
+fn six([a, b, c]: [f64; 3], [d, e, f]: [f64; 3]) -> [f64; 6] {
+    [a, b, c, d, e, f]
+}

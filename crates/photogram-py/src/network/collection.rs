@@ -1,0 +1,135 @@
+//! What an adjustment of a collection is given: every photo with a camera of its own, poses in vectors.
+
+use numpy::{PyArray2, PyReadonlyArrayDyn};
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
+use photocore::geometry::{self, ObjectSpace, Orientation, Point as GroundPoint, PoseNumbers, Unit};
+use photocore::network::{Camera, Network, NetworkError as Failure, Options, Photo, Start, UnitVariance};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::solution::CollectionSolution;
+use super::{CollectionError, adjusted, failure, images, points, said};
+use crate::arrays::{check_lengths, rows, slices, table};
+use crate::options::{named_loss, named_ordering, unknown};
+
+/// Adds the functions to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("CAMERAS", geometry::Camera::NAMES.to_vec())?;
+    module.add_function(wrap_pyfunction!(camera_model, module)?)?;
+    module.add_function(wrap_pyfunction!(collection_images, module)?)?;
+    module.add_function(wrap_pyfunction!(adjust_collection, module)?)
+}
+
+/// Parameters of a pose in vectors.
+const POSE: usize = 6;
+
+/// Formula and parameters of a camera.
+fn model(camera: &str) -> PyResult<(&'static str, &'static [(&'static str, Unit)])> {
+    geometry::Camera::model(camera).ok_or_else(|| unknown("camera", camera))
+}
+
+#[pyfunction]
+fn camera_model(camera: &str) -> PyResult<(&'static str, Vec<(&'static str, bool)>)> {
+    let (formula, parameters) = model(camera)?;
+    Ok((formula, parameters.iter().map(|&(name, unit)| (name, unit == Unit::Image)).collect()))
+}
+
+/// Pose and camera of every row of an (n, 6 + k) array.
+fn photos(
+    camera: &str,
+    name: &str,
+    array: &PyReadonlyArrayDyn<'_, f64>,
+) -> PyResult<Vec<([f64; POSE], geometry::Camera)>> {
+    let split = |row: Vec<f64>| {
+        let (pose, own) = row.split_first_chunk().ok_or_else(|| unknown("camera", camera))?;
+        Ok((*pose, geometry::Camera::named(camera, own).ok_or_else(|| unknown("camera", camera))?))
+    };
+    slices(name, array, POSE + model(camera)?.1.len())?.into_iter().map(split).collect()
+}
+
+#[pyfunction]
+fn collection_images<'py>(
+    py: Python<'py>,
+    camera: &str,
+    photo_parameters: PyReadonlyArrayDyn<'py, f64>,
+    points: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let photos = photos(camera, "photo_parameters", &photo_parameters)?;
+    let points = rows("points", &points)?;
+    check_lengths(("points", points.len()), &[("photo_parameters", photos.len())])?;
+    let image = |(([a, b, c, x, y, z], camera), point): (([f64; POSE], geometry::Camera), [f64; 3])| {
+        let orientation = Orientation::from_vectors([a, b, c].into(), [x, y, z].into());
+        camera.image(&orientation.sight(&GroundPoint::new(ObjectSpace::Rectangular, point)))
+    };
+    let images = py.detach(|| photos.into_iter().zip(points).map(image).collect());
+    table(py, images)
+}
+
+#[pyfunction]
+#[pyo3(signature = (
+    camera, photo_parameters, photo_sd, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, decrease,
+    max_iterations, covariance, loss, ordering, threads, memory, progress
+))]
+fn adjust_collection(
+    py: Python<'_>,
+    camera: &str,
+    photo_parameters: PyReadonlyArrayDyn<'_, f64>,
+    photo_sd: PyReadonlyArrayDyn<'_, f64>,
+    point_positions: PyReadonlyArrayDyn<'_, f64>,
+    point_sd: PyReadonlyArrayDyn<'_, f64>,
+    image_photos: PyReadonlyArrayDyn<'_, i64>,
+    image_points: PyReadonlyArrayDyn<'_, i64>,
+    image_xy: PyReadonlyArrayDyn<'_, f64>,
+    image_sd: PyReadonlyArrayDyn<'_, f64>,
+    decrease: f64,
+    max_iterations: usize,
+    covariance: bool,
+    loss: Option<(&str, f64)>,
+    ordering: &str,
+    threads: usize,
+    memory: Option<usize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<CollectionSolution> {
+    let given = photos(camera, "photo_parameters", &photo_parameters)?;
+    let unknowns = POSE + model(camera)?.1.len();
+    let sd = slices("photo_sd", &photo_sd, unknowns)?;
+    check_lengths(("photo_parameters", given.len()), &[("photo_sd", sd.len())])?;
+    let photo = |(camera, ((pose, _), sd)): (usize, (&([f64; POSE], _), &Vec<f64>))| Photo {
+        pose: *pose,
+        observed: *pose,
+        sd: std::array::from_fn(|k| sd[k]),
+        camera,
+    };
+    let own = |((_, camera), sd): (&(_, geometry::Camera), &Vec<f64>)| Camera {
+        camera: *camera,
+        sd: sd[POSE..].to_vec(),
+    };
+    let network = Network {
+        space: ObjectSpace::Rectangular,
+        poses: PoseNumbers::Vectors,
+        refraction: None,
+        cameras: given.iter().zip(&sd).map(own).collect(),
+        photos: given.iter().zip(&sd).enumerate().map(photo).collect(),
+        points: points(&point_positions, &point_sd)?,
+        images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
+        observations: vec![],
+    };
+    let options = Options {
+        adjustment: AdjustmentOptions {
+            method: Method::TrustRegion(Stop::Decrease(decrease)),
+            max_iterations,
+            covariance,
+            loss: named_loss(loss)?,
+        },
+        ordering: named_ordering(ordering)?,
+        unit_variance: UnitVariance::Constrained,
+        start: Start::Given,
+        hold_unused: true,
+        memory,
+    };
+    let solution = adjusted(py, &network, &options, threads, progress)?;
+    solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| match error {
+        Failure::Index(_) => PyValueError::new_err(said(&error, "collection")),
+        error => CollectionError::new_err(failure(&error, "collection")),
+    })
+}

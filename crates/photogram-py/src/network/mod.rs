@@ -1,0 +1,110 @@
+//! Networks of photos: blocks and collections; their documentation is in `_photocore.pyi`.
+
+mod block;
+mod collection;
+mod observations;
+mod solution;
+
+use numpy::PyReadonlyArrayDyn;
+use photocore::network::{Coarse, Image, Network, NetworkError as Failure, Options, Point, Solution};
+use pyo3::create_exception;
+use pyo3::exceptions::PyException;
+use pyo3::prelude::*;
+
+use crate::arrays::{check_lengths, indices, rows};
+use crate::work::{Workers, watched};
+
+create_exception!(
+    _photocore,
+    BlockError,
+    PyException,
+    "The block cannot be adjusted: (kind, message, photos, points)."
+);
+create_exception!(
+    _photocore,
+    CollectionError,
+    PyException,
+    "The collection cannot be adjusted: (kind, message, photos, points)."
+);
+
+/// Adds the functions and classes to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("BlockError", module.py().get_type::<BlockError>())?;
+    module.add("CollectionError", module.py().get_type::<CollectionError>())?;
+    block::register(module)?;
+    collection::register(module)?;
+    solution::register(module)
+}
+
+/// Points with their standard deviations.
+fn points(positions: &PyReadonlyArrayDyn<'_, f64>, sd: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<Point>> {
+    let coordinates = rows("point_positions", positions)?;
+    let sd = rows("point_sd", sd)?;
+    check_lengths(("point_positions", coordinates.len()), &[("point_sd", sd.len())])?;
+    Ok(coordinates.into_iter().zip(sd).map(|(coordinates, sd)| Point { coordinates, sd }).collect())
+}
+
+/// Image points: indices of their photos and points, coordinates and standard deviations.
+fn images(
+    photos: &PyReadonlyArrayDyn<'_, i64>,
+    points: &PyReadonlyArrayDyn<'_, i64>,
+    xy: &PyReadonlyArrayDyn<'_, f64>,
+    sd: &PyReadonlyArrayDyn<'_, f64>,
+) -> PyResult<Vec<Image>> {
+    let photos = indices("image_photos", photos)?;
+    let points = indices("image_points", points)?;
+    let xy = rows("image_xy", xy)?;
+    let sd = rows("image_sd", sd)?;
+    check_lengths(
+        ("image_xy", xy.len()),
+        &[("image_photos", photos.len()), ("image_points", points.len()), ("image_sd", sd.len())],
+    )?;
+    let image = |i: usize| Image { photo: photos[i], point: points[i], xy: xy[i], sd: sd[i] };
+    Ok((0..xy.len()).map(image).collect())
+}
+
+fn adjusted(
+    py: Python<'_>,
+    network: &Network,
+    options: &Options,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Result<Solution, Failure>> {
+    let workers = Workers::of(threads, network.images.len());
+    watched(py, workers, progress, |pool, watch| network.adjust(options, pool, watch))
+}
+
+/// Kind, message, and the photos and points concerned.
+type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>);
+
+/// A failure as Python sees it.
+fn failure(error: &Failure, what: &str) -> FailureRow {
+    let (kind, photos, points) = match error {
+        Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
+        Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
+        Failure::Undetermined(combinations) => {
+            let photos = combinations.iter().map(|combination| combination.photos.clone()).collect();
+            ("undetermined photos", photos, vec![])
+        }
+        Failure::Coarse(Coarse { photos, points }) => ("coarse", vec![photos.clone()], points.clone()),
+        Failure::Empty => ("empty", vec![], vec![]),
+        Failure::NotFinite => ("not finite", vec![], vec![]),
+        Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
+        Failure::Index(_)
+        | Failure::NoCamera(_)
+        | Failure::CameraDeviations(_)
+        | Failure::Observation { .. }
+        | Failure::Vectors
+        | Failure::Layout(_)
+        | Failure::Interrupted => ("input", vec![], vec![]),
+    };
+    (kind, said(error, what), photos, points)
+}
+
+/// What went wrong, in terms of what was given: a block or a collection.
+fn said(error: &Failure, what: &str) -> String {
+    match error {
+        Failure::Index(image) => format!("image {image} names a photo or point that is not in the {what}"),
+        error => error.to_string(),
+    }
+}

@@ -1,0 +1,294 @@
+//! What an adjustment of a network has found, as arrays.
+
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use photocore::network::{AdjustedPhoto, Solution};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::observations::{AdjustedRow, adjusted_row};
+use super::{FailureRow, failure};
+use crate::arrays::{squares, table};
+use crate::solution::{
+    IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
+};
+
+/// Adds the classes to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<BlockSolution>()?;
+    module.add_class::<CollectionSolution>()
+}
+
+/// Cofactors of so many unknowns of each photo, (n, N, N); those of held ones are zero.
+fn photo_cofactors<'py>(
+    py: Python<'py>,
+    photos: &[AdjustedPhoto],
+    unknowns: usize,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let mut all = vec![0.0; photos.len() * unknowns * unknowns];
+    for (photo, matrix) in photos.iter().zip(all.chunks_exact_mut(unknowns * unknowns)) {
+        let own = photo.redundancy.len();
+        for (row, values) in photo.cofactors.chunks_exact(own).enumerate() {
+            matrix[row * unknowns..][..own].copy_from_slice(values);
+        }
+        if photo.cofactors[0].is_nan() {
+            matrix.fill(f64::NAN);
+        }
+    }
+    PyArray1::from_vec(py, all).reshape([photos.len(), unknowns, unknowns])
+}
+
+/// Redundancy numbers of so many unknowns of each photo, (n, N); those of held ones are zero.
+fn photo_redundancy<'py>(
+    py: Python<'py>,
+    photos: &[AdjustedPhoto],
+    unknowns: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let mut all = vec![0.0; photos.len() * unknowns];
+    for (photo, row) in photos.iter().zip(all.chunks_exact_mut(unknowns)) {
+        row[..photo.redundancy.len()].copy_from_slice(&photo.redundancy);
+        if photo.redundancy[0].is_nan() {
+            row.fill(f64::NAN);
+        }
+    }
+    PyArray1::from_vec(py, all).reshape([photos.len(), unknowns])
+}
+
+/// A class of adjusted networks: what all have, and what the class has besides.
+macro_rules! solution_class {
+    ($(#[$doc:meta])* $class:ident, $what:literal, { $($own:tt)* }) => {
+        $(#[$doc])*
+        #[pyclass(frozen, module = "photogram._photocore")]
+        pub struct $class {
+            pub solution: Solution,
+            /// Of a photo: its pose, and its camera where that may be unknown.
+            pub unknowns: usize,
+        }
+
+        #[pymethods]
+        impl $class {
+            #[getter]
+            fn status(&self) -> &'static str {
+                status_name(self.solution.adjustment.status)
+            }
+
+            #[getter]
+            fn initial_sum_of_squares(&self) -> f64 {
+                self.solution.adjustment.initial_sum_of_squares
+            }
+
+            #[getter]
+            fn iterations(&self) -> Vec<IterationRow> {
+                self.solution.adjustment.iterations.iter().map(iteration_row).collect()
+            }
+
+            #[getter]
+            fn photo_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+                photo_cofactors(py, &self.solution.photos, self.unknowns)
+            }
+
+            #[getter]
+            fn photo_redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+                photo_redundancy(py, &self.solution.photos, self.unknowns)
+            }
+
+            #[getter]
+            fn point_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+                let missing = [f64::NAN; 3];
+                table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.coordinates)).collect())
+            }
+
+            #[getter]
+            fn point_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+                let missing = [[f64::NAN; 3]; 3];
+                squares(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.cofactors)).collect())
+            }
+
+            #[getter]
+            fn point_redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+                let missing = [f64::NAN; 3];
+                table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.redundancy)).collect())
+            }
+
+            #[getter]
+            fn point_rays<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+                let rays = self.solution.points.iter().map(|p| p.map_or(0, |p| p.rays as i64));
+                PyArray1::from_vec(py, rays.collect())
+            }
+
+            #[getter]
+            fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+                image_table(py, &self.solution.images, |image| image.residual)
+            }
+
+            #[getter]
+            fn redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+                image_table(py, &self.solution.images, |image| image.redundancy)
+            }
+
+            #[getter]
+            fn standardized<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+                image_table(py, &self.solution.images, |image| image.standardized)
+            }
+
+            #[getter]
+            fn image_weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+                image_weights(py, &self.solution.images)
+            }
+
+            #[getter]
+            fn redundancy_excess(&self) -> Option<f64> {
+                self.solution.adjustment.redundancy_excess
+            }
+
+            #[getter]
+            fn undetermined(&self) -> Option<FailureRow> {
+                self.solution.undetermined.as_ref().map(|error| failure(error, $what))
+            }
+
+            #[getter]
+            fn degrees_of_freedom(&self) -> i64 {
+                self.solution.degrees_of_freedom
+            }
+
+            #[getter]
+            fn variance_of_unit_weight(&self) -> Option<f64> {
+                self.solution.variance_of_unit_weight
+            }
+
+            #[getter]
+            fn counts(&self) -> (usize, usize, usize) {
+                let counts = self.solution.adjustment.counts;
+                (counts.observations, counts.weighted, counts.unknowns)
+            }
+
+            #[getter]
+            fn ordering(&self) -> &'static str {
+                self.solution.adjustment.ordering.name()
+            }
+
+            #[getter]
+            fn predictions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+                predictions(py, &self.solution.adjustment)
+            }
+
+            #[getter]
+            fn operations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+                operations(py, &self.solution.adjustment)
+            }
+
+            #[getter]
+            fn formations(&self) -> usize {
+                self.solution.adjustment.formations
+            }
+
+            #[getter]
+            fn seconds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+                seconds(py, &self.solution.adjustment)
+            }
+
+            $($own)*
+        }
+    };
+}
+
+solution_class! {
+    /// An adjusted block.
+    BlockSolution, "block", {
+        #[getter]
+        fn photo_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+            let iterations = &self.solution.photo_corrections;
+            let values = iterations.iter().flatten().copied().collect();
+            PyArray1::from_vec(py, values).reshape([iterations.len(), self.solution.photos.len(), 6])
+        }
+
+        #[getter]
+        fn photo_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+            let position = |photo: &AdjustedPhoto| std::array::from_fn::<_, 3, _>(|k| photo.pose[k]);
+            table(py, self.solution.photos.iter().map(position).collect())
+        }
+
+        #[getter]
+        fn photo_attitudes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+            let attitude = |photo: &AdjustedPhoto| std::array::from_fn::<_, 3, _>(|k| photo.pose[3 + k]);
+            table(py, self.solution.photos.iter().map(attitude).collect())
+        }
+
+        #[getter]
+        fn point_last_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+            let missing = [f64::NAN; 3];
+            table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.last_correction)).collect())
+        }
+
+        #[getter]
+        fn images_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+            PyArray1::from_vec(py, self.solution.behind.iter().map(|&image| image as i64).collect())
+        }
+
+        #[getter]
+        fn weak(&self) -> Vec<(usize, usize)> {
+            self.solution.weak.clone()
+        }
+
+        #[getter]
+        fn dropped(&self) -> Vec<(usize, &'static str)> {
+            self.solution.dropped.iter().map(|dropped| (dropped.point, dropped.reason.name())).collect()
+        }
+
+        #[getter]
+        fn sums_of_squares(&self) -> (f64, f64, f64, f64) {
+            let sums = self.solution.sums_of_squares;
+            (sums.camera, sums.ground, sums.plates, sums.observations)
+        }
+
+        #[getter]
+        fn adjusted_observations(&self) -> Vec<Option<AdjustedRow>> {
+            self.solution.observations.iter().map(|own| own.as_ref().map(adjusted_row)).collect()
+        }
+
+        #[getter]
+        fn photo_order<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+            let order = &self.solution.adjustment.order;
+            // A border of common unknowns is no photo.
+            let photos = order.iter().filter(|&&block| block < self.solution.photos.len());
+            PyArray1::from_vec(py, photos.map(|&photo| photo as i64).collect())
+        }
+    }
+}
+
+solution_class! {
+    /// An adjusted collection.
+    CollectionSolution, "collection", {
+        #[getter]
+        fn photo_parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+            let parameters = |photo: &AdjustedPhoto| [&photo.pose, photo.camera.as_slice()].concat();
+            let all = self.solution.photos.iter().flat_map(parameters).collect();
+            PyArray1::from_vec(py, all).reshape([self.solution.photos.len(), self.unknowns])
+        }
+
+        #[getter]
+        fn photo_images<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+            PyArray1::from_vec(py, self.solution.photos.iter().map(|photo| photo.images as i64).collect())
+        }
+
+        #[getter]
+        fn point_rays_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+            let behind = self.solution.points.iter().map(|p| p.map_or(0, |p| p.behind as i64));
+            PyArray1::from_vec(py, behind.collect())
+        }
+
+        #[getter]
+        fn collapsed(&self) -> Vec<usize> {
+            self.solution.collapsed.clone()
+        }
+
+        #[getter]
+        fn sum_of_squares(&self) -> f64 {
+            self.solution.sums_of_squares.total()
+        }
+
+        #[getter]
+        fn datum(&self) -> Vec<(usize, usize)> {
+            self.solution.datum.clone()
+        }
+    }
+}

@@ -1,0 +1,263 @@
+"""Attitudes in every representation, with their covariances.
+
+An attitude is a matrix A whose columns are the photo's axes in object space: x to the right, y up, z back
+towards the viewer; the camera looks along -z. Whatever numbers a file or a user has for it, they come in by
+:meth:`Attitudes.of`, and go out by :meth:`Attitudes.values` and :meth:`Attitudes.covariances`.
+`docs/conventions.md` has the equations, and a figure for each convention.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram import _photocore
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import frozen, length, numbers, one_of, shaped
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["Attitudes", "Mounting", "Representation"]
+
+Representation = Literal[
+    "omega_phi_kappa",
+    "omega_phi_kappa_photo_to_ground",
+    "phi_omega_kappa",
+    "azimuth_tilt_swing",
+    "yaw_pitch_roll",
+    "quaternion",
+    "quaternion_to_vision",
+    "rotation_vector",
+    "rotation_vector_to_photo",
+    "rotation_vector_to_vision",
+    "matrix",
+    "matrix_to_photo",
+    "matrix_to_vision",
+    "matrix_from_vision",
+]
+Mounting = Literal["top forward", "top right", "top back", "top left"]
+
+_TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])
+"""F: vision axes (x right, y down, z forward) from photo axes, and back."""
+_ORTHONORMAL = 1e-6
+"""What the product of a matrix with its transpose may differ from the identity by."""
+_LEAST_LENGTH = 1e-100
+"""Of a quaternion: the square of a shorter one is not a number to divide by."""
+
+_Numbers: TypeAlias = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Attitudes:
+    """Attitudes of n photos, whatever they were given as.
+
+    Parameters
+    ----------
+    matrices
+        A, (n, 3, 3), photo to object: columns are the photo's axes.
+    step_covariances
+        (n, 3, 3) of the rotation step rho about the photo's own axes, A Exp(rho), rad^2; None where they are
+        not known.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from photogram import Attitudes
+    >>> flown = Attitudes.of("yaw_pitch_roll", np.radians([[90.0, 0.0, 0.0]]))
+    >>> np.degrees(flown.values("omega_phi_kappa")).round(6) + 0.0
+    array([[  0.,   0., -90.]])
+    """
+
+    matrices: Floats
+    step_covariances: Floats | None = None
+
+    def __post_init__(self) -> None:
+        count = length("matrices", self.matrices)
+        object.__setattr__(self, "matrices", shaped("matrices", self.matrices, (count, 3, 3)))
+        _check_orthonormal(self.matrices)
+        if self.step_covariances is not None:
+            covariances = shaped("step_covariances", self.step_covariances, (count, 3, 3))
+            object.__setattr__(self, "step_covariances", covariances)
+
+    def __len__(self) -> int:
+        return len(self.matrices)
+
+    @classmethod
+    def of(
+        cls,
+        representation: Representation,
+        values: ArrayLike,
+        covariances: ArrayLike | None = None,
+        *,
+        mounting: Mounting | ArrayLike = "top forward",
+    ) -> Attitudes:
+        """Attitudes from numbers.
+
+        Parameters
+        ----------
+        representation
+            What the numbers are (specified in `docs/conventions.md`); angles in radians:
+
+            - "omega_phi_kappa": A = (Mz(kappa) My(phi) Mx(omega))', ground to photo; with
+              "_photo_to_ground" A is the product itself;
+            - "phi_omega_kappa": A = (Mz(kappa) Mx(omega) My(phi))', in the order phi, omega, kappa;
+            - "azimuth_tilt_swing": azimuth of the direction of view clockwise from +Y, tilt from the
+              nadir, swing clockwise from the photo's +y to the nadir point;
+            - "yaw_pitch_roll": of an aircraft; yaw clockwise from north, nose up, right wing down; object
+              axes are east, north, up;
+            - "quaternion": w, x, y, z of A; with "_to_vision" of F A' (COLMAP);
+            - "rotation_vector": of A; with "_to_photo" of A' (Bundler, BAL), with "_to_vision" of F A'
+              (OpenCV);
+            - "matrix": A; with "_to_photo" A', with "_to_vision" F A' (COLMAP, OpenCV), with "_from_vision"
+              A F (Metashape): F turns photo axes into vision axes, x right, y down, z forward.
+        values
+            (n, 3), of quaternions (n, 4), of matrices (n, 3, 3). Quaternions may have any length but zero.
+        covariances
+            Of the numbers, (n, k, k); of matrices those of the rotation step, (n, 3, 3).
+        mounting
+            Of yaw, pitch, roll: how a camera that looks at the nadir has the top of its pictures, or the
+            boresight matrix (3, 3), photo axes from body axes (forward, right, down).
+
+        Raises
+        ------
+        InputError
+            Other shapes, numbers that are not finite, a matrix that is not orthonormal or mirrored, a
+            quaternion of length zero.
+        """
+        one_of("representation", representation, get_args(Representation))
+        if representation.startswith("matrix"):
+            return cls(_from_matrices(representation, values), _given(covariances))
+        found, rates = _from_numbers(representation, values, _boresight(mounting))
+        if covariances is None:
+            return cls(found)
+        width = rates.shape[2]
+        own = shaped("covariances", covariances, (len(found), width, width))
+        return cls(found, rates @ own @ rates.transpose(0, 2, 1))
+
+    def values(
+        self, representation: Representation, *, mounting: Mounting | ArrayLike = "top forward"
+    ) -> Floats:
+        """Return the numbers of a representation: (n, 3), of quaternions (n, 4), of matrices (n, 3, 3).
+
+        Where two angles turn about one axis (phi of +-90 degrees, a vertical photo's azimuth and swing), one
+        of them is zero. Of quaternions w is not negative. Arguments are those of :meth:`of`.
+        """
+        one_of("representation", representation, get_args(Representation))
+        if representation.startswith("matrix"):
+            return _to_matrices(representation, self.matrices)
+        return _photocore.numbers_of_attitudes(representation, self.matrices, _boresight(mounting))[0]
+
+    def covariances(
+        self, representation: Representation, *, mounting: Mounting | ArrayLike = "top forward"
+    ) -> Floats:
+        """Covariances of these numbers, (n, k, k); NaN where two angles turn about one axis.
+
+        Of matrices: that of the rotation step, (n, 3, 3). Arguments are those of :meth:`of`.
+
+        Raises
+        ------
+        InputError
+            Attitudes without covariances.
+        """
+        one_of("representation", representation, get_args(Representation))
+        own = self.step_covariances
+        if own is None:
+            raise InputError("these attitudes have no covariances")
+        if representation.startswith("matrix"):
+            return own
+        partials = _photocore.numbers_of_attitudes(representation, self.matrices, _boresight(mounting))[1]
+        found: Floats = partials @ own @ partials.transpose(0, 2, 1)
+        return found
+
+    def standard_deviations(
+        self, representation: Representation, *, mounting: Mounting | ArrayLike = "top forward"
+    ) -> Floats:
+        """Roots of the diagonals of :meth:`covariances`, (n, k)."""
+        covariances = self.covariances(representation, mounting=mounting)
+        found: Floats = np.sqrt(np.einsum("nii->ni", covariances))
+        return found
+
+    def translations(self, positions: ArrayLike) -> Floats:
+        """Return t = -R C, (n, 3), of projection centres C: with R = F A' the pose of COLMAP and OpenCV."""
+        centres = shaped("positions", positions, (len(self), 3))
+        found: Floats = -np.einsum("nij,nj->ni", self.values("matrix_to_vision"), centres)
+        return found
+
+    def positions(self, translations: ArrayLike) -> Floats:
+        """Projection centres C = -R' t, (n, 3), the inverse of :meth:`translations`."""
+        shifts = shaped("translations", translations, (len(self), 3))
+        found: Floats = -np.einsum("nji,nj->ni", self.values("matrix_to_vision"), shifts)
+        return found
+
+
+def _from_numbers(representation: str, values: ArrayLike, boresight: Floats) -> _Numbers:
+    """Matrices A, and the partials of the rotation step by the numbers."""
+    given = numbers("values", values)
+    if not np.isfinite(given).all():
+        raise InputError("values has numbers that are not finite")
+    if representation.startswith("quaternion") and given.ndim == 2:
+        short = np.flatnonzero(np.hypot.reduce(given, axis=1) < _LEAST_LENGTH)
+        if short.size:
+            raise InputError(f"the quaternion of row {short[0]} has no length")
+    return _photocore.attitudes_from_numbers(representation, given, boresight)
+
+
+_FROM: dict[str, Callable[[Floats], Floats]] = {
+    "matrix": lambda a: a,
+    "matrix_to_photo": lambda a: a.transpose(0, 2, 1),
+    "matrix_to_vision": lambda a: a.transpose(0, 2, 1) @ _TO_VISION,
+    "matrix_from_vision": lambda a: a @ _TO_VISION,
+}
+
+
+def _from_matrices(representation: str, values: ArrayLike) -> Floats:
+    given = shaped("values", values, (length("values", values), 3, 3))
+    _check_orthonormal(given)
+    # One step of Newton's method for the nearest orthonormal matrix: files hold few digits.
+    found: Floats = given @ (3.0 * np.eye(3) - given.transpose(0, 2, 1) @ given) / 2.0
+    return _FROM[representation](found)
+
+
+def _to_matrices(representation: str, attitudes: Floats) -> Floats:
+    if representation == "matrix_to_vision":
+        found: Floats = _TO_VISION @ attitudes.transpose(0, 2, 1)
+        return found
+    return _FROM[representation](attitudes)
+
+
+def _check_orthonormal(matrices: Floats) -> None:
+    """Refuse matrices that are no rotations."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        excess = np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    bad = np.flatnonzero(~(excess <= _ORTHONORMAL))
+    if bad.size:
+        raise InputError(f"the matrix of row {bad[0]} is not orthonormal: A A' is not the identity")
+    mirrored = np.flatnonzero(np.linalg.det(matrices) < 0)
+    if mirrored.size:
+        raise InputError(
+            f"the matrix of row {mirrored[0]} is mirrored (its determinant is -1): it belongs to axes that "
+            "are left-handed, such as x right, y up, z forward"
+        )
+
+
+def _given(covariances: ArrayLike | None) -> Floats | None:
+    return None if covariances is None else numbers("covariances", covariances)
+
+
+def _boresight(mounting: Mounting | ArrayLike) -> Floats:
+    if isinstance(mounting, str):
+        known = get_args(Mounting)
+        one_of("mounting", mounting, known)
+        return _photocore.nadir_boresight(known.index(mounting))
+    boresight = shaped("mounting", mounting, (3, 3))
+    _check_orthonormal(boresight[None])
+    return frozen(boresight)
+
+
+check_arguments(globals(), ["Attitudes"])

@@ -1,0 +1,150 @@
+"""Observations beside images after the adjustment, kind by kind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.network.block import Block
+from photogram.network.observations import observation_rows
+from photogram.show.angles import ARCSEC
+from photogram.statistics.outliers import Observations
+from photogram.statistics.reliability import TESTABLE
+
+if TYPE_CHECKING:
+    from photogram import _photocore
+
+__all__ = ["ObservedKind", "beside_images_lines", "observed_kinds"]
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedKind:
+    """The k observations of one kind, of r components each.
+
+    Components that were not observed are NaN, and so are observations of points that were left out. Arrays
+    cannot be written.
+
+    Attributes
+    ----------
+    kind
+        Its name.
+    rows
+        (k,) which observations of the block they are.
+    names
+        What each is of.
+    components, units
+        Names and units of the r components: the linear unit of the object space, or radians.
+    sd
+        (k, r) standard deviations a priori.
+    residuals
+        (k, r) observed minus computed.
+    redundancy
+        (k, r) redundancy numbers; single ones may leave 0 to 1 where components are correlated.
+    standardized
+        (k, r) standardized residuals, a priori unit weight: with W the inverse of the covariance matrix S of
+        an observation, `(W v)_i / sqrt((W Qvv W)_ii)`, which without correlations is Baarda's w; NaN without
+        redundancy.
+    squares
+        (k,) v' W v, weights as the loss has changed them.
+    weights
+        (k,) factor by which the loss has changed the weight; 1 without a loss.
+    """
+
+    kind: str
+    rows: Indices
+    names: list[str]
+    components: tuple[str, ...]
+    units: tuple[str, ...]
+    sd: Floats
+    residuals: Floats
+    redundancy: Floats
+    standardized: Floats
+    squares: Floats
+    weights: Floats
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def tested(self) -> Observations:
+        """Return the standardized residuals, where these say something."""
+
+        def name(index: tuple[int, ...]) -> str:
+            return f"{self.components[index[1]]} of {self.kind} {self.names[index[0]]}"
+
+        values = np.where(self.redundancy > TESTABLE, self.standardized, np.nan)
+        return Observations(f"components of observations of the kind {self.kind}", values, name)
+
+    @property
+    def used(self) -> int:
+        """How many took part."""
+        return int(np.isfinite(self.squares).sum())
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Of those that took part, weighted."""
+        return float(np.nansum(self.squares))
+
+
+def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str, ObservedKind]:
+    """Return what has become of the observations of a block, by the names of their kinds."""
+    found = iter(solution.adjusted_observations)
+    kinds = {}
+    groups = observation_rows(block.observations, block.point_ids, block.photo_ids)
+    for rows, (kind, _, _, covariances) in groups:
+        first = block.observations[rows[0]]
+        components = first.components(geographic=block.geographic)
+        observed = np.ones((len(rows), len(components)), dtype=bool)
+        if kind == "difference":
+            observed = ~np.isnan([block.observations[row].observed for row in rows])
+        tables = np.full((3, *observed.shape), np.nan)
+        single = np.full((2, len(rows)), np.nan)
+        for k in range(len(rows)):
+            adjusted = next(found)
+            if adjusted is not None:
+                tables[:, k, observed[k]] = adjusted[:3]
+                single[:, k] = adjusted[3:]
+        variances = np.diagonal(covariances, axis1=1, axis2=2)
+        kinds[kind] = ObservedKind(
+            kind=kind,
+            rows=np.array(rows, dtype=np.int64),
+            names=[" - ".join(block.observations[row].of) for row in rows],
+            components=components,
+            units=tuple("rad" if name.startswith("rotation") else block.linear_unit for name in components),
+            sd=np.sqrt(np.where(observed, variances, np.nan)),
+            residuals=tables[0].copy(),
+            redundancy=tables[1].copy(),
+            standardized=tables[2].copy(),
+            squares=single[0].copy(),
+            weights=single[1].copy(),
+        )
+    return kinds
+
+
+def beside_images_lines(kinds: Iterable[ObservedKind]) -> list[str]:
+    """List observations beside images, a line for each component, rotations in arcsec."""
+    lines = []
+    for each in kinds:
+        units = ["arcsec" if unit == "rad" else unit for unit in each.units]
+        outward = np.array([1.0 / ARCSEC if unit == "rad" else 1.0 for unit in each.units])
+        columns = ("sd", "residual", "redundancy", "standardized")
+        lines.append(f"{each.kind:<28}{'component':<22}" + "".join(f"{column:>14}" for column in columns))
+        parts = (
+            (each.sd * outward, 5),
+            (each.residuals * outward, 5),
+            (each.redundancy, 3),
+            (each.standardized, 2),
+        )
+        for i, k in np.argwhere(~np.isnan(each.residuals)).tolist():
+            cells = "".join(
+                f"{f'{part[i, k]:.{decimals}f}' if math.isfinite(part[i, k]) else '-':>14}"
+                for part, decimals in parts
+            )
+            lines.append(f"{each.names[i]:<28}{f'{each.components[k]} {units[k]}':<22}{cells}")
+    return lines

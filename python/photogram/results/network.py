@@ -1,0 +1,252 @@
+"""What every adjustment of photos and points gives: arrays with their covariances and test values."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.arguments.arrays import standard_deviations
+from photogram.arguments.types import Floats, Indices
+from photogram.messages import Message
+from photogram.results.iteration import Iteration
+from photogram.show.ways import Shown
+from photogram.statistics.reliability import ROUNDING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from photogram import _photocore
+
+__all__ = ["AdjustedNetwork", "Observed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Observations of one kind, each with k components.
+
+    Attributes
+    ----------
+    rows
+        (r,) the points or photos that they are of.
+    residuals
+        (r, k) observed minus adjusted; 0 where fixed, NaN where nothing is observed.
+    sd
+        (r, k) standard deviations: 0 where fixed, infinite where nothing is observed.
+    redundancy, standardized
+        (r, k) redundancy numbers, and residual / (sd x root of redundancy number).
+    """
+
+    rows: Indices
+    residuals: Floats
+    sd: Floats
+    redundancy: Floats
+    standardized: Floats
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AdjustedNetwork(Shown, ABC):
+    """An adjusted network of P photos with k unknowns each, n points and m image points.
+
+    All are in the order in which they were given; what was left out of the adjustment is NaN. Residuals are
+    observed minus computed. Cofactors hold for a priori unit weight; covariances are cofactors times the
+    variance of unit weight. Arrays cannot be written.
+
+    Attributes
+    ----------
+    status
+        `converged`, `not converged` or `diverged`.
+    messages
+        Remarks that did not stop the adjustment.
+    loss
+        Name and scale of the robust loss of the image points; None for least squares.
+    initial_weighted_sum_of_squares, iterations
+        The history; with a loss, sums of losses.
+    degrees_of_freedom, variance_of_unit_weight
+        The variance is None without degrees of freedom; covariances are then scaled by 1.
+    photo_cofactors
+        (P, k, k).
+    photo_redundancy
+        (P, k) redundancy numbers of weighted unknowns as observations; 0 unless weighted.
+    point_positions
+        (n, 3) adjusted.
+    point_cofactors
+        (n, 3, 3).
+    point_redundancy
+        (n, 3) redundancy numbers of weighted coordinates as observations; 0 unless weighted.
+    point_rays
+        (n,) number of images; 0 for points left out.
+    residuals
+        (m, 2) in the unit of the image coordinates.
+    redundancy
+        (m, 2) redundancy numbers.
+    standardized
+        (m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight (Baarda's w);
+        NaN without redundancy.
+    image_weights
+        (m,) factor by which the loss has changed the weight of an image point; 1 without a loss.
+    ordering, predictions
+        The ordering of photos in force, and the predicted multiply-adds of one factorisation in each ordering
+        that was tried.
+    operations, formations, seconds
+        Predicted multiply-adds of each phase, the number of formations of the normal equations, and seconds
+        spent in each phase.
+    """
+
+    status: str
+    messages: list[Message]
+    loss: tuple[str, float] | None
+    initial_weighted_sum_of_squares: float
+    iterations: list[Iteration]
+    degrees_of_freedom: int
+    variance_of_unit_weight: float | None
+    photo_cofactors: Floats
+    photo_redundancy: Floats
+    point_positions: Floats
+    point_cofactors: Floats
+    point_redundancy: Floats
+    point_rays: Indices
+    residuals: Floats
+    redundancy: Floats
+    standardized: Floats
+    image_weights: Floats
+    ordering: str
+    predictions: Mapping[str, float]
+    operations: Mapping[str, float]
+    formations: int
+    seconds: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    @classmethod
+    def taken_over(cls, solution: _photocore._NetworkSolution, **found: Any) -> Self:
+        """Take over what the core found: under the same names, but for what is put otherwise in `found`."""
+        found["initial_weighted_sum_of_squares"] = solution.initial_sum_of_squares
+        found["iterations"] = [Iteration(*row) for row in solution.iterations]
+        same = {each.name: getattr(solution, each.name) for each in fields(cls) if each.name not in found}
+        return cls(**found, **same)
+
+    @property
+    @abstractmethod
+    def image_points(self) -> Indices:
+        """(m,) the point of each image."""
+
+    @property
+    @abstractmethod
+    def photo_residuals(self) -> Floats:
+        """(P, k) observed minus adjusted unknowns of photos; 0 where fixed, NaN where free."""
+
+    @property
+    @abstractmethod
+    def photo_given_sd(self) -> Floats:
+        """(P, k) standard deviations of the unknowns as observations: infinite free, zero fixed."""
+
+    @property
+    @abstractmethod
+    def point_residuals(self) -> Floats:
+        """(n, 3) observed minus adjusted held components; 0 where fixed, NaN where not held."""
+
+    @property
+    @abstractmethod
+    def point_given_sd(self) -> Floats:
+        """(n, 3) standard deviations of coordinates as observations: infinite not held, zero fixed."""
+
+    @property
+    def photo_standardized(self) -> Floats:
+        """(P, k) `photo_residuals` / (sd x root of redundancy number); NaN unless weighted."""
+        return _standardized(self.photo_residuals, self.photo_given_sd, self.photo_redundancy)
+
+    @property
+    def point_standardized(self) -> Floats:
+        """(n, 3) `point_residuals` / (sd x root of redundancy number); NaN unless weighted."""
+        return _standardized(self.point_residuals, self.point_given_sd, self.point_redundancy)
+
+    @property
+    def stations(self) -> Observed:
+        """Photos with an unknown that is weighted or fixed, as observations of their own unknowns."""
+        rows = np.flatnonzero(np.isfinite(self.photo_given_sd).any(axis=1))
+        parts = (self.photo_residuals, self.photo_given_sd, self.photo_redundancy, self.photo_standardized)
+        return Observed(rows, *(part[rows] for part in parts))
+
+    @property
+    def control(self) -> Observed:
+        """Points that took part and have a coordinate that is weighted or fixed, as observations."""
+        rows = np.flatnonzero(self.used_points & np.isfinite(self.point_given_sd).any(axis=1))
+        parts = (self.point_residuals, self.point_given_sd, self.point_redundancy, self.point_standardized)
+        return Observed(rows, *(part[rows] for part in parts))
+
+    @property
+    def used_points(self) -> NDArray[np.bool_]:
+        """(n,) whether a point took part."""
+        return self.point_rays > 0
+
+    @property
+    def used_images(self) -> NDArray[np.bool_]:
+        """(m,) whether an image took part."""
+        return np.asarray(self.used_points[self.image_points])
+
+    @property
+    def converged(self) -> bool:
+        """Whether the criterion of convergence was met."""
+        return self.status == "converged"
+
+    @property
+    def covariance_scale(self) -> float:
+        """What cofactors are multiplied by: the variance of unit weight, or 1 where there is none."""
+        return 1.0 if self.variance_of_unit_weight is None else self.variance_of_unit_weight
+
+    @property
+    def photo_covariances(self) -> Floats:
+        """(P, k, k) covariances of the unknowns of photos, scaled by the variance of unit weight."""
+        return self.photo_cofactors * self.covariance_scale
+
+    @property
+    def point_covariances(self) -> Floats:
+        """(n, 3, 3) covariances, scaled by the variance of unit weight."""
+        return self.point_cofactors * self.covariance_scale
+
+    @property
+    def photo_sd(self) -> Floats:
+        """(P, k) standard deviations of the unknowns of photos."""
+        return standard_deviations(self.photo_covariances)
+
+    @property
+    def point_sd(self) -> Floats:
+        """(n, 3) standard deviations."""
+        return standard_deviations(self.point_covariances)
+
+    def photo_table(self) -> pd.DataFrame:
+        """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""
+        return self._table("photo")
+
+    def point_table(self) -> pd.DataFrame:
+        """Return adjusted points as a data frame: rays, values and standard deviations, angles in degrees."""
+        return self._table("point")
+
+    def image_table(self) -> pd.DataFrame:
+        """Return image observations as a data frame: residuals, redundancy numbers, test values."""
+        return self._table("image")
+
+    def control_table(self) -> pd.DataFrame:
+        """Return control as a data frame: residuals of held components, redundancy numbers, test values."""
+        return self._table("control")
+
+    def station_table(self) -> pd.DataFrame:
+        """Return weighted and fixed photos as a data frame: residuals, redundancy numbers, test values."""
+        return self._table("station")
+
+
+def _standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:
+    """Return Baarda's w; NaN for what is no observation, and where rounding is all there is of redundancy."""
+    tested = np.isfinite(sd) & (sd > 0) & (redundancy > ROUNDING)
+    values = np.full(residuals.shape, np.nan)
+    values[tested] = residuals[tested] / (sd[tested] * np.sqrt(redundancy[tested]))
+    return values

@@ -1,0 +1,68 @@
+"""Ways to show a result: declared here, defined for each class of results in the files above it.
+
+A class of results holds arrays and their names, and knows no report; a report knows the class whose arrays it
+reads. `Result.report()` calls `report_of`, which `results.report` defines for `Result`. So a result is one
+class, and no file needs one that needs it. The package of a class imports the files that define its ways:
+they are there as soon as the class is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import singledispatch
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Shown", "columns_of", "document_of", "picture_of", "report_of"]
+
+
+@singledispatch
+def report_of(result: object) -> str:
+    """Return the report of a result as text."""
+    _undefined(result, "report")
+
+
+@singledispatch
+def document_of(result: object) -> bytes:
+    """Return the whole result as a JSON document (UTF-8)."""
+    _undefined(result, "JSON document")
+
+
+@singledispatch
+def columns_of(result: object, what: str) -> Mapping[str, Any]:
+    """Return what a result says about one kind of thing (`photo`, `point`, `image` ...) as named columns."""
+    _undefined(result, f"table of {what}s")
+
+
+@singledispatch
+def picture_of(result: object) -> bytes:
+    """Return the picture of a result (PNG)."""
+    _undefined(result, "picture")
+
+
+def _undefined(result: object, way: str) -> NoReturn:
+    raise NotImplementedError(f"{type(result).__name__} has no {way}")
+
+
+class Shown:
+    """What has a report, a JSON document, and tables."""
+
+    def report(self) -> str:
+        """Return the report as text."""
+        return report_of(self)
+
+    def to_json(self) -> bytes:
+        """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
+        return document_of(self)
+
+    def _table(self, what: str) -> pd.DataFrame:
+        """Return what the result says about one kind of thing as a data frame.
+
+        pandas rather than polars: geopandas, matplotlib and statsmodels, which people use on such tables,
+        speak it. It is imported only when a table is asked for: that takes long.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(columns_of(self, what))
