@@ -19,7 +19,7 @@ const FREE: f64 = f64::INFINITY;
 const PHOTOS: usize = 11;
 const POINTS: usize = 40;
 const IMAGE_SD: f64 = 0.5;
-const TIGHT: Criterion = Method::Damped(Stop::Fraction(1e-9));
+const TIGHT: Method = Method::Damped(Stop::Fraction(1e-9));
 /// Two that several photos share, one of one photo, one that is held, and one with a principal distance alone.
 const CAMERA_OF: [usize; PHOTOS] = [0, 1, 0, 1, 0, 1, 0, 2, 3, 4, 4];
 

@@ -7,6 +7,7 @@ mod distributions;
 mod geometry;
 mod memory;
 mod network;
+mod observations;
 mod options;
 mod resection;
 mod similarity;

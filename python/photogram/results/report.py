@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.structuring import structure
-from photogram.results.beside_images import beside_images_lines
+from photogram.results.kinds import kind_lines, tested_kind
 from photogram.results.observed import image_lines, observed_lines, tested
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
@@ -57,7 +57,7 @@ def report(result: Result) -> str:
         ),
         (
             "Observations beside images: observed minus adjusted, redundancy, standardized residual",
-            beside_images_lines(result.kinds.values()),
+            kind_lines(result.kinds),
         ),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
@@ -88,9 +88,10 @@ def problems_of(result: Result) -> list[str]:
 def _tested(result: Result) -> list[Observations]:
     block = result.block
     unknowns = (*_axes(result), "omega", "phi", "kappa")
-    others = (each.tested() for each in result.kinds.values())
-    own = tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result))
-    return [*own, *others]
+    of_unknowns = tested(
+        result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result)
+    )
+    return of_unknowns + [tested_kind(each) for each in result.kinds.values()]
 
 
 def _axes(result: Result) -> tuple[str, str, str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.results.beside_images import ObservedKind, observed_kinds
+from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.limits import GlobalTest, global_test
 
@@ -54,7 +54,7 @@ class SumsOfSquares:
     @property
     def total(self) -> float:
         """All together."""
-        return self.camera + self.ground + self.plates + self.observations
+        return self.camera + self.measured
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -195,7 +195,7 @@ class Result(AdjustedNetwork):
         return self._table("check")
 
     def observation_table(self) -> pd.DataFrame:
-        """Return observations beside images as a data frame, a row for each component."""
+        """Return observations beside images as a data frame, a row for each component, with its unit."""
         return self._table("observation")
 
 

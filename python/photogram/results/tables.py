@@ -22,7 +22,7 @@ __all__ = ["images", "named", "observed", "table"]
 
 @columns_of.register(Result)
 def table(result: Result, what: str) -> dict[str, Any]:
-    """Return the columns of photos, points, images, check points, control or stations."""
+    """Return the columns of photos, points, images, check points, control, stations or other observations."""
     return _TABLES[what](result)
 
 
@@ -79,12 +79,8 @@ def _stations(result: Result) -> dict[str, Any]:
     return {"photo": _ids(result.block.photo_ids)[stations.rows], **observed(names, stations)}
 
 
-def _observations(result: Result) -> dict[str, Any]:
-    """`kind`, `of`, `component`, `unit`, `sd`, `residual`, `redundancy`, `standardized` of each component.
-
-    Residuals are observed minus adjusted. Components that were not observed have no row, nor have
-    observations that were left out.
-    """
+def _beside_images(result: Result) -> dict[str, Any]:
+    """Name what there is of each component: one row; what was not observed or left out has none."""
     rows = [
         (each.kind, each.names[i], each.components[k], each.units[k], *(values[i, k] for values in numbers))
         for each in result.kinds.values()
@@ -92,11 +88,7 @@ def _observations(result: Result) -> dict[str, Any]:
         for i, k in np.argwhere(~np.isnan(each.residuals)).tolist()
     ]
     names = ("kind", "of", "component", "unit", "sd", "residual", "redundancy", "standardized")
-    columns = zip(*rows, strict=True) if rows else [()] * len(names)
-    return {
-        name: np.array(column, dtype=object if k < 4 else float)
-        for k, (name, column) in enumerate(zip(names, columns, strict=True))
-    }
+    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
 _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
@@ -106,7 +98,7 @@ _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "check": _check_points,
     "control": _control,
     "station": _stations,
-    "observation": _observations,
+    "observation": _beside_images,
 }
 
 

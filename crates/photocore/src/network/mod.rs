@@ -1,9 +1,10 @@
 //! Networks of photos: poses, cameras, points and images adjusted together.
 //!
-//! Unknowns are the pose of every photo, the parameters of its camera unless they are held, and the coordinates of every point,
-//! each weighted from free to fixed; observations are image coordinates and, beside them, those of [`observations`]. A block of aerial photographs (GIANT guide, sections 4 to 9)
-//! has cameras that are held, and poses in angles; a collection "in the large" (Agarwal, Snavely, Seitz and Szeliski 2010) has a
-//! camera of its own for every photo, and poses in vectors. Positions are X, Y, Z or longitude, latitude, height.
+//! Unknowns are the pose of every photo, the parameters of the cameras unless they are held, and the coordinates of every point,
+//! each weighted from free to fixed; observations are image coordinates and, beside them, those of [`observations`]. A block of aerial
+//! photographs (GIANT guide, sections 4 to 9) has cameras that are held, and poses in angles; a collection "in the large" (Agarwal,
+//! Snavely, Seitz and Szeliski 2010) has a camera of its own for every photo, and poses in vectors; a block that calibrates its camera
+//! has one for all. Positions are X, Y, Z or longitude, latitude, height.
 //!
 //! Two photos over four control points:
 //!
@@ -89,7 +90,8 @@ pub struct Photo {
     pub camera: usize,
 }
 
-/// A camera as it is known beforehand.
+/// A camera as it is known beforehand. Photos may share it: then its unknown parameters are a block of their own; those of a camera of
+/// one photo are unknowns of that.
 #[derive(Debug, Clone)]
 pub struct Camera {
     /// The camera with its initial (and, where weighted, observed) parameters.

@@ -6,11 +6,11 @@ use photocore::geometry::{Perspective, PoseNumbers};
 use photocore::network::{Camera, Network, Options, Photo, Start, UnitVariance};
 use pyo3::prelude::*;
 
-use super::observations::{Group, observations};
 use super::solution::BlockSolution;
 use super::{BlockError, adjusted, failure, images, points};
 use crate::arrays::{check_lengths, numbers, rows};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
+use crate::observations::{Group, observations};
 use crate::options::{named_loss, named_ordering, unknown};
 
 /// Adds the function to the extension module.

@@ -2,7 +2,6 @@
 
 mod block;
 mod collection;
-mod observations;
 mod solution;
 
 use numpy::PyReadonlyArrayDyn;

@@ -5,9 +5,9 @@ use photocore::network::{AdjustedPhoto, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::observations::{AdjustedRow, adjusted_row};
 use super::{FailureRow, failure};
 use crate::arrays::{squares, table};
+use crate::observations::{AdjustedRow, adjusted_row};
 use crate::solution::{
     IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
 };

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from photogram.statistics.reliability import TESTABLE
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["ObservedKind", "beside_images_lines", "observed_kinds"]
+__all__ = ["ObservedKind", "kind_lines", "observed_kinds", "tested_kind"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +72,6 @@ class ObservedKind:
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
 
-    def tested(self) -> Observations:
-        """Return the standardized residuals, where these say something."""
-
-        def name(index: tuple[int, ...]) -> str:
-            return f"{self.components[index[1]]} of {self.kind} {self.names[index[0]]}"
-
-        values = np.where(self.redundancy > TESTABLE, self.standardized, np.nan)
-        return Observations(f"components of observations of the kind {self.kind}", values, name)
-
     @property
     def used(self) -> int:
         """How many took part."""
@@ -127,24 +118,31 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
     return kinds
 
 
-def beside_images_lines(kinds: Iterable[ObservedKind]) -> list[str]:
-    """List observations beside images, a line for each component, rotations in arcsec."""
+def tested_kind(kind: ObservedKind) -> Observations:
+    """Return the components of a kind with their standardized residuals, where these say something."""
+
+    def named(index: tuple[int, ...]) -> str:
+        return f"{kind.components[index[1]]} of {kind.kind} {kind.names[index[0]]}"
+
+    standardized = np.where(kind.redundancy > TESTABLE, kind.standardized, np.nan)
+    return Observations(f"components of observations of the kind {kind.kind}", standardized, named)
+
+
+def kind_lines(kinds: Mapping[str, ObservedKind]) -> list[str]:
+    """Write a line for each component of every observation, rotations in arcsec."""
     lines = []
-    for each in kinds:
+    for each in kinds.values():
         units = ["arcsec" if unit == "rad" else unit for unit in each.units]
         outward = np.array([1.0 / ARCSEC if unit == "rad" else 1.0 for unit in each.units])
         columns = ("sd", "residual", "redundancy", "standardized")
         lines.append(f"{each.kind:<28}{'component':<22}" + "".join(f"{column:>14}" for column in columns))
-        parts = (
-            (each.sd * outward, 5),
-            (each.residuals * outward, 5),
-            (each.redundancy, 3),
-            (each.standardized, 2),
-        )
+        parts = (each.sd * outward, each.residuals * outward, each.redundancy, each.standardized)
         for i, k in np.argwhere(~np.isnan(each.residuals)).tolist():
-            cells = "".join(
-                f"{f'{part[i, k]:.{decimals}f}' if math.isfinite(part[i, k]) else '-':>14}"
-                for part, decimals in parts
-            )
-            lines.append(f"{each.names[i]:<28}{f'{each.components[k]} {units[k]}':<22}{cells}")
+            cells = (_cell(part[i, k], decimals) for part, decimals in zip(parts, (5, 5, 3, 2), strict=True))
+            component = f"{each.components[k]} {units[k]}"
+            lines.append(f"{each.names[i]:<28}{component:<22}{''.join(cells)}")
     return lines
+
+
+def _cell(value: float, decimals: int) -> str:
+    return f"{value:>14.{decimals}f}" if math.isfinite(value) else f"{'-':>14}"
