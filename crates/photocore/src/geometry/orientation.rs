@@ -1,5 +1,7 @@
 //! A photo's pose with what each of its six unknowns does to it: position and rotation step, or the numbers of a file.
 
+use nalgebra::Matrix6;
+
 use super::attitude::{AttitudeNumbers, RotationSense};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
 use super::space::{Lift, ObjectSpace, Point};
@@ -118,6 +120,24 @@ impl Orientation {
     pub fn shifts_along(&self, place: &Vector3) -> [(usize, f64); 3] {
         let u = self.pose.sight(place);
         [0, 1, 2].map(|k| (self.shifting + k, self.shifts.column(k).normalize().dot(&u)))
+    }
+
+    /// How the six unknowns move with a step of the pose, dC in object axes, then rho; None where angles are singular.
+    ///
+    /// The projection centre itself is seen at u = 0 before the step and at -A^T dC after it, and the axes turn by rho:
+    /// sum of -(w x s) dq + S dq = -A^T dC, sum of w dq = -rho.
+    pub fn unknowns_by_step(&self) -> Option<Matrix6<f64>> {
+        let mut by_unknowns = Matrix6::zeros();
+        for (k, w) in self.turns.iter().enumerate() {
+            by_unknowns.fixed_view_mut::<3, 1>(0, k).copy_from(&-w.cross(&self.pivot));
+            by_unknowns.fixed_view_mut::<3, 1>(3, k).copy_from(w);
+        }
+        let mut shifting = by_unknowns.fixed_view_mut::<3, 3>(0, self.shifting);
+        shifting += self.shifts;
+        let mut step = Matrix6::zeros();
+        step.fixed_view_mut::<3, 3>(0, 0).copy_from(&-self.pose.attitude.transpose());
+        step.fixed_view_mut::<3, 3>(3, 3).copy_from(&-Matrix3::identity());
+        by_unknowns.try_inverse().map(|inverse| inverse * step)
     }
 
     /// u, the point in the photo's axes.

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::precision::Coarse;
-use crate::adjustment::{AdjustError, gib};
+use crate::adjustment::{AdjustError, DatumError, gib};
 use crate::normals::LayoutError;
 
 /// Why a network cannot be adjusted, or has no cofactors. Photos, cameras and points are indices into the network.
@@ -22,7 +22,7 @@ pub enum NetworkError {
     #[error("camera {0} has unknown parameters and belongs to several photos")]
     SharedCamera(usize),
     /// Poses in vectors in a space where they are not defined.
-    #[error("poses in vectors need rectangular space and no refraction")]
+    #[error("poses in vectors need rectangular space and no refraction, and carry no datum")]
     Vectors,
     /// Nothing to adjust.
     #[error("no point is left to adjust: none is on two photos")]
@@ -56,6 +56,9 @@ pub enum NetworkError {
     /// An allocation of so many bytes failed.
     #[error("there is no memory for an array of {0} bytes")]
     OutOfMemory(usize),
+    /// It cannot be taken to a datum.
+    #[error(transparent)]
+    Datum(#[from] DatumError),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),

@@ -160,8 +160,10 @@ impl Network {
             let own = if camera.is_held() { 0 } else { camera.sd.len() };
             first.push(first[first.len() - 1] + 6 + own);
         }
+        // Angles alone leave position and scale open.
+        let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
         let placed = screened.points.iter().any(|&point| self.points[point].held() != [false; 3])
-            || self.photos.iter().any(|photo| photo.sd.iter().any(|sd| sd.is_finite()));
+            || self.photos.iter().any(|photo| photo.sd[..positions].iter().any(|sd| sd.is_finite()));
         let images: Vec<Image> = screened.images.order.iter().map(|&image| self.images[image]).collect();
         Bundle {
             space: self.space,

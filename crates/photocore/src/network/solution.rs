@@ -76,7 +76,8 @@ pub struct Solution {
     /// What a combination of unknowns moves that is determined so weakly that no step could follow it to its end, photo and
     /// unknown (0 to 5: pose, then camera); none where the adjustment ended otherwise.
     pub weak: Vec<(usize, usize)>,
-    /// What was held to give the cofactors a datum: photo and unknown.
+    /// What was held to give a datum where nothing else does: photo and unknown. In the datum of inner constraints, what they were
+    /// taken from.
     pub datum: Vec<(usize, usize)>,
     /// The points that were left out at first.
     pub dropped: Vec<Dropped>,

@@ -91,6 +91,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::CameraDeviations(_)
         | Failure::SharedCamera(_)
         | Failure::Vectors
+        | Failure::Datum(_)
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
     };

@@ -185,6 +185,11 @@ macro_rules! solution_class {
                 seconds(py, &self.solution.adjustment)
             }
 
+            #[getter]
+            fn datum(&self) -> Vec<(usize, usize)> {
+                self.solution.datum.clone()
+            }
+
             $($own)*
         }
     };
@@ -278,11 +283,6 @@ solution_class! {
         #[getter]
         fn sum_of_squares(&self) -> f64 {
             self.solution.sums_of_squares.total()
-        }
-
-        #[getter]
-        fn datum(&self) -> Vec<(usize, usize)> {
-            self.solution.datum.clone()
         }
     }
 }
