@@ -3,6 +3,8 @@
     python docs/regenerate.py [--check] [PAGE ...]
 
 Blocks between `<!-- numbers: NAME -->` and `<!-- end -->` are made anew, of all pages unless some are named.
+So are quotes of files of the repository: `<!-- quote: PATH -->` of all of one, `<!-- quote: PATH | LINE -->`
+of what begins with the line and ends with the next bracket that closes where it is indented.
 With --check, nothing is written, and the exit code says whether a page is out of date.
 """
 
@@ -19,9 +21,25 @@ import stellar_numbers
 DOCS = Path(__file__).parent
 PAGES: dict[str, Mapping[str, Callable[[], list[str]]]] = {
     "comparator.md": comparator_numbers.BLOCKS,
+    "extending.md": {},
     "stellar-camera.md": stellar_numbers.BLOCKS,
 }
 BLOCK = re.compile(r"(<!-- numbers: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+QUOTE = re.compile(r"(<!-- quote: (\S+)(?: \| (.*?))? -->\n).*?(<!-- end -->)", re.DOTALL)
+LANGUAGES = {".rs": "rust", ".py": "python"}
+
+
+def quoted(path: Path, first: str | None) -> list[str]:
+    """Return the lines of a file, or of the part of it that begins with a line, whatever its indentation."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    if first is None:
+        return lines
+    start = next(number for number, line in enumerate(lines) if line.strip() == first)
+    margin = len(lines[start]) - len(lines[start].lstrip())
+    end = next(
+        number for number in range(start + 1, len(lines)) if re.match(rf" {{{margin}}}[)}}\]]", lines[number])
+    )
+    return [line[margin:] for line in lines[start : end + 1]]
 
 
 def regenerated(page: str, blocks: Mapping[str, Callable[[], list[str]]]) -> str:
@@ -31,7 +49,11 @@ def regenerated(page: str, blocks: Mapping[str, Callable[[], list[str]]]) -> str
         lines = [line.rstrip() for line in blocks[match[2]]()]
         return "\n".join([f"{match[1]}```text", *lines, "```", match[3]])
 
-    return BLOCK.sub(block, page)
+    def quote(match: re.Match[str]) -> str:
+        path = DOCS.parent / match[2]
+        return "\n".join([f"{match[1]}```{LANGUAGES[path.suffix]}", *quoted(path, match[3]), "```", match[4]])
+
+    return QUOTE.sub(quote, BLOCK.sub(block, page))
 
 
 def main(arguments: list[str]) -> int:

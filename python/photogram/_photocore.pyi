@@ -421,11 +421,12 @@ def adjust_block(
         An argument of another shape, length or choice; the message names it.
     """
 
-@final
-class BlockSolution:
-    """An adjusted block, in the order of its photos (P), points (n) and images (m).
+class _NetworkSolution:
+    """What adjusted blocks and collections have alike, in the order of photos (P), points (n), images (m).
 
-    Points and images that were left out are NaN. Cofactors hold for a priori unit weight.
+    A photo has k unknowns: of a block its position and attitude, of a collection also its camera. Values are
+    in the units in which they were given. Points and images that were left out are NaN. Cofactors hold for a
+    priori unit weight.
     """
 
     @property
@@ -434,15 +435,101 @@ class BlockSolution:
 
     @property
     def initial_sum_of_squares(self) -> float:
-        """Weighted sum of squares at the initial values."""
+        """Weighted sum of squares, of losses with a loss, at the initial values."""
 
     @property
     def iterations(self) -> list[IterationRow]:
         """Every iteration."""
 
     @property
+    def photo_cofactors(self) -> _Floats:
+        """(P, k, k): position and attitude, or vector and translation, then the camera."""
+
+    @property
+    def photo_redundancy(self) -> _Floats:
+        """(P, k) redundancy numbers of the unknowns as observations; 0 unless weighted."""
+
+    @property
+    def point_positions(self) -> _Floats:
+        """(n, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
+
+    @property
+    def point_cofactors(self) -> _Floats:
+        """(n, 3, 3)."""
+
+    @property
+    def point_redundancy(self) -> _Floats:
+        """(n, 3) redundancy numbers of the coordinates as observations; 0 unless weighted."""
+
+    @property
+    def point_rays(self) -> _Indices:
+        """(n,) number of images; 0 for points left out."""
+
+    @property
+    def residuals(self) -> _Floats:
+        """(m, 2) observed minus computed, in the unit of the image."""
+
+    @property
+    def redundancy(self) -> _Floats:
+        """(m, 2) redundancy numbers."""
+
+    @property
+    def standardized(self) -> _Floats:
+        """(m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight.
+
+        NaN without redundancy.
+        """
+
+    @property
+    def image_weights(self) -> _Floats:
+        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
+
+    @property
+    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
+        """Why there are no cofactors although they were asked for, as in :class:`BlockError`."""
+
+    @property
+    def redundancy_excess(self) -> float | None:
+        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
+
+        None without cofactors, and with a loss.
+        """
+
+    @property
+    def variance_of_unit_weight(self) -> float | None:
+        """None without degrees of freedom."""
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Observations, weighted unknowns, unknowns that are neither fixed nor held."""
+
+    @property
+    def ordering(self) -> str:
+        """The ordering in force."""
+
+    @property
+    def predictions(self) -> dict[str, float]:
+        """Predicted multiply-adds of one factorisation in each ordering that was tried."""
+
+    @property
+    def operations(self) -> dict[str, float]:
+        """Predicted multiply-adds of `reduction`, `factor` and `inverse`, each time they are carried out."""
+
+    @property
+    def formations(self) -> int:
+        """How often the normal equations were formed."""
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds in `form`, `factor`, `solve`, `invert` and `cofactors`, over all iterations."""
+
+@final
+class BlockSolution(_NetworkSolution):
+    """An adjusted block; k is 6."""
+
+    @property
     def photo_corrections(self) -> _Floats:
-        """(k, P, 6) corrections of position and attitude in each of k iterations, in their units."""
+        """(i, P, 6) corrections of position and attitude in each of i iterations, in their units."""
 
     @property
     def photo_positions(self) -> _Floats:
@@ -453,66 +540,12 @@ class BlockSolution:
         """(P, 3) omega, phi, kappa in radians."""
 
     @property
-    def photo_cofactors(self) -> _Floats:
-        """(P, 6, 6): position, then attitude, in the units of the values."""
-
-    @property
-    def photo_redundancy(self) -> _Floats:
-        """(P, 6) redundancy numbers of position and attitude as observations; 0 unless weighted."""
-
-    @property
-    def point_positions(self) -> _Floats:
-        """(n, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
-
-    @property
     def point_last_corrections(self) -> _Floats:
         """(n, 3) corrections in the last iteration, in the units of the values."""
 
     @property
-    def point_cofactors(self) -> _Floats:
-        """(n, 3, 3) in the units of the values."""
-
-    @property
-    def point_redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of held components; 0 unless weighted."""
-
-    @property
-    def point_rays(self) -> _Indices:
-        """(n,) number of images; 0 for points left out."""
-
-    @property
-    def residuals(self) -> _Floats:
-        """(m, 2) observed minus computed, millimetres."""
-
-    @property
-    def redundancy(self) -> _Floats:
-        """(m, 2) redundancy numbers."""
-
-    @property
-    def standardized(self) -> _Floats:
-        """(m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight."""
-
-    @property
-    def image_weights(self) -> _Floats:
-        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
-
-    @property
     def images_behind(self) -> _Indices:
         """Indices of the images whose point stands behind the camera, ascending."""
-
-    @property
-    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
-        """What the adjusted values leave undetermined, as in a :class:`BlockError`: there are no cofactors.
-
-        None where everything is determined.
-        """
-
-    @property
-    def redundancy_excess(self) -> float | None:
-        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
-
-        None without cofactors, and with a loss.
-        """
 
     @property
     def weak(self) -> list[tuple[int, int]]:
@@ -541,36 +574,8 @@ class BlockSolution:
         """Of the chosen unit variance."""
 
     @property
-    def variance_of_unit_weight(self) -> float | None:
-        """None without degrees of freedom."""
-
-    @property
-    def counts(self) -> tuple[int, int, int]:
-        """Image coordinates, weighted unknowns, unknowns that are not fixed."""
-
-    @property
-    def ordering(self) -> str:
-        """The ordering of photos in force."""
-
-    @property
-    def predictions(self) -> dict[str, float]:
-        """The orderings that were tried, with the predicted multiply-adds of one factorisation."""
-
-    @property
     def photo_order(self) -> _Indices:
         """(P,) indices of the photos in the order of their elimination."""
-
-    @property
-    def operations(self) -> dict[str, float]:
-        """Predicted multiply-adds of `reduction`, `factor` and `inverse`, each time they are carried out."""
-
-    @property
-    def formations(self) -> int:
-        """How often the normal equations were formed."""
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Seconds in `form`, `factor`, `solve`, `invert` and `cofactors`, over all iterations."""
 
 class ResectionError(Exception):
     """A photo that cannot be resected.
@@ -1387,55 +1392,16 @@ def adjust_collection(
     """
 
 @final
-class CollectionSolution:
-    """An adjusted collection, in the order of its photos (P), points (n) and images (m).
-
-    Points and images that were left out are NaN. Cofactors hold for a priori unit weight.
-    """
-
-    @property
-    def status(self) -> str:
-        """`converged`, `not converged` or `diverged`."""
-
-    @property
-    def initial_sum_of_squares(self) -> float:
-        """Weighted sum of squares, of losses with a loss, at the initial values."""
-
-    @property
-    def iterations(self) -> list[IterationRow]:
-        """Every iteration."""
+class CollectionSolution(_NetworkSolution):
+    """An adjusted collection; k is 6 plus the number of parameters of a camera."""
 
     @property
     def photo_parameters(self) -> _Floats:
-        """(P, 6 + k) as they were given, adjusted."""
-
-    @property
-    def photo_cofactors(self) -> _Floats:
-        """(P, 6 + k, 6 + k)."""
-
-    @property
-    def photo_redundancy(self) -> _Floats:
-        """(P, 6 + k) redundancy numbers of the parameters as observations; 0 unless weighted."""
+        """(P, k) as they were given, adjusted."""
 
     @property
     def photo_images(self) -> _Indices:
         """(P,) number of images that took part."""
-
-    @property
-    def point_positions(self) -> _Floats:
-        """(n, 3)."""
-
-    @property
-    def point_cofactors(self) -> _Floats:
-        """(n, 3, 3)."""
-
-    @property
-    def point_redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of the coordinates as observations; 0 unless weighted."""
-
-    @property
-    def point_rays(self) -> _Indices:
-        """(n,) number of images; 0 for points left out."""
 
     @property
     def point_rays_behind(self) -> _Indices:
@@ -1446,22 +1412,6 @@ class CollectionSolution:
         """Indices of the points that ran into a station and were left out."""
 
     @property
-    def residuals(self) -> _Floats:
-        """(m, 2) observed minus computed, pixels."""
-
-    @property
-    def redundancy(self) -> _Floats:
-        """(m, 2) redundancy numbers."""
-
-    @property
-    def standardized(self) -> _Floats:
-        """(m, 2) residual / (standard deviation x root of redundancy number); NaN without redundancy."""
-
-    @property
-    def image_weights(self) -> _Floats:
-        """(m,) factor by which a loss has changed the weight; 1 without a loss."""
-
-    @property
     def sum_of_squares(self) -> float:
         """Weighted sum of squares, weights as the loss has changed them."""
 
@@ -1470,44 +1420,5 @@ class CollectionSolution:
         """Observations and weighted unknowns less unknowns."""
 
     @property
-    def variance_of_unit_weight(self) -> float | None:
-        """None without degrees of freedom."""
-
-    @property
     def datum(self) -> list[tuple[int, int]]:
         """Photos and parameters held to give a datum; empty where observations and weights give one."""
-
-    @property
-    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
-        """Why there are no cofactors although they were asked for, as in :class:`CollectionError`."""
-
-    @property
-    def redundancy_excess(self) -> float | None:
-        """Sum of all redundancy numbers minus the degrees of freedom: what rounding has made of zero.
-
-        None without cofactors, and with a loss.
-        """
-
-    @property
-    def counts(self) -> tuple[int, int, int]:
-        """Observations, weighted unknowns, unknowns that are neither fixed nor held."""
-
-    @property
-    def ordering(self) -> str:
-        """The ordering in force."""
-
-    @property
-    def predictions(self) -> dict[str, float]:
-        """Predicted multiply-adds of one factorisation in each ordering that was tried."""
-
-    @property
-    def operations(self) -> dict[str, float]:
-        """Predicted multiply-adds of reduction, factor and inverse, once."""
-
-    @property
-    def formations(self) -> int:
-        """Formations of the normal equations."""
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Seconds spent in form, factor, solve, invert and cofactors."""

@@ -122,7 +122,9 @@ def _collection(place: Path, rng: Random, quiet: bool) -> list[str]:
         threads=1,
         quiet=quiet,
     )
-    return ["out/adjusted.txt", "out/report.txt", "result.json"]
+    # A damaged Bundle file may be taken for the other format.
+    adjusted = next((place / "out").glob("adjusted.*")).name
+    return [f"out/{adjusted}", "out/report.txt", "result.json"]
 
 
 def _orientation(place: Path, rng: Random, quiet: bool) -> list[str]:
@@ -261,6 +263,7 @@ PROGRAMS: dict[str, tuple[Run, int]] = {
     "GIANT project": (_giant, 8),
     "GIANT project, check": (_check, 2),
     "BAL collection": (_collection, 20),
+    "Bundle file": (_collection, 20),
     "orientation: stations": (_orientation, 40),
     "orientation: transform": (_transform, 30),
     "perspective-center deck": (_perspective, 14),

@@ -16,7 +16,7 @@ import numpy as np
 from photogram import Spheroid, orient, simulate
 from photogram.absolute_orientation import read_csv
 from photogram.absolute_orientation.cards import transformation_records
-from photogram.collection.bal import to_bytes as bal_bytes
+from photogram.collection.formats import to_bytes as collection_bytes
 from photogram.collection.simulation import simulate as simulate_collection
 from photogram.comparator import Grid, Options, calibrate, simulate_calibration, to_cards, to_csv
 from photogram.comparator.grid import built_in_grid
@@ -57,10 +57,10 @@ def giant() -> list[Files]:
     return [{name: record_bytes(lines) for name, lines in one.records().items()} for one in projects]
 
 
-def collection() -> list[Files]:
+def collection(file_format: str) -> list[Files]:
     """Return four photos around nine points, plain and packed."""
     made = simulate_collection(photos=4, points=9, seen=1.0, seed=4).collection
-    text = bal_bytes(made)
+    text = collection_bytes(made, file_format=file_format)
     return [{"input": text}, {"input": text}, {"input": gzip.compress(text)}, {"input": bz2.compress(text)}]
 
 
@@ -234,7 +234,8 @@ def options() -> list[Files]:
 SOUND: dict[str, Callable[[], list[Files]]] = {
     "GIANT project": giant,
     "GIANT project, check": giant,
-    "BAL collection": collection,
+    "BAL collection": lambda: collection("bal"),
+    "Bundle file": lambda: collection("bundler"),
     "orientation: stations": orientation,
     "orientation: transform": transformation,
     "perspective-center deck": perspective,

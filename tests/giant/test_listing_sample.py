@@ -29,7 +29,8 @@ from photogram.giant.listing.points import point_pages, propagated_point_pages
 from photogram.giant.listing.residuals import PointResiduals, residual_pages, statistics
 from photogram.giant.listing.stations import station_pages
 from photogram.giant.listing.warnings import warning_pages
-from photogram.results.adjusted import Iteration, SumsOfSquares
+from photogram.results.iteration import Iteration
+from photogram.results.result import SumsOfSquares
 
 DATA = Path(__file__).parents[1] / "data" / "giant"
 SCAN = DATA / "scanned_pages.txt"

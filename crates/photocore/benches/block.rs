@@ -14,7 +14,7 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use photocore::adjustment;
-use photocore::geometry::{self, ObjectSpace, Orientation, Perspective, PoseNumbers, RotationSense};
+use photocore::geometry::{self, Bal, ObjectSpace, Orientation, Perspective, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Start, UnitVariance};
 use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, Stopped, System};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -65,6 +65,7 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
         photos: vec![],
         points: vec![],
         images: vec![],
+        observations: vec![],
     };
     for (photo, (position, attitude)) in true_photos.iter().enumerate() {
         let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();
@@ -104,6 +105,12 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
         }
     }
     block
+}
+
+/// The block with one camera for all photographs, its focal length and two radial terms free.
+fn with_shared_camera(block: &Network) -> Network {
+    let camera = Bal { focal_length: -PRINCIPAL_DISTANCE, radial: [0.0; 2] };
+    Network { cameras: vec![Camera { camera: camera.into(), sd: vec![f64::INFINITY; 3] }], ..block.clone() }
 }
 
 /// The observation equations of a block, ready-made, so that the phases of the normal equations are timed without the model.
@@ -222,8 +229,8 @@ fn product(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The whole adjustment, with all cofactors and redundancy numbers; the collinearity equations and their partials alone, on one
-/// thread.
+/// The whole adjustment, with all cofactors and redundancy numbers, the camera held or one for all; the collinearity equations and
+/// their partials alone, on one thread.
 fn adjust(criterion: &mut Criterion) {
     let (block, size) = block();
     let pool = pool();
@@ -240,11 +247,16 @@ fn adjust(criterion: &mut Criterion) {
         hold_unused: false,
         memory: None,
     };
-    let adjust =
-        || block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).expect("a determined block");
+    let adjust = |block: &Network| {
+        block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).expect("a determined block")
+    };
+    let shared = with_shared_camera(&block);
     let mut group = criterion.benchmark_group(format!("block/{size}"));
     group.throughput(Throughput::Elements(block.photos.len() as u64));
-    group.bench_function("adjust", |bencher| bencher.iter(|| black_box(adjust())));
+    group.bench_function("adjust", |bencher| bencher.iter(|| black_box(adjust(&block))));
+    group.bench_function("adjust with a shared camera", |bencher| {
+        bencher.iter(|| black_box(adjust(&shared)));
+    });
     group.throughput(Throughput::Elements(block.images.len() as u64));
     group.bench_function("linearize", |bencher| bencher.iter(|| black_box(Linear::new(&block))));
     group.finish();

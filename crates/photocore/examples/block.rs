@@ -56,6 +56,7 @@ fn block() -> Network {
         photos: (0..8).map(photo).collect(),
         points: (0..28).map(point).collect(),
         images,
+        observations: vec![],
     }
 }
 

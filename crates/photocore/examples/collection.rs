@@ -47,6 +47,7 @@ pub fn read(text: &str) -> Result<Network, Box<dyn Error>> {
             .map(|&coordinates| Point { coordinates, sd: [f64::INFINITY; 3] })
             .collect(),
         images: seen.as_chunks().0.iter().map(image).collect(),
+        observations: vec![],
     })
 }
 

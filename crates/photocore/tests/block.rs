@@ -48,6 +48,7 @@ fn block(photos: Vec<Photo>, places: &[[f64; 3]]) -> Network {
         photos,
         points: places.iter().map(|&coordinates| Point { coordinates, sd: FREE }).collect(),
         images,
+        observations: vec![],
     }
 }
 

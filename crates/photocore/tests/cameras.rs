@@ -1,6 +1,6 @@
 //! Cameras: partials against complex steps and differences, ways back, names, golden data.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
 use num_complex::Complex64 as C;
 use photocore::geometry::{Bal, Camera, CameraModel, Unit, Vector3};

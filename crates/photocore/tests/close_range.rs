@@ -72,6 +72,7 @@ fn around(sense: RotationSense, turned: &Matrix3, image_error: f64, error: f64) 
         photos,
         points,
         images,
+        observations: vec![],
     }
 }
 

@@ -13,6 +13,8 @@ mod block;
 mod collection;
 #[path = "../examples/comparator.rs"]
 mod comparator;
+#[path = "../examples/scale_bar.rs"]
+mod scale_bar;
 
 #[test]
 fn the_stations_of_the_block_come_out_within_their_standard_deviations() {
@@ -51,4 +53,20 @@ fn a_file_of_bundle_adjustment_in_the_large_is_adjusted() {
     assert_eq!(solution.datum.len(), 7);
     assert!(solution.photos.iter().all(|photo| photo.camera[0] > 0.0 && photo.cofactors[60] > 0.0));
     assert!(collection::read("8 60 379 0 0").is_err());
+}
+
+#[test]
+fn a_scale_bar_gives_the_object_its_size() {
+    let solution = scale_bar::adjusted().unwrap();
+    assert_eq!(solution.adjustment.status, Status::Converged);
+    for (index, point) in solution.points.iter().enumerate() {
+        let found = point.unwrap();
+        for k in 0..3 {
+            assert!((found.coordinates[k] - scale_bar::place(index)[k]).abs() < 1e-8, "point {index}");
+        }
+    }
+    // Nothing checks the length of the bar.
+    let bar = solution.observations[0].as_ref().unwrap();
+    assert!(bar.residual[0].abs() < 1e-9 && bar.redundancy[0].abs() < 1e-9);
+    scale_bar::main().unwrap();
 }

@@ -42,7 +42,7 @@ def collection(
         Reads.FILE,
         typer.Argument(
             metavar="FILE",
-            help='Collection in the format of "Bundle Adjustment in the Large", plain, .bz2 or .gz.',
+            help='Problem of "Bundle Adjustment in the Large" or Bundle file (0.3), plain, .bz2 or .gz.',
             show_default=False,
         ),
     ] = None,
@@ -54,7 +54,8 @@ def collection(
         Path | None,
         Writes.DIRECTORY,
         out_option(
-            "Directory for report.txt and the adjusted collection: adjusted.txt, packed as FILE is."
+            "Directory for report.txt and the adjusted collection: adjusted.txt, or adjusted.out for a Bundle"
+            " file, packed as FILE is."
             " Default: no files."
         ),
     ] = None,
@@ -93,16 +94,17 @@ def collection(
     if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
         raise typer.BadParameter("names a directory; adjusted.txt goes there", param_hint="--out")
     with job:
-        from photogram.collection import adjust, read, to_bytes
+        from photogram.collection import adjust, to_bytes
+        from photogram.collection.formats import recognised
         from photogram.collection.report import summary
 
         if problem is None:
             problem = job.packaged(*EXAMPLE)
             job.reads(problem)
         packing = problem.suffix if problem.suffix in PACKED else ""
-        names = [] if out is None else [out / "report.txt", out / f"adjusted.txt{packing}"]
+        photos, found = recognised(problem)
+        names = [] if out is None else [out / "report.txt", out / f"adjusted{found.suffix}{packing}"]
         job.writes(*names)
-        photos = read(problem)
         photos = photos.replace(image_sd=sd)
         with job.status("adjusting") as status:
             result = adjust(
@@ -119,10 +121,11 @@ def collection(
         written = {}
         if names:
             written[names[0]] = result.report().encode()
-            written[names[1]] = to_bytes(result.adjusted(), packing)
+            written[names[1]] = to_bytes(result.adjusted(), packing, found.name)
         if report is not None:
             written[report] = result.report().encode()
         if json is not None:
             written[json] = result.to_json()
-        whole = (section for section in summary(result) if section[1])
+        sections = [("File", [f"{problem}: {found.title}"]), *summary(result)]
+        whole = (section for section in sections if section[1])
         job.finish(written, summary=lambda: print_sections(whole, "the report"), good=result.converged)

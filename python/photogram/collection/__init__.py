@@ -4,8 +4,8 @@ from photogram.arguments.annotations import check_arguments
 from photogram.collection import document, report, tables  # noqa: F401  (the ways to show a result)
 from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.bal import read, to_bytes
 from photogram.collection.collection import PARAMETERS, Collection
+from photogram.collection.formats import read, to_bytes
 from photogram.collection.simulation import Simulation, simulate
 
 __all__ = [
@@ -19,4 +19,4 @@ __all__ = [
     "to_bytes",
 ]
 
-check_arguments(globals(), ["Collection", "adjust", "read", "simulate", "to_bytes"])
+check_arguments(globals(), set(__all__) - {"AdjustedCollection", "PARAMETERS", "Simulation"})

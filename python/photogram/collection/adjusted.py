@@ -12,7 +12,7 @@ from photogram.collection.collection import Collection
 from photogram.results.network import AdjustedNetwork
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 __all__ = ["AdjustedCollection"]
 
@@ -86,26 +86,6 @@ class AdjustedCollection(AdjustedNetwork):
             self.used_points[:, np.newaxis], self.point_positions, self.collection.point_positions
         )
         return self.collection.replace(photo_parameters=self.photo_parameters, point_positions=positions)
-
-    def photo_table(self) -> pd.DataFrame:
-        """Return adjusted photos as a data frame: number of images, parameters, standard deviations."""
-        return self._table("photo")
-
-    def point_table(self) -> pd.DataFrame:
-        """Return adjusted points as a data frame: rays, coordinates, standard deviations."""
-        return self._table("point")
-
-    def image_table(self) -> pd.DataFrame:
-        """Return image points as a data frame: residuals, redundancy numbers, test values."""
-        return self._table("image")
-
-    def control_table(self) -> pd.DataFrame:
-        """Return weighted and fixed points as a data frame: residuals, redundancy numbers, test values."""
-        return self._table("control")
-
-    def station_table(self) -> pd.DataFrame:
-        """Return photos with weighted or fixed parameters as a data frame, columns as of control."""
-        return self._table("station")
 
 
 CollectionSolution = AdjustedCollection

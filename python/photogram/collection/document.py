@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.io import json
+from photogram.results.network import Observed
 from photogram.show.ways import document_of
 
 __all__ = ["to_json"]
@@ -61,20 +61,8 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         "photos": _photos(result),
         "points": _points(result),
         "observations": _observations(result),
-        "control": _weighted(
-            np.flatnonzero(result.held_points),
-            result.point_residuals,
-            result.point_given_sd,
-            result.point_redundancy,
-            result.point_standardized,
-        ),
-        "stations": _weighted(
-            np.flatnonzero(result.known_photos),
-            result.photo_residuals,
-            result.photo_given_sd,
-            result.photo_redundancy,
-            result.photo_standardized,
-        ),
+        "control": _observed(result.control),
+        "stations": _observed(result.stations),
         "ordering": result.ordering,
         "predictions": dict(result.predictions),
         "operations": dict(result.operations),
@@ -144,19 +132,12 @@ def _observations(result: AdjustedCollection) -> list[dict[str, Any]]:
     ]
 
 
-def _weighted(
-    numbers: Indices, residuals: Floats, sd: Floats, redundancy: Floats, standardized: Floats
-) -> list[dict[str, Any]]:
+def _observed(given: Observed) -> list[dict[str, Any]]:
     """Return points or photos as observations of their own unknowns."""
     columns = zip(
-        numbers.tolist(),
-        residuals[numbers],
-        sd[numbers],
-        redundancy[numbers],
-        standardized[numbers],
-        strict=True,
+        given.rows.tolist(), given.residuals, given.sd, given.redundancy, given.standardized, strict=True
     )
     return [
-        {"number": number, "residual": residual, "sd": given, "redundancy": own, "standardized": test}
-        for number, residual, given, own, test in columns
+        {"number": number, "residual": residual, "sd": sd, "redundancy": redundancy, "standardized": test}
+        for number, residual, sd, redundancy, test in columns
     ]

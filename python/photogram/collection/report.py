@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.results.observed import control_lines, image_lines, station_lines, tested
+from photogram.results.observed import image_lines, observed_lines, tested
 from photogram.show.sections import Section, composed, headline, problems
 from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
@@ -26,20 +26,21 @@ NOTABLE = 3.0
 @report_of.register(AdjustedCollection)
 def report(result: AdjustedCollection) -> str:
     """Return the report of an adjusted collection."""
+    (photos, points), heads = _numbers(result), _heads(result)
     sections = [
         *summary(result),
         ("Iterations", _iterations(result)),
         (
             "Weighted and fixed points: given minus adjusted, redundancy, standardized residual",
-            control_lines(result, _numbers(result)[1], "XYZ", np.ones(3)),
+            observed_lines("point", points, "XYZ", np.ones(3), result.control),
         ),
         (
             "Weighted and fixed parameters: given minus adjusted, redundancy, standardized residual",
-            station_lines(result, _numbers(result)[0], _heads(result), np.ones(len(_heads(result)))),
+            observed_lines("photo", photos, heads, np.ones(len(heads)), result.stations),
         ),
-        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Photos: values and standard deviations", _photos(result)),
         ("Points: standard deviations", _points(result)),
+        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Work", _work(result)),
     ]
     return composed(headline("collection of photos"), sections)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.results.tables import control, images, named, stations
+from photogram.results.tables import images, named, observed
 from photogram.show.ways import columns_of
 
 __all__ = ["table"]
@@ -52,11 +52,11 @@ def _images(result: AdjustedCollection) -> dict[str, Any]:
 
 
 def _control(result: AdjustedCollection) -> dict[str, Any]:
-    return {"point": np.flatnonzero(result.held_points), **control(result, AXES)}
+    return {"point": result.control.rows, **observed(AXES, result.control)}
 
 
 def _stations(result: AdjustedCollection) -> dict[str, Any]:
-    return {"photo": np.flatnonzero(result.known_photos), **stations(result, _parameters(result))}
+    return {"photo": result.stations.rows, **observed(_parameters(result), result.stations)}
 
 
 def _parameters(result: AdjustedCollection) -> list[str]:

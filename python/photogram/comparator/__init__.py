@@ -54,23 +54,18 @@ __all__ = [
 
 check_arguments(
     globals(),
-    [
-        "Correction",
-        "Frame",
-        "Grid",
-        "Options",
-        "Polynomial",
-        "built_in_grid",
-        "calibrate",
-        "find_grid",
-        "listing",
-        "read",
-        "read_cards",
-        "read_csv",
-        "read_grid",
-        "simulate_calibration",
-        "to_cards",
-        "to_csv",
-        "to_json",
-    ],
+    set(__all__)
+    - {
+        "Calibration",
+        "Case",
+        "CaseResult",
+        "Decomposition",
+        "Place",
+        "PlateResult",
+        "Pointing",
+        "Reading",
+        "Session",
+        "Simulation",
+        "collect_cases",
+    },
 )

@@ -33,17 +33,5 @@ __all__ = [
 ]
 
 check_arguments(
-    globals(),
-    [
-        "Camera",
-        "Common",
-        "Frame",
-        "GroundPoint",
-        "Limits",
-        "check",
-        "error_warnings",
-        "listing",
-        "read_project",
-        "write_project",
-    ],
+    globals(), set(__all__) - {"Check", "ErrorWarning", "Finding", "ImageFrame", "Project", "Section"}
 )

@@ -258,18 +258,4 @@ def _floats(values: ArrayLike) -> Floats:
     return np.asarray(values, dtype=np.float64)
 
 
-check_arguments(
-    globals(),
-    [
-        "Spheroid",
-        "geocentric_to_geographic",
-        "geographic_to_geocentric",
-        "lengths_of_units",
-        "local_frames",
-        "project",
-        "refraction_shift",
-        "rotation_angles",
-        "rotation_matrix",
-        "viewing_directions",
-    ],
-)
+check_arguments(globals(), __all__)

@@ -19,4 +19,4 @@ __all__ = [
     "run_deck",
 ]
 
-check_arguments(globals(), ["Coordinatograph", "Grid", "determine", "read_deck", "reduce", "run_deck"])
+check_arguments(globals(), set(__all__) - {"Cycle", "PerspectiveCenter", "Run", "Stop"})

@@ -188,19 +188,18 @@ def _global_test(result: Result) -> dict[str, Any] | None:
 
 
 def _control(result: Result) -> list[dict[str, Any]]:
-    block = result.block
-    rows = np.flatnonzero(result.held_points)
+    given = result.control
     columns = zip(
-        rows.tolist(),
-        _outward(result, result.point_residuals[rows]).tolist(),
-        _outward(result, block.point_sd[rows]).tolist(),
-        result.point_redundancy[rows].tolist(),
-        result.point_standardized[rows].tolist(),
+        given.rows.tolist(),
+        _outward(result, given.residuals).tolist(),
+        _outward(result, given.sd).tolist(),
+        given.redundancy.tolist(),
+        given.standardized.tolist(),
         strict=True,
     )
     return [
         {
-            "id": block.point_ids[row],
+            "id": result.block.point_ids[row],
             "position_residual": residual,
             "position_sd": sd,
             "redundancy": redundancy,
@@ -211,22 +210,20 @@ def _control(result: Result) -> list[dict[str, Any]]:
 
 
 def _stations(result: Result) -> list[dict[str, Any]]:
-    block, given_sd = result.block, result.photo_given_sd
-    rows = np.flatnonzero(result.known_photos)
-    residuals = result.photo_residuals[rows]
+    given = result.stations
     columns = zip(
-        rows.tolist(),
-        _outward(result, residuals[:, :3]).tolist(),
-        _outward(result, given_sd[rows, :3]).tolist(),
-        residuals[:, 3:].tolist(),
-        given_sd[rows, 3:].tolist(),
-        result.photo_redundancy[rows].tolist(),
-        result.photo_standardized[rows].tolist(),
+        given.rows.tolist(),
+        _outward(result, given.residuals[:, :3]).tolist(),
+        _outward(result, given.sd[:, :3]).tolist(),
+        given.residuals[:, 3:].tolist(),
+        given.sd[:, 3:].tolist(),
+        given.redundancy.tolist(),
+        given.standardized.tolist(),
         strict=True,
     )
     return [
         {
-            "id": block.photo_ids[row],
+            "id": result.block.photo_ids[row],
             "position_residual": position,
             "position_sd": position_sd,
             "attitude_residual_rad": attitude,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,35 @@ from photogram.results.iteration import Iteration
 from photogram.show.ways import Shown
 from photogram.statistics.reliability import ROUNDING
 
-__all__ = ["AdjustedNetwork"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from photogram import _photocore
+
+__all__ = ["AdjustedNetwork", "Observed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Observations of one kind, each with k components.
+
+    Attributes
+    ----------
+    rows
+        (r,) the points or photos that they are of.
+    residuals
+        (r, k) observed minus adjusted; 0 where fixed, NaN where nothing is observed.
+    sd
+        (r, k) standard deviations: 0 where fixed, infinite where nothing is observed.
+    redundancy, standardized
+        (r, k) redundancy numbers, and residual / (sd x root of redundancy number).
+    """
+
+    rows: Indices
+    residuals: Floats
+    sd: Floats
+    redundancy: Floats
+    standardized: Floats
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -99,7 +127,7 @@ class AdjustedNetwork(Shown, ABC):
                 value.flags.writeable = False
 
     @classmethod
-    def taken_over(cls, solution: Any, **found: Any) -> Self:
+    def taken_over(cls, solution: _photocore._NetworkSolution, **found: Any) -> Self:
         """Take over what the core found: under the same names, but for what is put otherwise in `found`."""
         found["initial_weighted_sum_of_squares"] = solution.initial_sum_of_squares
         found["iterations"] = [Iteration(*row) for row in solution.iterations]
@@ -142,14 +170,18 @@ class AdjustedNetwork(Shown, ABC):
         return _standardized(self.point_residuals, self.point_given_sd, self.point_redundancy)
 
     @property
-    def known_photos(self) -> NDArray[np.bool_]:
-        """(P,) whether a photo has an unknown that is weighted or fixed."""
-        return np.asarray(np.isfinite(self.photo_given_sd).any(axis=1))
+    def stations(self) -> Observed:
+        """Photos with an unknown that is weighted or fixed, as observations of their own unknowns."""
+        rows = np.flatnonzero(np.isfinite(self.photo_given_sd).any(axis=1))
+        parts = (self.photo_residuals, self.photo_given_sd, self.photo_redundancy, self.photo_standardized)
+        return Observed(rows, *(part[rows] for part in parts))
 
     @property
-    def held_points(self) -> NDArray[np.bool_]:
-        """(n,) whether a point took part and has a coordinate that is weighted or fixed."""
-        return np.asarray(self.used_points & np.isfinite(self.point_given_sd).any(axis=1))
+    def control(self) -> Observed:
+        """Points that took part and have a coordinate that is weighted or fixed, as observations."""
+        rows = np.flatnonzero(self.used_points & np.isfinite(self.point_given_sd).any(axis=1))
+        parts = (self.point_residuals, self.point_given_sd, self.point_redundancy, self.point_standardized)
+        return Observed(rows, *(part[rows] for part in parts))
 
     @property
     def used_points(self) -> NDArray[np.bool_]:
@@ -190,6 +222,26 @@ class AdjustedNetwork(Shown, ABC):
     def point_sd(self) -> Floats:
         """(n, 3) standard deviations."""
         return standard_deviations(self.point_covariances)
+
+    def photo_table(self) -> pd.DataFrame:
+        """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""
+        return self._table("photo")
+
+    def point_table(self) -> pd.DataFrame:
+        """Return adjusted points as a data frame: rays, values and standard deviations, angles in degrees."""
+        return self._table("point")
+
+    def image_table(self) -> pd.DataFrame:
+        """Return image observations as a data frame: residuals, redundancy numbers, test values."""
+        return self._table("image")
+
+    def control_table(self) -> pd.DataFrame:
+        """Return control as a data frame: residuals of held components, redundancy numbers, test values."""
+        return self._table("control")
+
+    def station_table(self) -> pd.DataFrame:
+        """Return weighted and fixed photos as a data frame: residuals, redundancy numbers, test values."""
+        return self._table("station")
 
 
 def _standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:

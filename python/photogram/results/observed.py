@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.results.network import AdjustedNetwork
+from photogram.results.network import AdjustedNetwork, Observed
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["control_lines", "image_lines", "station_lines", "tested"]
+__all__ = ["image_lines", "observed_lines", "tested"]
 
 LISTED = 10_000
 """Image points that a report lists at most; tables and documents have every one."""
@@ -92,62 +92,37 @@ def image_lines(
     return lines if len(used) else []
 
 
-def control_lines(
-    result: AdjustedNetwork, points: Sequence[str], columns: Sequence[str], factors: Floats
+def observed_lines(
+    kind: str, names: Sequence[str], columns: Sequence[str], factors: Floats, given: Observed
 ) -> list[str]:
-    """List control as observations; `factors` lead to the units of the columns."""
-    held = result.held_points
-    return _observed_lines(
-        "point",
-        [points[row] for row in np.flatnonzero(held).tolist()],
-        columns,
-        result.point_given_sd[held] * factors,
-        result.point_residuals[held] * factors,
-        result.point_redundancy[held],
-        result.point_standardized[held],
-    )
+    """List observed components, four lines for each point or photo: what was observed, and how it fits.
 
-
-def station_lines(
-    result: AdjustedNetwork, photos: Sequence[str], columns: Sequence[str], factors: Floats
-) -> list[str]:
-    """List photos as observations of their own unknowns; `factors` lead to the units of the columns."""
-    known = result.known_photos
-    return _observed_lines(
-        "photo",
-        [photos[row] for row in np.flatnonzero(known).tolist()],
-        columns,
-        result.photo_given_sd[known] * factors,
-        result.photo_residuals[known] * factors,
-        result.photo_redundancy[known],
-        result.photo_standardized[known],
-    )
-
-
-def _observed_lines(
-    kind: str,
-    names: Sequence[str],
-    columns: Sequence[str],
-    sd: Floats,
-    residuals: Floats,
-    redundancy: Floats,
-    standardized: Floats,
-) -> list[str]:
-    """Four lines for each of some observed positions: what was observed, and how it fits."""
-    if not names:
+    Parameters
+    ----------
+    kind
+        `point` or `photo`.
+    names
+        Of all points or photos.
+    columns, factors
+        The components with their units, and what leads to these.
+    given
+        The observations.
+    """
+    if not len(given.rows):
         return []
+    sd, residuals = given.sd * factors, given.residuals * factors
     lines = [f"{kind:<10}{'':<14}" + "".join(f"{column:>18}" for column in columns)]
     held = np.isfinite(sd)
     weighted = held & (sd > 0)
-    for row, name in enumerate(names):
+    for row, name in enumerate(names[index] for index in given.rows.tolist()):
         deviations = [
             "free" if math.isinf(each) else "fixed" if each == 0 else f"{each:.5f}" for each in sd[row]
         ]
         parts = (
             ("sd", deviations),
             ("residual", _cells(residuals[row], held[row], 5)),
-            ("redundancy", _cells(redundancy[row], weighted[row], 3)),
-            ("standardized", _cells(standardized[row], weighted[row], 2)),
+            ("redundancy", _cells(given.redundancy[row], weighted[row], 3)),
+            ("standardized", _cells(given.standardized[row], weighted[row], 2)),
         )
         lines += [
             f"{name if part == 'sd' else '':<10}{part:<14}" + "".join(f"{cell:>18}" for cell in cells)

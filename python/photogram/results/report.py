@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.structuring import structure
-from photogram.results.observed import control_lines, image_lines, station_lines, tested
+from photogram.results.observed import image_lines, observed_lines, tested
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.sections import Section, composed, headline, problems
@@ -54,9 +54,9 @@ def report(result: Result) -> str:
             "Stations as observations: observed minus adjusted, redundancy, standardized residual",
             _stations(result),
         ),
-        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
+        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Work", _work(result)),
     ]
     return composed(headline("block adjustment", result.block.title), sections)
@@ -215,14 +215,14 @@ def _difference_table(result: Result, differences: Floats) -> list[str]:
 
 def _control(result: Result) -> list[str]:
     columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
-    return control_lines(result, result.block.point_ids, columns, _outward(result))
+    return observed_lines("point", result.block.point_ids, columns, _outward(result), result.control)
 
 
 def _stations(result: Result) -> list[str]:
     columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
     columns += ["omega arcsec", "phi arcsec", "kappa arcsec"]
     outward = np.append(_outward(result), [1.0 / ARCSEC] * 3)
-    return station_lines(result, result.block.photo_ids, columns, outward)
+    return observed_lines("photo", result.block.photo_ids, columns, outward, result.stations)
 
 
 def _images(result: Result) -> list[str]:

@@ -177,29 +177,9 @@ class Result(AdjustedNetwork):
             differences[:, 0] = _least_turns(differences[:, 0])
         return differences
 
-    def photo_table(self) -> pd.DataFrame:
-        """Return adjusted photos as a data frame: values and standard deviations, angles in degrees."""
-        return self._table("photo")
-
-    def point_table(self) -> pd.DataFrame:
-        """Return adjusted points as a data frame: kind, rays, values and standard deviations, in degrees."""
-        return self._table("point")
-
-    def image_table(self) -> pd.DataFrame:
-        """Return image observations as a data frame: residuals, redundancy numbers, test values."""
-        return self._table("image")
-
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""
         return self._table("check")
-
-    def control_table(self) -> pd.DataFrame:
-        """Return control as a data frame: residuals of held components, redundancy numbers, test values."""
-        return self._table("control")
-
-    def station_table(self) -> pd.DataFrame:
-        """Return weighted and fixed stations as a data frame: residuals, redundancy numbers, test values."""
-        return self._table("station")
 
 
 def _least_turns(angles: Floats) -> Floats:

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.network.block import ATTITUDE_COLUMNS, position_columns
-from photogram.results.network import AdjustedNetwork
+from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.result import Result
 from photogram.show.ways import columns_of
 
-__all__ = ["control", "images", "named", "stations"]
+__all__ = ["images", "named", "observed", "table"]
 
 
 @columns_of.register(Result)
@@ -68,13 +68,15 @@ def _check_points(result: Result) -> dict[str, Any]:
 
 
 def _control(result: Result) -> dict[str, Any]:
-    points = _ids(result.block.point_ids)[result.held_points]
-    return {"point": points, **control(result, position_columns(result.block))}
+    control = result.control
+    points = _ids(result.block.point_ids)[control.rows]
+    return {"point": points, **observed(position_columns(result.block), control)}
 
 
 def _stations(result: Result) -> dict[str, Any]:
+    stations = result.stations
     names = [*position_columns(result.block), *ATTITUDE_COLUMNS]
-    return {"photo": _ids(result.block.photo_ids)[result.known_photos], **stations(result, names)}
+    return {"photo": _ids(result.block.photo_ids)[stations.rows], **observed(names, stations)}
 
 
 _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
@@ -97,45 +99,18 @@ def images(result: AdjustedNetwork, unit: str) -> dict[str, Any]:
     }
 
 
-def control(result: AdjustedNetwork, names: Sequence[str]) -> dict[str, Any]:
-    """Name what there is of control as observations.
+def observed(names: Sequence[str], given: Observed) -> dict[str, Any]:
+    """Name what there is of observed components: residuals and `sd_` in their units, plain numbers without.
 
     Residuals are observed minus adjusted. Where `sd_` is 0 a component is fixed, where it is infinite it is
-    not held.
+    not observed.
     """
-    parts = (
-        result.point_residuals,
-        result.point_given_sd,
-        result.point_redundancy,
-        result.point_standardized,
-    )
-    return _observed(names, *(part[result.held_points] for part in parts))
-
-
-def stations(result: AdjustedNetwork, names: Sequence[str]) -> dict[str, Any]:
-    """Name what there is of photos as observations of their own unknowns, columns as for control.
-
-    Of those with an unknown that is weighted or fixed (`sd_` 0); free ones have an infinite `sd_`.
-    """
-    parts = (
-        result.photo_residuals,
-        result.photo_given_sd,
-        result.photo_redundancy,
-        result.photo_standardized,
-    )
-    return _observed(names, *(part[result.known_photos] for part in parts))
-
-
-def _observed(
-    names: Sequence[str], residuals: Floats, sd: Floats, redundancy: Floats, standardized: Floats
-) -> dict[str, Any]:
-    """`residual_`, `sd_`, `redundancy_` and `standardized_` of each component; the latter have no units."""
     plain = [name.removesuffix("_deg").removesuffix("_rad").removesuffix("_px") for name in names]
     return {
-        **named(names, residuals, "residual_"),
-        **named(names, sd, "sd_"),
-        **named(plain, redundancy, "redundancy_"),
-        **named(plain, standardized, "standardized_"),
+        **named(names, given.residuals, "residual_"),
+        **named(names, given.sd, "sd_"),
+        **named(plain, given.redundancy, "redundancy_"),
+        **named(plain, given.standardized, "standardized_"),
     }
 
 

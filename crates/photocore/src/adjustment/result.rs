@@ -118,15 +118,13 @@ impl Adjustment {
         self.weights = None;
     }
 
-    /// Weighted sum of squares of the residuals, weights as the loss has changed them.
-    pub fn reweighted_sum_of_squares(&self, sd: &[f64]) -> f64 {
+    /// Weighted sum of squares of the first residuals, those of observations of the given standard deviations in groups of so many rows,
+    /// weights as the loss has changed them.
+    pub fn reweighted_sum_of_squares(&self, sd: &[f64], rows: usize) -> f64 {
         let squares = self.residuals.iter().zip(sd).map(|(residual, sd)| (residual / sd).powi(2));
         match &self.weights {
             None => squares.sum(),
-            Some(weights) => {
-                let rows = self.residuals.len() / weights.len().max(1);
-                squares.enumerate().map(|(i, square)| weights[i / rows] * square).sum()
-            }
+            Some(weights) => squares.enumerate().map(|(i, square)| weights[i / rows] * square).sum(),
         }
     }
 

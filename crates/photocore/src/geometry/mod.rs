@@ -3,7 +3,7 @@
 //! * [`mod@pose`]: where a photo stands and how it is turned; [`attitude`]: what numbers say how;
 //! * [`camera`]: from a direction to an image, one file for each kind of camera;
 //! * [`orientation`]: a pose as its six unknowns give it; [`projection`]: camera after pose after point;
-//! * [`collinearity`], [`bundler`]: the two photos that the programs use;
+//! * [`collinearity`]: the photo of the programs;
 //! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix; [`angle_axis`]: rotations as one vector;
 //! * [`space`]: coordinates of the object space; [`ellipsoid`]: longitude, latitude, height, and the local vertical frame;
 //! * [`lens`]: radial and decentering distortion, forward and inverse;
@@ -31,7 +31,6 @@
 pub mod angle_axis;
 pub mod atmosphere;
 pub mod attitude;
-pub mod bundler;
 pub mod camera;
 pub mod collinearity;
 pub mod cramer;
@@ -48,7 +47,6 @@ pub mod space;
 
 pub use angle_axis::{angle_axis_rotation, angle_axis_with_jacobian};
 pub use attitude::{AttitudeNumbers, RotationSense};
-pub use bundler::{BundlerParameters, BundlerPhoto};
 pub use camera::{Bal, Camera, CameraModel, Image, Perspective, Unit};
 pub use ellipsoid::{Ellipsoid, local_vertical};
 pub use lens::{Displacement, Distortion, Undistorted};

@@ -17,18 +17,31 @@ pub enum PoseNumbers {
     Vectors,
 }
 
-/// A pose with its partials: `du = [w]x (u - s) dq + S dq`, where every unknown may turn (w) about a pivot s, and three of them
-/// shift (S), all in the photo's axes.
+/// A pose with what its unknowns do to it.
 #[derive(Debug, Clone, Copy)]
 pub struct Orientation {
     pose: Pose,
-    /// w of the six unknowns.
-    turns: [Vector3; 6],
-    /// s.
-    pivot: Vector3,
-    /// S: columns of the three unknowns from `shifting` on.
-    shifts: Matrix3,
-    shifting: usize,
+    unknowns: Unknowns,
+}
+
+/// What the six unknowns are. A turn w of the photo's axes brings about du = w x (u - s), s being the pivot.
+#[derive(Debug, Clone, Copy)]
+enum Unknowns {
+    /// The coordinates of the position, then three of the attitude.
+    Position {
+        /// By what a point seems to move in cartesian axes when the coordinates change, as columns; None in rectangular space: -I.
+        shifts: Option<Matrix3>,
+        /// w of longitude and latitude, which turn the local vertical frame; None in rectangular space.
+        turns: Option<[Vector3; 2]>,
+        /// K of the angles; None where they are a rotation step.
+        rates: Option<Matrix3>,
+    },
+    /// The rotation vector of A^T, then t, which is the pivot: the rotation turns P, not P - C.
+    Vectors {
+        /// w of the rotation vector, as columns.
+        turns: Matrix3,
+        translation: Vector3,
+    },
 }
 
 impl Orientation {
@@ -50,12 +63,11 @@ impl Orientation {
         attitude: [f64; 3],
     ) -> Self {
         let numbers = AttitudeNumbers::OmegaPhiKappa(sense);
-        let stepping = Self::stepping(space, position, &numbers.attitude(attitude));
-        // A step rho turns the photo, and what it sees the other way.
-        let rates = -numbers.rates(attitude);
-        let [omega, phi, kappa] = [0, 1, 2].map(|k| rates.column(k).into());
-        let [longitude, latitude, height, ..] = stepping.turns;
-        Self { turns: [longitude, latitude, height, omega, phi, kappa], ..stepping }
+        let mut orientation = Self::stepping(space, position, &numbers.attitude(attitude));
+        if let Unknowns::Position { rates, .. } = &mut orientation.unknowns {
+            *rates = Some(numbers.rates(attitude));
+        }
+        orientation
     }
 
     /// The orientation at `position` (coordinates of the object space) with the attitude A, in geographic space that in the local
@@ -65,36 +77,24 @@ impl Orientation {
     /// du = u x rho, so that the partials of an image coordinate with respect to rho are g x u.
     pub fn stepping(space: ObjectSpace, position: [f64; 3], local: &Matrix3) -> Self {
         let (centre, centre_partials) = space.cartesian_with_partials(position);
-        let (attitude, longitude, latitude) = match space {
-            ObjectSpace::Rectangular => (*local, Vector3::zeros(), Vector3::zeros()),
+        let (attitude, shifts, turns) = match space {
+            ObjectSpace::Rectangular => (*local, None, None),
             ObjectSpace::Geographic(_) => {
                 let vertical = local_vertical(position[0], position[1]);
-                let [longitude, latitude] = local_vertical_turns(position[1]).map(|w| local.tr_mul(&w));
-                (vertical.tr_mul(local), longitude, latitude)
+                let turns = local_vertical_turns(position[1]).map(|w| local.tr_mul(&w));
+                (vertical.tr_mul(local), Some(-centre_partials), Some(turns))
             }
         };
-        let [x, y, z] = [-Vector3::x(), -Vector3::y(), -Vector3::z()];
-        Self {
-            pose: Pose { position: centre, attitude },
-            turns: [longitude, latitude, Vector3::zeros(), x, y, z],
-            pivot: Vector3::zeros(),
-            shifts: -attitude.tr_mul(&centre_partials),
-            shifting: 0,
-        }
+        let unknowns = Unknowns::Position { shifts, turns, rates: None };
+        Self { pose: Pose { position: centre, attitude }, unknowns }
     }
 
     /// The orientation with the rotation vector of A^T and the translation t.
     pub fn from_vectors(rotation: Vector3, translation: Vector3) -> Self {
-        let (to_photo, jacobian) = angle_axis_with_jacobian(&rotation);
-        let none = Vector3::zeros();
-        let [x, y, z] = [0, 1, 2].map(|k| jacobian.column(k).into());
+        let (to_photo, turns) = angle_axis_with_jacobian(&rotation);
         Self {
             pose: Pose { position: -to_photo.tr_mul(&translation), attitude: to_photo.transpose() },
-            turns: [x, y, z, none, none, none],
-            // The rotation turns P, not P - C.
-            pivot: translation,
-            shifts: Matrix3::identity(),
-            shifting: 3,
+            unknowns: Unknowns::Vectors { turns, translation },
         }
     }
 
@@ -110,34 +110,63 @@ impl Orientation {
         self.pose.position
     }
 
-    /// Partials of the projection centre with respect to the three coordinates of the position, as columns; those of angles.
+    /// Partials of the projection centre with respect to the three coordinates of the position, as columns; the identity where these are
+    /// cartesian.
     pub fn centre_partials(&self) -> Matrix3 {
-        -(self.pose.attitude * self.shifts)
+        match self.unknowns {
+            Unknowns::Position { shifts: Some(shifts), .. } => -shifts,
+            Unknowns::Position { .. } | Unknowns::Vectors { .. } => Matrix3::identity(),
+        }
+    }
+
+    /// The step of the pose, dC and rho (see [`Pose::step`]), that a unit of each unknown takes to first order.
+    pub fn steps(&self) -> [(Vector3, Vector3); 6] {
+        let none = Vector3::zeros();
+        match &self.unknowns {
+            Unknowns::Position { turns, rates, .. } => {
+                let (centre, rates) = (self.centre_partials(), rates.unwrap_or_else(Matrix3::identity));
+                let [longitude, latitude] = turns.unwrap_or([none; 2]);
+                let turned = [-longitude, -latitude, none];
+                let by_position = |k: usize| (centre.column(k).into(), turned[k]);
+                let by_attitude = |k: usize| (none, rates.column(k).into());
+                std::array::from_fn(|k| if k < 3 { by_position(k) } else { by_attitude(k - 3) })
+            }
+            // du = -A^T dC + u x rho = w x (u - t) holds for every u, so that rho = -w, and at u = 0 dC = A (w x t).
+            Unknowns::Vectors { turns, translation } => std::array::from_fn(|k| {
+                if k < 3 {
+                    let turn: Vector3 = turns.column(k).into();
+                    (self.pose.attitude * turn.cross(translation), -turn)
+                } else {
+                    (-self.pose.attitude.column(k - 3), none)
+                }
+            }),
+        }
     }
 
     /// By how much each of the three unknowns that shift would have to change, about, to move the photo to a place: the index of the
     /// unknown among the six, and the change in units of length.
     pub fn shifts_along(&self, place: &Vector3) -> [(usize, f64); 3] {
-        let u = self.pose.sight(place);
-        [0, 1, 2].map(|k| (self.shifting + k, self.shifts.column(k).normalize().dot(&u)))
+        match self.unknowns {
+            Unknowns::Position { .. } => {
+                let (columns, way) = (self.centre_partials(), place - self.centre());
+                [0, 1, 2].map(|k| (k, columns.column(k).normalize().dot(&way)))
+            }
+            Unknowns::Vectors { .. } => {
+                let u = self.pose.sight(place);
+                [0, 1, 2].map(|k| (3 + k, u[k]))
+            }
+        }
     }
 
-    /// How the six unknowns move with a step of the pose, dC in object axes, then rho; None where angles are singular.
-    ///
-    /// The projection centre itself is seen at u = 0 before the step and at -A^T dC after it, and the axes turn by rho:
-    /// sum of -(w x s) dq + S dq = -A^T dC, sum of w dq = -rho.
+    /// How the six unknowns move with a step of the pose, dC, then rho: the inverse of [`Orientation::steps`]. None where angles are
+    /// singular.
     pub fn unknowns_by_step(&self) -> Option<Matrix6<f64>> {
-        let mut by_unknowns = Matrix6::zeros();
-        for (k, w) in self.turns.iter().enumerate() {
-            by_unknowns.fixed_view_mut::<3, 1>(0, k).copy_from(&-w.cross(&self.pivot));
-            by_unknowns.fixed_view_mut::<3, 1>(3, k).copy_from(w);
+        let mut steps = Matrix6::zeros();
+        for (k, (shift, rho)) in self.steps().iter().enumerate() {
+            steps.fixed_view_mut::<3, 1>(0, k).copy_from(shift);
+            steps.fixed_view_mut::<3, 1>(3, k).copy_from(rho);
         }
-        let mut shifting = by_unknowns.fixed_view_mut::<3, 3>(0, self.shifting);
-        shifting += self.shifts;
-        let mut step = Matrix6::zeros();
-        step.fixed_view_mut::<3, 3>(0, 0).copy_from(&-self.pose.attitude.transpose());
-        step.fixed_view_mut::<3, 3>(3, 3).copy_from(&-Matrix3::identity());
-        by_unknowns.try_inverse().map(|inverse| inverse * step)
+        steps.try_inverse()
     }
 
     /// u, the point in the photo's axes.
@@ -146,22 +175,43 @@ impl Orientation {
         self.pose.sight(&point.position())
     }
 
-    /// The same orientation for a lifted point: what the photo's position does to the lift is added to its shifts. Of angles.
+    /// The same orientation for a lifted point: what the photo's position does to the lift is added to its shifts. Of positions.
     pub fn under(&self, lift: &Lift) -> Self {
-        Self { shifts: self.shifts + self.pose.attitude.tr_mul(&lift.by_photo), ..*self }
+        let mut lifted = *self;
+        if let Unknowns::Position { shifts, .. } = &mut lifted.unknowns {
+            *shifts = Some(lift.by_photo - self.centre_partials());
+        }
+        lifted
     }
 
     /// Partials of one image coordinate with respect to the six unknowns and to the coordinates of the point, given its gradient g
-    /// with respect to u: `g . ([w]x u) = (u x g) . w`, and du/dP = A^T.
+    /// with respect to u: `g . (w x u) = (u x g) . w`, and du/dP = A^T.
     #[inline(always)]
     pub fn chain(&self, u: &Vector3, g: &Vector3, point: &Point) -> ([f64; 6], [f64; 3]) {
-        let by_point = point.partials().tr_mul(&(self.pose.attitude * g));
-        let moment = (u - self.pivot).cross(g);
-        let [a, b, c, d, e, f] = self.turns.map(|w| moment.dot(&w));
-        let [p, q, r] = self.shifts.tr_mul(g).into();
-        // Not by an index: the partials would have to go through memory.
-        let by_photo =
-            if self.shifting == 0 { [a + p, b + q, c + r, d, e, f] } else { [a, b, c, d + p, e + q, f + r] };
-        (by_photo, by_point.into())
+        let by_place = self.pose.attitude * g;
+        let by_photo = match &self.unknowns {
+            Unknowns::Position { shifts, turns, rates } => {
+                let moment = u.cross(g);
+                let mut shift = match shifts {
+                    None => -by_place,
+                    Some(shifts) => shifts.tr_mul(&by_place),
+                };
+                if let Some([longitude, latitude]) = turns {
+                    shift.x += moment.dot(longitude);
+                    shift.y += moment.dot(latitude);
+                }
+                // A step turns the photo, and what it sees the other way.
+                let turn = match rates {
+                    None => -moment,
+                    Some(rates) => -rates.tr_mul(&moment),
+                };
+                [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
+            }
+            Unknowns::Vectors { turns, translation } => {
+                let turn = turns.tr_mul(&(u - translation).cross(g));
+                [turn.x, turn.y, turn.z, g.x, g.y, g.z]
+            }
+        };
+        (by_photo, point.by_coordinates(&by_place).into())
     }
 }

@@ -43,15 +43,21 @@ impl ObjectSpace {
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
     position: Vector3,
-    partials: Matrix3,
+    /// None in rectangular space: I.
+    partials: Option<Matrix3>,
 }
 
 impl Point {
     /// The point with the given coordinates of the object space.
     #[inline]
     pub fn new(space: ObjectSpace, coordinates: [f64; 3]) -> Self {
-        let (position, partials) = space.cartesian_with_partials(coordinates);
-        Self { position, partials }
+        match space {
+            ObjectSpace::Rectangular => Self { position: coordinates.into(), partials: None },
+            ObjectSpace::Geographic(_) => {
+                let (position, partials) = space.cartesian_with_partials(coordinates);
+                Self { position, partials: Some(partials) }
+            }
+        }
     }
 
     /// The cartesian position.
@@ -62,13 +68,22 @@ impl Point {
 
     /// Partials of the cartesian position with respect to the three coordinates, as columns.
     #[inline]
-    pub fn partials(&self) -> &Matrix3 {
-        &self.partials
+    pub fn partials(&self) -> Matrix3 {
+        self.partials.unwrap_or_else(Matrix3::identity)
+    }
+
+    /// A gradient with respect to the coordinates from that with respect to the cartesian position.
+    #[inline(always)]
+    pub fn by_coordinates(&self, by_position: &Vector3) -> Vector3 {
+        match &self.partials {
+            None => *by_position,
+            Some(partials) => partials.tr_mul(by_position),
+        }
     }
 
     /// The point where the lift puts it.
     pub fn lifted(&self, lift: &Lift) -> Self {
-        Self { position: self.position + lift.vector, partials: self.partials + lift.by_point }
+        Self { position: self.position + lift.vector, partials: Some(self.partials() + lift.by_point) }
     }
 }
 

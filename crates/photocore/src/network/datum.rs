@@ -71,12 +71,11 @@ impl Bundle {
     /// The motions of a free network about the central photo, whose pose is held first, and for the scale the coordinate of another
     /// in which the two are farthest apart.
     pub(super) fn rigid_motions(&self, unknowns: &[f64]) -> Option<Motions> {
-        let locals = 3 * self.points.len();
-        let photos = self.photos(&unknowns[locals..]);
+        let photos = self.photos(&unknowns[self.of_stations()]);
         let (central, part) = self.central_photo().filter(|_| !self.placed)?;
         let origin = photos[central].orientation.centre();
         let mut vectors = vec![vec![0.0; unknowns.len()]; MOTIONS];
-        for (point, &at) in unknowns[..locals].as_chunks::<3>().0.iter().enumerate() {
+        for (point, &at) in self.coordinates(unknowns).enumerate() {
             let point_at = Point::new(self.space, at);
             let inverse = match self.space {
                 ObjectSpace::Rectangular => Matrix3::identity(),
@@ -85,7 +84,7 @@ impl Bundle {
             let from = point_at.position() - origin;
             for (k, vector) in vectors.iter_mut().enumerate() {
                 let moved = inverse * displacement(k, &from);
-                vector[3 * point..3 * point + 3].copy_from_slice(moved.as_slice());
+                vector[self.of_point(point)].copy_from_slice(moved.as_slice());
             }
         }
         for (photo, station) in photos.iter().enumerate() {
@@ -96,35 +95,36 @@ impl Bundle {
                 let turn = if (3..6).contains(&k) { Vector3::ith(k - 3, 1.0) } else { Vector3::zeros() };
                 let rho = pose.attitude.tr_mul(&turn);
                 let moved = by_step * Vector6::new(shift.x, shift.y, shift.z, rho.x, rho.y, rho.z);
-                vector[locals + self.first[photo]..][..6].copy_from_slice(moved.as_slice());
+                vector[self.of_block(photo)][..6].copy_from_slice(moved.as_slice());
             }
         }
         let shifts = part.iter().filter(|&&photo| photo != central).flat_map(|&photo| {
             let shift = photos[photo].orientation.shifts_along(&origin);
-            shift.map(|(number, change)| (change.abs(), self.first[photo] + number))
+            shift.map(|(number, change)| (change.abs(), self.of_block(photo).start + number))
         });
         let mut shifts: Vec<(f64, usize)> = shifts.collect();
         shifts.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let pose = self.first[central]..self.first[central] + 6;
-        let preferred = pose.chain(shifts.into_iter().map(|(_, unknown)| unknown));
-        Some(Motions { vectors, preferred: preferred.map(|unknown| locals + unknown).collect() })
+        let pose = self.of_block(central).take(6);
+        let preferred = pose.chain(shifts.into_iter().map(|(_, unknown)| unknown)).collect();
+        Some(Motions { vectors, preferred })
     }
 
     /// Moves the network as a whole, exactly: P -> o + e^s Exp(w) (P - o) + e, o being the centre of the central photo.
     pub(super) fn move_rigidly(&self, unknowns: &mut [f64], amounts: &[f64]) {
-        let (points, kept) = unknowns.split_at_mut(3 * self.points.len());
-        let photos = self.photos(kept);
+        let photos = self.photos(&unknowns[self.of_stations()]);
         let Some((central, _)) = self.central_photo() else { return };
         let origin = photos[central].orientation.centre();
         let shift = Vector3::new(amounts[0], amounts[1], amounts[2]);
         let turn = angle_axis_rotation(&Vector3::new(amounts[3], amounts[4], amounts[5]));
         let scale = amounts[SCALE].exp();
         let moved = |place: Vector3| origin + scale * (turn * (place - origin)) + shift;
-        for at in points.as_chunks_mut::<3>().0 {
-            *at = self.space.coordinates(moved(self.space.cartesian(*at)));
+        let places =
+            self.coordinates(unknowns).map(|&at| self.space.coordinates(moved(self.space.cartesian(at))));
+        for (point, at) in places.collect::<Vec<[f64; 3]>>().into_iter().enumerate() {
+            unknowns[self.of_point(point)].copy_from_slice(&at);
         }
         for (photo, station) in photos.iter().enumerate() {
-            let pose: &mut [f64] = &mut kept[self.first[photo]..][..6];
+            let pose = &mut unknowns[self.of_block(photo)][..6];
             let (centre, attitude) =
                 (moved(station.orientation.centre()), turn * station.orientation.pose().attitude);
             match self.poses {
@@ -153,19 +153,18 @@ impl Bundle {
 impl Assembled {
     /// The unknowns that carry a datum, and the values that they stay near to.
     pub(super) fn datum(&self, inner: &InnerConstraints) -> (Datum, Vec<f64>) {
-        let (model, locals) = (&self.problem.model, 3 * self.points.len());
+        let model = &self.problem.model;
         let mut reference = self.problem.initial.clone();
-        let given = model.points.iter().flat_map(|point| point.coordinates);
-        reference
-            .iter_mut()
-            .zip(given)
-            .filter(|(_, given)| !given.is_nan())
-            .for_each(|(x, given)| *x = given);
-        let of = self.points.iter().enumerate().map(|(local, &point)| (point, 3 * local));
-        let first: HashMap<usize, usize> = of.collect();
+        for (point, given) in model.points.iter().enumerate() {
+            let places = reference[model.of_point(point)].iter_mut().zip(given.coordinates);
+            places.filter(|(_, given)| !given.is_nan()).for_each(|(x, given)| *x = given);
+        }
+        let of = self.points.iter().enumerate();
+        let first: HashMap<usize, usize> =
+            of.map(|(index, &point)| (point, model.of_point(index).start)).collect();
         let points = inner.points.iter().filter_map(|point| first.get(point).copied());
         let photos = inner.photos.iter().filter(|&&photo| photo < model.cameras.len());
-        let photos = photos.map(|&photo| locals + model.first[photo]);
+        let photos = photos.map(|&photo| model.of_block(photo).start);
         let lengths = |first: usize| {
             let at = std::array::from_fn(|k| self.problem.initial[first + k]);
             let partials = *Point::new(model.space, at).partials();

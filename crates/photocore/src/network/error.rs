@@ -2,7 +2,9 @@
 
 use thiserror::Error;
 
+use super::observations::Fault;
 use super::precision::Coarse;
+use super::problem::Assembled;
 use crate::adjustment::{AdjustError, DatumError, gib};
 use crate::normals::LayoutError;
 
@@ -18,9 +20,16 @@ pub enum NetworkError {
     /// A camera has more or fewer standard deviations than parameters.
     #[error("camera {0} has not as many standard deviations as parameters")]
     CameraDeviations(usize),
-    /// Several photos share a camera that is not held.
-    #[error("camera {0} has unknown parameters and belongs to several photos")]
-    SharedCamera(usize),
+    /// An observation that contradicts itself or the network.
+    #[error("observation {index}, of kind {kind}, {fault}")]
+    Observation {
+        /// Its index.
+        index: usize,
+        /// The name of its kind.
+        kind: &'static str,
+        /// What is wrong with it.
+        fault: Fault,
+    },
     /// Poses in vectors in a space where they are not defined.
     #[error("poses in vectors need rectangular space and no refraction, and carry no datum")]
     Vectors,
@@ -33,9 +42,9 @@ pub enum NetworkError {
     /// Points whose image points do not determine them.
     #[error("{} points are not determined by their image points", .0.len())]
     UndeterminedPoints(Vec<usize>),
-    /// Photos whose unknowns the observations do not determine; one list for each undetermined combination.
-    #[error("{} combinations of the photos' unknowns are not determined", .0.len())]
-    UndeterminedPhotos(Vec<Vec<usize>>),
+    /// Combinations of the unknowns of photos and of cameras that the observations do not determine.
+    #[error("{} combinations of the unknowns of photos and cameras are not determined", .0.len())]
+    Undetermined(Vec<Combination>),
     /// The initial values put a point into the plane of a projection centre, so that its image is not finite.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
@@ -64,19 +73,54 @@ pub enum NetworkError {
     Layout(#[from] LayoutError),
 }
 
+/// What a combination of unknowns moves.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Combination {
+    /// Photos, by their pose or a camera that is theirs alone.
+    pub photos: Vec<usize>,
+    /// Cameras that several photos share.
+    pub cameras: Vec<usize>,
+}
+
 impl NetworkError {
-    /// What stopped the adjustment, in terms of the network; `points` are those that took part.
-    pub(super) fn new(error: AdjustError, points: &[usize]) -> Self {
+    /// What stopped the adjustment, in terms of the network.
+    pub(super) fn new(error: AdjustError, assembled: &Assembled) -> Self {
         match error {
             AdjustError::UndeterminedLocals(locals) => {
-                let mut points: Vec<usize> = locals.into_iter().map(|local| points[local]).collect();
+                let mut points: Vec<usize> =
+                    locals.into_iter().map(|local| assembled.points[local]).collect();
                 points.sort_unstable();
                 Self::UndeterminedPoints(points)
             }
-            AdjustError::Undetermined(combinations) => Self::UndeterminedPhotos(combinations),
+            AdjustError::Undetermined(combinations) => Self::undetermined(combinations, assembled),
             AdjustError::NotFinite => Self::NotFinite,
             AdjustError::Interrupted => Self::Interrupted,
             AdjustError::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
         }
+    }
+
+    /// Combinations of kept blocks: those that move photos and cameras by these, else the points that they move.
+    fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
+        let model = &assembled.problem.model;
+        let (photos, stations) = (model.cameras.len(), model.stations());
+        let of_stations = |blocks: &Vec<usize>| {
+            let mut found = Combination::default();
+            for &block in blocks.iter().filter(|&&block| block < stations) {
+                match block.checked_sub(photos) {
+                    None => found.photos.push(block),
+                    Some(shared) => found.cameras.push(model.shared[shared]),
+                }
+            }
+            (found != Combination::default()).then_some(found)
+        };
+        let found: Vec<Combination> = combinations.iter().filter_map(of_stations).collect();
+        if !found.is_empty() {
+            return Self::Undetermined(found);
+        }
+        let point = |block: usize| assembled.points[model.locals + block - stations];
+        let mut points: Vec<usize> = combinations.into_iter().flatten().map(point).collect();
+        points.sort_unstable();
+        points.dedup();
+        Self::UndeterminedPoints(points)
     }
 }

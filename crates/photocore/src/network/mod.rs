@@ -1,9 +1,10 @@
 //! Networks of photos: poses, cameras, points and images adjusted together.
 //!
-//! Unknowns are the pose of every photo, the parameters of its camera unless they are held, and the coordinates of every point,
-//! each weighted from free to fixed; observations are image coordinates. A block of aerial photographs (GIANT guide, sections 4 to 9)
-//! has cameras that are held, and poses in angles; a collection "in the large" (Agarwal, Snavely, Seitz and Szeliski 2010) has a
-//! camera of its own for every photo, and poses in vectors. Positions are X, Y, Z or longitude, latitude, height.
+//! Unknowns are the pose of every photo, the parameters of the cameras unless they are held, and the coordinates of every point,
+//! each weighted from free to fixed; observations are image coordinates and, beside them, those of [`observations`]. A block of aerial
+//! photographs (GIANT guide, sections 4 to 9) has cameras that are held, and poses in angles; a collection "in the large" (Agarwal,
+//! Snavely, Seitz and Szeliski 2010) has a camera of its own for every photo, and poses in vectors; a block that calibrates its camera
+//! has one for all. Positions are X, Y, Z or longitude, latitude, height.
 //!
 //! Two photos over four control points:
 //!
@@ -38,6 +39,7 @@
 //!     photos: stations.map(photo).to_vec(),
 //!     points: corners.map(|coordinates| Point { coordinates, sd: [0.02; 3] }).to_vec(),
 //!     images,
+//!     observations: vec![],
 //! };
 //! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
 //! let solution = network.adjust(&Options::default(), &pool, &mut |_| ControlFlow::Continue(()))?;
@@ -49,10 +51,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod cameras;
 mod datum;
 mod error;
 mod model;
 mod neighbourhood;
+pub mod observations;
 mod precision;
 mod problem;
 mod screening;
@@ -67,8 +71,10 @@ use crate::adjustment::{self, Adjustment, Event};
 use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
+pub use cameras::AdjustedCamera;
 pub use datum::InnerConstraints;
-pub use error::NetworkError;
+pub use error::{Combination, NetworkError};
+pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
@@ -86,12 +92,13 @@ pub struct Photo {
     pub camera: usize,
 }
 
-/// A camera as it is known beforehand.
+/// A camera as it is known beforehand. Photos may share it: then its unknown parameters are a block of their own; those of a camera of
+/// one photo are unknowns of that.
 #[derive(Debug, Clone)]
 pub struct Camera {
     /// The camera with its initial (and, where weighted, observed) parameters.
     pub camera: geometry::Camera,
-    /// Standard deviations of the parameters: infinite free, zero fixed. A camera with other ones than zeros belongs to one photo.
+    /// Standard deviations of the parameters: infinite free, zero fixed.
     pub sd: Vec<f64>,
 }
 
@@ -153,6 +160,8 @@ pub struct Network {
     pub points: Vec<Point>,
     /// Its image points.
     pub images: Vec<Image>,
+    /// What else was observed.
+    pub observations: Vec<Observation>,
 }
 
 /// What the variance of unit weight is based on (GIANT guide, Appendix E).
@@ -213,7 +222,7 @@ impl Network {
     ///
     /// Points that their image points cannot determine are left out first (see [`Dropped`]). So are points that run into the station
     /// of a photo: the adjustment goes on without them from where it was. `watch` is called on the calling thread; when it breaks, the
-    /// adjustment stops.
+    /// adjustment stops. Observations of points that are left out do not take part.
     ///
     /// # Errors
     /// A network that contradicts itself, has nothing to adjust, or leaves unknowns undetermined; an interruption.
@@ -266,7 +275,7 @@ impl Network {
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
             let adjusted = adjustment::adjust(problem, &own, pool, watch);
-            let mut adjusted = adjusted.map_err(|error| NetworkError::new(error, &assembled.points))?;
+            let mut adjusted = adjusted.map_err(|error| NetworkError::new(error, &assembled))?;
             let earlier = before.take();
             adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
             if adjusted.collapsed.is_empty() {
@@ -276,7 +285,7 @@ impl Network {
                 let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
                 return Ok(Solution::new(self, options, &assembled, adjusted, collapsed));
             }
-            adjusted.collapsed.iter().for_each(|&local| left_out[assembled.points[local]] = true);
+            adjusted.collapsed.iter().for_each(|&point| left_out[assembled.points[point]] = true);
             let reached = assembled.reached(&adjusted.unknowns, self.points.len());
             before = Some((adjusted, reached));
         }
@@ -312,17 +321,19 @@ impl Network {
         if let Some(bad) = self.images.iter().position(outside) {
             return Err(NetworkError::Index(bad));
         }
-        let mut users = vec![0_usize; self.cameras.len()];
         for (index, photo) in self.photos.iter().enumerate() {
-            *users.get_mut(photo.camera).ok_or(NetworkError::NoCamera(index))? += 1;
+            if photo.camera >= self.cameras.len() {
+                return Err(NetworkError::NoCamera(index));
+            }
         }
-        for (index, (camera, users)) in self.cameras.iter().zip(users).enumerate() {
+        for (index, camera) in self.cameras.iter().enumerate() {
             if camera.sd.len() != camera.camera.parameter_names().len() {
                 return Err(NetworkError::CameraDeviations(index));
             }
-            if users > 1 && !camera.is_held() {
-                return Err(NetworkError::SharedCamera(index));
-            }
+        }
+        for (index, observation) in self.observations.iter().enumerate() {
+            let checked = observation.check(self.points.len(), self.photos.len());
+            checked.map_err(|fault| NetworkError::Observation { index, kind: observation.kind(), fault })?;
         }
         let cartesian = self.space == ObjectSpace::Rectangular && self.refraction.is_none();
         if self.poses == PoseNumbers::Vectors && !cartesian { Err(NetworkError::Vectors) } else { Ok(()) }

@@ -1,7 +1,10 @@
 //! The observation equations of a network.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
+use super::observations::{TiedModel, TiedObservation};
 use super::{Image, Point};
 use crate::adjustment::{Model, Motions};
 use crate::geometry::camera::each_camera;
@@ -9,10 +12,11 @@ use crate::geometry::{
     self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
     RotationSense, Vector3, Vertical,
 };
-use crate::normals::GroupRows;
+use crate::normals::{GroupRows, Tie, TieRows};
 
-/// Images of points by photos: the local blocks are the points, the kept blocks the photos with their pose and, unless it is held,
-/// their camera.
+/// Images of points by photos, and other observations of these: the local blocks are the points that no such observation touches, the
+/// kept blocks the photos with their pose and, unless it is held or shared, their camera, then the cameras that several photos share,
+/// then all other points. The images of these are ties, and so are the observations, in this order.
 #[derive(Debug)]
 pub struct Bundle {
     pub space: ObjectSpace,
@@ -21,11 +25,20 @@ pub struct Bundle {
     pub refraction: Option<Refraction>,
     /// Of each photo, with the parameters that it starts from.
     pub cameras: Vec<Camera>,
-    /// The unknowns of photo i are `first[i]..first[i + 1]` of the kept ones: six of the pose, then those of the camera.
+    /// The unknowns of kept block i are `first[i]..first[i + 1]` of the kept ones: photos (six of the pose, then those of a camera of
+    /// their own), then shared cameras.
     pub first: Vec<usize>,
-    /// The points; coordinates counted from the local origin.
+    /// The cameras that several photos share, as the network numbers them.
+    pub shared: Vec<usize>,
+    /// The kept block of each photo's camera where that is shared.
+    pub camera_block: Vec<Option<usize>>,
+    /// What coordinates are counted from.
+    pub origin: [f64; 3],
+    /// The points, local ones first; coordinates counted from the origin.
     pub points: Vec<Point>,
-    /// The images, point by point: the groups of observations.
+    /// How many of them are local.
+    pub locals: usize,
+    /// The images, point by point: the groups of observations, then the first ties.
     pub images: Vec<Image>,
     /// The images of point i are `images[start[i]..start[i + 1]]`.
     pub start: Vec<usize>,
@@ -35,7 +48,9 @@ pub struct Bundle {
     pub images_on: Vec<usize>,
     /// Which photos step by a rotation vector about their own axes: those with free angles.
     pub turning: Vec<bool>,
-    /// Whether the position of anything is weighted or fixed: then the datum is the user's.
+    /// What else was observed.
+    pub observations: Vec<TiedObservation>,
+    /// Whether the position of anything is weighted, fixed or observed: then the datum is the user's.
     pub placed: bool,
 }
 
@@ -44,6 +59,8 @@ pub struct Bundle {
 pub struct Stations {
     pub photos: Vec<Station>,
     pub points: Vec<geometry::Point>,
+    /// The coordinates of the points that are not local.
+    tied: Vec<[f64; 3]>,
     refracted: Option<Refracted>,
 }
 
@@ -93,7 +110,7 @@ fn write<C: CameraModel>(
 ) {
     let u = orientation.sight(point);
     let projection = orientation.projection(&u, &camera.linearize(&u), point);
-    let width = rows.kept.len() / 2;
+    let (width, shared) = (rows.kept.len() / 2, rows.common.len() / 2);
     for row in 0..2 {
         rows.constant[row] = image.xy[row] - projection.xy[row];
         rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
@@ -101,6 +118,11 @@ fn write<C: CameraModel>(
         if width > 6 {
             rows.kept[width * row + 6..][..width - 6].copy_from_slice(projection.camera[row].as_ref());
         }
+    }
+    if shared > 0 {
+        (0..2).for_each(|row| {
+            rows.common[shared * row..][..shared].copy_from_slice(projection.camera[row].as_ref());
+        });
     }
 }
 
@@ -142,12 +164,94 @@ impl Shares {
 }
 
 impl Bundle {
-    /// The photos at given values of their unknowns.
+    /// The unknowns that are those of photos and shared cameras, of all.
+    pub fn of_stations(&self) -> Range<usize> {
+        let start = 3 * self.locals;
+        start..start + self.first[self.stations()]
+    }
+
+    /// Number of photos and shared cameras: the first kept blocks.
+    pub fn stations(&self) -> usize {
+        self.first.len() - 1
+    }
+
+    /// The unknowns of a photo or shared camera, of all.
+    pub fn of_block(&self, block: usize) -> Range<usize> {
+        let start = 3 * self.locals;
+        start + self.first[block]..start + self.first[block + 1]
+    }
+
+    /// Whether a photo has a camera with unknown parameters that is no other's.
+    pub fn has_own_camera(&self, photo: usize) -> bool {
+        self.of_block(photo).len() > 6
+    }
+
+    /// Where the coordinates of a point stand among the unknowns.
+    pub fn of_point(&self, point: usize) -> Range<usize> {
+        let start = if point < self.locals { 0 } else { self.of_stations().len() };
+        start + 3 * point..start + 3 * point + 3
+    }
+
+    /// The coordinates of all points, counted from the origin, at given values of the unknowns.
+    pub fn coordinates<'a>(&self, unknowns: &'a [f64]) -> impl Iterator<Item = &'a [f64; 3]> + use<'a> {
+        let photos = self.of_stations();
+        let (local, tied) = (&unknowns[..photos.start], &unknowns[photos.end..]);
+        local.as_chunks().0.iter().chain(tied.as_chunks().0)
+    }
+
+    /// The ties: images of points that are not local, then observations.
+    pub fn ties(&self) -> Vec<Tie> {
+        let block = |&point: &usize| (self.stations() + point - self.locals) as u32;
+        let images = self.images[self.start[self.locals]..].iter().enumerate().map(|(tie, image)| {
+            let point = self.point_of(self.start[self.locals] + tie);
+            let camera = self.camera_block[image.photo].map(|block| block as u32);
+            Tie {
+                rows: 2,
+                kept: [block(&point), image.photo as u32].into_iter().chain(camera).collect(),
+                border: 0..0,
+            }
+        });
+        let observations = self.observations.iter().map(|tied| Tie {
+            rows: tied.root.nrows(),
+            kept: tied.points.iter().map(block).chain(tied.photos.iter().map(|&i| i as u32)).collect(),
+            border: 0..0,
+        });
+        images.chain(observations).collect()
+    }
+
+    /// How many ties are images.
+    pub fn tied_images(&self) -> usize {
+        self.images.len() - self.start[self.locals]
+    }
+
+    /// The point of an image.
+    fn point_of(&self, image: usize) -> usize {
+        self.start.partition_point(|&start| start <= image) - 1
+    }
+
+    /// Writes the equations of an image whose point is not local.
+    fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut TieRows<'_>) {
+        let all = rows.coefficients.len() / 2;
+        let width = self.of_block(self.images[image].photo).len();
+        let shared = all - 3 - width;
+        let (mut local, mut kept, mut common) = ([0.0; 6], vec![0.0; 2 * width], vec![0.0; 2 * shared]);
+        let constant = &mut *rows.constant;
+        let mut apart = GroupRows { constant, local: &mut local, kept: &mut kept, common: &mut common };
+        self.observe(stations, self.point_of(image), image, &mut apart);
+        for (row, together) in rows.coefficients.chunks_exact_mut(all).enumerate() {
+            together[..3].copy_from_slice(&local[3 * row..][..3]);
+            together[3..3 + width].copy_from_slice(&kept[width * row..][..width]);
+            together[3 + width..].copy_from_slice(&common[shared * row..][..shared]);
+        }
+    }
+
+    /// The photos at given values of the unknowns of photos and shared cameras.
     pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
         let photo = |photo: usize| {
             let (pose, camera) = unknowns[self.first[photo]..self.first[photo + 1]].split_at(6);
             let pose = std::array::from_fn(|k| pose[k]);
-            let own = self.cameras[photo];
+            let shared = self.camera_block[photo].map(|block| self.first[block]..self.first[block + 1]);
+            let (own, camera) = (self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
             Station {
                 orientation: self.orientation(photo, &pose),
                 camera: own.with_parameters(camera).unwrap_or(own),
@@ -232,8 +336,9 @@ impl Model for Bundle {
     type Prepared = Stations;
 
     fn prepare(&self, unknowns: &[f64]) -> Stations {
-        let (points, photos) = unknowns.split_at(3 * self.points.len());
-        let coordinates = points.as_chunks().0;
+        let photos = &unknowns[self.of_stations()];
+        let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
+        let tied = tied.as_chunks().0.to_vec();
         let refracted = self.refraction.map(|refraction| Refracted {
             refraction,
             at_photos: verticals(
@@ -241,18 +346,24 @@ impl Model for Bundle {
                 self.space,
                 self.first[..self.cameras.len()].iter().map(|&i| &photos[i..]),
             ),
-            at_points: verticals(&refraction, self.space, points.chunks(3)),
+            at_points: verticals(
+                &refraction,
+                self.space,
+                local.chunks(3).chain(tied.as_flattened().chunks(3)),
+            ),
         });
-        let points = coordinates.par_iter().with_min_len(1024);
-        let points = points.map(|&coordinates| geometry::Point::new(self.space, coordinates)).collect();
-        Stations { photos: self.photos(photos), points, refracted }
+        let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
+        let mut points: Vec<geometry::Point> =
+            local.as_chunks().0.par_iter().with_min_len(1024).map(place).collect();
+        points.extend(tied.iter().map(place));
+        Stations { photos: self.photos(photos), points, tied, refracted }
     }
 
     /// Angles of photos that step by a rotation vector go by way of their matrix.
     fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
-        let angles_of = |photo: usize| 3 * self.points.len() + self.first[photo] + 3;
+        let start = self.of_stations().start + 3;
         let turn = |photo: usize| {
-            let (first, sense) = (angles_of(photo), self.turning_sense(photo)?);
+            let (first, sense) = (start + self.first[photo], self.turning_sense(photo)?);
             let [angles, rho] = [&*unknowns, step].map(|values| std::array::from_fn(|k| values[first + k]));
             Some((first, sense.stepped(angles, &Vector3::from(rho))))
         };
@@ -263,9 +374,11 @@ impl Model for Bundle {
 
     /// Intersects the points anew.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
-        let (points, photos) = unknowns.split_at_mut(3 * self.points.len());
-        let Ok(coordinates) = self.intersect(&self.photos(photos)) else { return false };
-        points.copy_from_slice(coordinates.as_flattened());
+        let photos = self.of_stations();
+        let Ok(coordinates) = self.intersect(&self.photos(&unknowns[photos.clone()])) else { return false };
+        let (local, tied) = coordinates.split_at(self.locals);
+        unknowns[..photos.start].copy_from_slice(local.as_flattened());
+        unknowns[photos.end..].copy_from_slice(tied.as_flattened());
         true
     }
 
@@ -280,6 +393,17 @@ impl Model for Bundle {
             }
             Some(refracted) => refracted.write(stations, image, local, rows),
         }
+    }
+
+    fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {
+        let Some(observation) = tie.checked_sub(self.tied_images()) else {
+            return self.observe_tied_image(stations, self.start[self.locals] + tie, rows);
+        };
+        let point = |point: usize| (stations.points[point], stations.tied[point - self.locals]);
+        let photo =
+            |photo: usize| (&stations.photos[photo].orientation, self.first[photo + 1] - self.first[photo]);
+        let model = TiedModel { space: self.space, origin: self.origin, point: &point, photo: &photo };
+        self.observations[observation].write(&model, rows.constant, rows.coefficients);
     }
 
     /// Points that have run into a station, or are on their way there: two rays that meet there ask for it.

@@ -1,37 +1,39 @@
-//! The least-squares problem of a network: points are local blocks of three, photos kept blocks of six and their cameras'.
+//! The least-squares problem of a network: points are local blocks of three, photos kept blocks of six and their own cameras', cameras
+//! that several photos share blocks of their own; points that observations touch are kept blocks of three.
+
+use std::collections::HashMap;
 
 use super::model::{Bundle, Station};
+use super::observations::{Fault, Observation, TiedObservation};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
 use super::{Camera, Image, Network, NetworkError, Options, Photo, Point, Start};
-use crate::adjustment::{Method, Problem};
+use crate::adjustment::{Method, Model, Problem};
 use crate::geometry::{ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, nearest_turns};
-use crate::normals::{Layout, System};
+use crate::normals::{Layout, System, TieRows};
 
 /// A problem, and what its parts are in the network.
 pub(super) struct Assembled {
     pub problem: Problem<Bundle>,
-    /// The points that take part.
+    /// The points that take part, in the order of the model.
     pub points: Vec<usize>,
     /// Those that do not.
     pub dropped: Vec<Dropped>,
-    /// What coordinates are counted from.
-    pub origin: [f64; 3],
 }
 
-/// Values from which an adjustment goes on: of all points, and of the kept unknowns.
+/// Values from which an adjustment goes on: of all points, and of the unknowns of photos and shared cameras.
 pub(super) struct Reached {
     points: Vec<[f64; 3]>,
-    kept: Vec<f64>,
+    stations: Vec<f64>,
 }
 
 impl Assembled {
     /// Takes over adjusted unknowns; `count` is the number of all points.
     pub fn reached(&self, unknowns: &[f64], count: usize) -> Reached {
-        let (points, kept) = unknowns.split_at(3 * self.points.len());
+        let model = &self.problem.model;
         let mut all = vec![[f64::NAN; 3]; count];
-        self.points.iter().zip(points.as_chunks().0).for_each(|(&point, &at)| all[point] = at);
-        Reached { points: all, kept: kept.to_vec() }
+        self.points.iter().zip(model.coordinates(unknowns)).for_each(|(&point, &at)| all[point] = at);
+        Reached { points: all, stations: unknowns[model.of_stations()].to_vec() }
     }
 }
 
@@ -62,18 +64,34 @@ impl Network {
         &self.cameras[photo.camera]
     }
 
-    /// Standard deviations of the unknowns of a photo.
-    fn photo_sd<'a>(&'a self, photo: &'a Photo, held: bool) -> impl Iterator<Item = f64> + 'a {
-        let camera = self.camera(photo);
-        let own = if camera.is_held() { &[][..] } else { &camera.sd[..] };
-        photo.sd.iter().chain(own).map(move |&sd| if held { 0.0 } else { sd })
+    /// Standard deviations of the unknowns of photos and shared cameras; those of `unused` photos, and of cameras that have no others,
+    /// are held.
+    fn station_sd(&self, model: &Bundle, unused: impl Fn(usize) -> bool) -> Vec<f64> {
+        let mut all = Vec::new();
+        let mut used = vec![false; self.cameras.len()];
+        for (index, photo) in self.photos.iter().enumerate() {
+            let own = if model.has_own_camera(index) { &self.camera(photo).sd[..] } else { &[] };
+            let held = unused(index);
+            used[photo.camera] |= !held;
+            all.extend(photo.sd.iter().chain(own).map(|&sd| if held { 0.0 } else { sd }));
+        }
+        for &camera in &model.shared {
+            all.extend(self.cameras[camera].sd.iter().map(|&sd| if used[camera] { sd } else { 0.0 }));
+        }
+        all
     }
 
-    /// The values of the unknowns of a photo, its pose given.
-    fn photo_values(&self, photo: &Photo, pose: [f64; 6]) -> impl Iterator<Item = f64> + use<> {
-        let camera = self.camera(photo);
-        let own = if camera.is_held() { vec![] } else { camera.camera.parameters() };
-        pose.into_iter().chain(own)
+    /// The values of the unknowns of photos, with the given poses, and of shared cameras.
+    fn station_values(&self, model: &Bundle, pose: impl Fn(&Photo) -> [f64; 6]) -> Vec<f64> {
+        let mut all = Vec::new();
+        for (index, photo) in self.photos.iter().enumerate() {
+            all.extend(pose(photo));
+            if model.has_own_camera(index) {
+                all.extend(self.camera(photo).camera.parameters());
+            }
+        }
+        all.extend(model.shared.iter().flat_map(|&camera| self.cameras[camera].camera.parameters()));
+        all
     }
 
     /// The observed pose of a photo, as near to the initial one as whole turns bring it.
@@ -110,7 +128,7 @@ impl Network {
             self.check_rounding(&screened, |photo| !unused(photo))?;
         }
         let origin = self.origin();
-        let mut model = self.bundle(&screened, images_on.clone(), origin);
+        let mut model = self.bundle(&screened, images_on.clone(), origin)?;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
             model.turning = (0..self.photos.len()).map(|i| self.turns(i) && !unused(i)).collect();
@@ -121,51 +139,98 @@ impl Network {
             }
             PoseNumbers::Vectors => pose,
         };
-        let of_photos = |pose: &dyn Fn(&Photo) -> [f64; 6]| -> Vec<f64> {
-            self.photos.iter().flat_map(|photo| self.photo_values(photo, local(pose(photo)))).collect()
-        };
-        let kept = reached.map_or_else(|| of_photos(&|photo| photo.pose), |reached| reached.kept.clone());
-        let stations = model.photos(&kept);
+        let values = reached.map_or_else(
+            || self.station_values(&model, |photo| local(photo.pose)),
+            |reached| reached.stations.clone(),
+        );
+        let stations = model.photos(&values);
         let start = match reached {
             Some(reached) => screened.points.iter().map(|&point| reached.points[point]).collect(),
             None => self.start(options.start, &screened, &model, &stations)?,
         };
         let own: Vec<[f64; 3]> = model.points.iter().map(|point| point.coordinates).collect();
-        let prior = of_photos(&|photo| self.observed_pose(photo));
-        let photo_sd = self.photos.iter().enumerate().flat_map(|(i, photo)| self.photo_sd(photo, unused(i)));
-        let sd = model.points.iter().flat_map(|point| point.sd).chain(photo_sd).collect();
-        let widths: Vec<usize> = model.first.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let photo_of = model.images.iter().map(|image| image.photo as u32).collect();
-        let places = stations.iter().map(|station| station.orientation.centre().into()).collect();
-        let layout = Layout::new(2, 3, &widths, model.start.clone(), photo_of)?.with_places(places)?;
+        let own_sd: Vec<[f64; 3]> = model.points.iter().map(|point| point.sd).collect();
+        let observed = self.station_values(&model, |photo| local(self.observed_pose(photo)));
+        let station_sd = self.station_sd(&model, unused);
+        // Local points, photos and shared cameras, points that observations touch.
+        let unknowns = |points: &[[f64; 3]], stations: &[f64]| {
+            let (local, tied) = points.split_at(model.locals);
+            [local.as_flattened(), stations, tied.as_flattened()].concat()
+        };
+        let (initial, prior, sd) =
+            (unknowns(&start, &values), unknowns(&own, &observed), unknowns(&own_sd, &station_sd));
+        let tied = start[model.locals..].iter().map(|&at| self.space.cartesian(at));
+        let centres: Vec<[f64; 3]> =
+            stations.iter().map(|station| station.orientation.centre().into()).collect();
+        let cameras = (0..model.shared.len()).map(|shared| model.place_of_camera(shared, &centres));
+        let places = [centres.clone(), cameras.collect(), tied.map(Into::into).collect()].concat();
+        let of_images = model.images.iter().flat_map(|image| image.sd);
+        let of_ties = model.observations.iter().flat_map(|tied| vec![1.0; tied.root.nrows()]);
         let problem = Problem {
-            observation_sd: model.images.iter().flat_map(|image| image.sd).collect(),
-            system: System::new(layout, options.ordering),
-            initial: [start.into_flattened(), kept].concat(),
-            prior: [own.into_flattened(), prior].concat(),
+            observation_sd: of_images.chain(of_ties).collect(),
+            system: System::new(layout(&model, places)?, options.ordering),
+            initial,
+            prior,
             sd,
             model,
         };
-        Ok(Assembled { problem, points: screened.points, dropped: screened.dropped, origin })
+        self.check_observations(&problem)?;
+        Ok(Assembled { problem, points: screened.points, dropped: screened.dropped })
     }
 
-    fn bundle(&self, screened: &Screened, images_on: Vec<usize>, origin: [f64; 3]) -> Bundle {
+    /// Refuses observations that cannot be computed from the initial values.
+    fn check_observations(&self, problem: &Problem<Bundle>) -> Result<(), NetworkError> {
+        let model = &problem.model;
+        if model.observations.is_empty() {
+            return Ok(());
+        }
+        let (stations, layout) = (model.prepare(&problem.initial), problem.layout());
+        for (i, TiedObservation { index, observation, root, .. }) in model.observations.iter().enumerate() {
+            let tie = model.tied_images() + i;
+            let mut constant = vec![0.0; root.nrows()];
+            let mut coefficients = vec![0.0; root.nrows() * layout.tie_columns(tie).count()];
+            let mut rows = TieRows { constant: &mut constant, coefficients: &mut coefficients };
+            model.observe_tie(&stations, tie, &mut rows);
+            if !constant.iter().chain(&coefficients).all(|value| value.is_finite()) {
+                let (index, kind, fault) = (*index, observation.kind(), Fault::NotFinite);
+                return Err(NetworkError::Observation { index, kind, fault });
+            }
+        }
+        Ok(())
+    }
+
+    fn bundle(
+        &self,
+        screened: &Screened,
+        images_on: Vec<usize>,
+        origin: [f64; 3],
+    ) -> Result<Bundle, NetworkError> {
         let local_point = |&point: &usize| {
             let Point { coordinates, sd } = self.points[point];
             Point { coordinates: std::array::from_fn(|k| coordinates[k] - origin[k]), sd }
         };
-        let mut first = vec![0];
+        let (shared, mut first) = (self.shared_cameras(), vec![0]);
         for photo in &self.photos {
             let camera = self.camera(photo);
-            let own = if camera.is_held() { 0 } else { camera.sd.len() };
+            let own = if camera.is_held() || shared.binary_search(&photo.camera).is_ok() {
+                0
+            } else {
+                camera.sd.len()
+            };
             first.push(first[first.len() - 1] + 6 + own);
         }
+        for &camera in &shared {
+            first.push(first[first.len() - 1] + self.cameras[camera].sd.len());
+        }
+        let block = |photo: &Photo| Some(self.photos.len() + shared.binary_search(&photo.camera).ok()?);
+        let observations = self.tied_observations(screened)?;
         // Angles alone leave position and scale open.
         let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
         let placed = screened.points.iter().any(|&point| self.points[point].held() != [false; 3])
+            || observations.iter().any(|tied| !tied.observation.is_internal())
             || self.photos.iter().any(|photo| photo.sd[..positions].iter().any(|sd| sd.is_finite()));
         let images: Vec<Image> = screened.images.order.iter().map(|&image| self.images[image]).collect();
-        Bundle {
+        Ok(Bundle {
             space: self.space,
             poses: self.poses,
             // Coordinates are counted from the origin; heights are not.
@@ -174,14 +239,40 @@ impl Network {
                 .map(|refraction| Refraction { datum: refraction.datum + origin[2], ..refraction }),
             cameras: self.photos.iter().map(|photo| self.camera(photo).camera).collect(),
             first,
+            camera_block: self.photos.iter().map(block).collect(),
+            shared,
+            origin,
+            locals: screened.locals,
             points: screened.points.iter().map(local_point).collect(),
             images,
             start: screened.images.start.clone(),
             order: screened.images.order.clone(),
             turning: vec![false; self.photos.len()],
             images_on,
+            observations,
             placed,
-        }
+        })
+    }
+
+    /// The observations that take part.
+    fn tied_observations(&self, screened: &Screened) -> Result<Vec<TiedObservation>, NetworkError> {
+        let Screened { points, locals, observations, .. } = screened;
+        let place: HashMap<usize, usize> =
+            points[*locals..].iter().enumerate().map(|(i, &point)| (point, locals + i)).collect();
+        let tied = |&index: &usize| {
+            let observation: &Observation = &self.observations[index];
+            let touches = observation.touches();
+            let root = observation.precision().root(observation.rows());
+            let kind = observation.kind();
+            Ok(TiedObservation {
+                index,
+                points: touches.points.iter().map(|point| place[point]).collect(),
+                photos: touches.photos,
+                root: root.map_err(|fault| NetworkError::Observation { index, kind, fault })?,
+                observation: observation.clone(),
+            })
+        };
+        observations.iter().map(tied).collect()
     }
 
     /// Where points start from.
@@ -208,4 +299,21 @@ impl Network {
         }
         Ok(met)
     }
+}
+
+/// The blocks of a model, at the given places, and what ties them.
+fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError> {
+    let (groups, tied) = (model.start[model.locals], model.points.len() - model.locals);
+    let widths = model.first.windows(2).map(|pair| pair[1] - pair[0]);
+    let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
+    let images = &model.images[..groups];
+    let photo_of = images.iter().map(|image| image.photo as u32).collect();
+    let layout = Layout::new(2, 3, &widths, model.start[..=model.locals].to_vec(), photo_of)?;
+    let (mut further_ptr, mut further) = (vec![0], Vec::new());
+    for image in images {
+        further.extend(model.camera_block[image.photo].map(|block| block as u32));
+        further_ptr.push(further.len());
+    }
+    let layout = layout.with_further(further_ptr, further)?;
+    Ok(layout.with_places(places)?.with_ties(model.ties())?)
 }

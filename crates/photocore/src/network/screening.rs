@@ -38,31 +38,59 @@ impl Network {
     ///
     /// A point on one photo stays when at most one of its components is not held: then there are at least four equations for
     /// three unknowns (specification, open point 21).
+    ///
+    /// Points that observations touch stand behind all others.
     pub(super) fn screen(&self, left_out: &[bool]) -> Screened {
         let all = self.point_images();
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
-        let mut images = PointImages { start: vec![0], order: Vec::with_capacity(self.images.len()) };
         for point in self.along_curve(&all).into_iter().filter(|&point| !left_out[point]) {
-            let own = all.of(point);
-            let first_photo = own.first().map(|&image| self.images[image].photo);
-            let one_photo = own.iter().all(|&image| Some(self.images[image].photo) == first_photo);
-            let held = self.points[point].held().into_iter().filter(|&held| held).count();
-            let reason = match (first_photo, held) {
-                (None, _) => Some(Reason::NotPhotographed),
-                (_, 0) if one_photo => Some(Reason::PassPointOnOnePhoto),
-                (_, 1) if one_photo => Some(Reason::ControlPointOnOnePhoto),
-                _ => None,
-            };
-            if let Some(reason) = reason {
-                dropped.push(Dropped { point, reason });
-            } else {
-                points.push(point);
-                images.order.extend(own);
-                images.start.push(images.order.len());
+            match self.reason(point, all.of(point)) {
+                Some(reason) => dropped.push(Dropped { point, reason }),
+                None => points.push(point),
             }
         }
         dropped.sort_unstable_by_key(|dropped| dropped.point);
-        Screened { points, images, dropped }
+        let observations = self.observations_of(&points);
+        let mut tied = Vec::new();
+        if !observations.is_empty() {
+            let mut touched = vec![false; self.points.len()];
+            let touches = observations.iter().flat_map(|&i| self.observations[i].touches().points);
+            touches.for_each(|point| touched[point] = true);
+            (tied, points) = points.into_iter().partition(|&point| touched[point]);
+        }
+        let locals = points.len();
+        points.extend(tied);
+        let mut images = PointImages { start: vec![0], order: Vec::with_capacity(self.images.len()) };
+        for &point in &points {
+            images.order.extend(all.of(point));
+            images.start.push(images.order.len());
+        }
+        Screened { points, locals, images, observations, dropped }
+    }
+
+    /// Why a point with the given images does not take part; None where it does.
+    fn reason(&self, point: usize, images: &[usize]) -> Option<Reason> {
+        let first_photo = images.first().map(|&image| self.images[image].photo);
+        let one_photo = images.iter().all(|&image| Some(self.images[image].photo) == first_photo);
+        let held = self.points[point].held().into_iter().filter(|&held| held).count();
+        match (first_photo, held) {
+            (None, _) => Some(Reason::NotPhotographed),
+            (_, 0) if one_photo => Some(Reason::PassPointOnOnePhoto),
+            (_, 1) if one_photo => Some(Reason::ControlPointOnOnePhoto),
+            _ => None,
+        }
+    }
+
+    /// The observations whose points are all among the given ones.
+    fn observations_of(&self, points: &[usize]) -> Vec<usize> {
+        if self.observations.is_empty() {
+            return vec![];
+        }
+        let mut takes_part = vec![false; self.points.len()];
+        points.iter().for_each(|&point| takes_part[point] = true);
+        let all_there =
+            |&index: &usize| self.observations[index].touches().points.iter().all(|&point| takes_part[point]);
+        (0..self.observations.len()).filter(all_there).collect()
     }
 
     /// The images of every point.
@@ -88,10 +116,13 @@ impl PointImages {
     }
 }
 
-/// The points that take part, neighbours together, and what was left out.
+/// What takes part, points neighbours together, and what was left out.
 pub(super) struct Screened {
     pub points: Vec<usize>,
+    /// How many of them, the first, no observation touches.
+    pub locals: usize,
     pub images: PointImages,
+    pub observations: Vec<usize>,
     pub dropped: Vec<Dropped>,
 }
 

@@ -1,9 +1,14 @@
 //! The adjusted network.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::problem::Assembled;
-use super::{Dropped, Network, NetworkError, Options, Point, UnitVariance};
+use super::{
+    AdjustedCamera, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options, Point,
+    UnitVariance,
+};
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::network::model::Bundle;
@@ -15,7 +20,7 @@ pub struct AdjustedPhoto {
     pub pose: [f64; 6],
     /// The parameters of its camera.
     pub camera: Vec<f64>,
-    /// Cofactors (a priori unit weight) of pose and, unless it is held, camera, row by row; NaN where there are none.
+    /// Cofactors (a priori unit weight) of pose and, unless it is held or shared, camera, row by row; NaN where there are none.
     pub cofactors: Vec<f64>,
     /// Redundancy numbers of these unknowns as observations of themselves; zero unless weighted, NaN where there are no cofactors.
     pub redundancy: Vec<f64>,
@@ -49,12 +54,19 @@ pub struct SumsOfSquares {
     pub ground: f64,
     /// Of the image coordinates.
     pub plates: f64,
+    /// Of the observations beside these.
+    pub observations: f64,
 }
 
 impl SumsOfSquares {
+    /// Of all but photos and cameras.
+    pub fn measured(&self) -> f64 {
+        self.ground + self.plates + self.observations
+    }
+
     /// All together.
     pub fn total(&self) -> f64 {
-        self.camera + self.ground + self.plates
+        self.camera + self.ground + self.plates + self.observations
     }
 }
 
@@ -63,12 +75,18 @@ impl SumsOfSquares {
 pub struct Solution {
     /// The photos.
     pub photos: Vec<AdjustedPhoto>,
+    /// The cameras.
+    pub cameras: Vec<AdjustedCamera>,
     /// For every iteration, the corrections of the unknowns of all photos, one photo after the other.
     pub photo_corrections: Vec<Vec<f64>>,
     /// The points; None for those that were left out.
     pub points: Vec<Option<AdjustedPoint>>,
     /// The images; None for those of points that were left out.
     pub images: Vec<Option<Observed<2>>>,
+    /// The other observations; None for those of points that were left out.
+    pub observations: Vec<Option<AdjustedObservation>>,
+    /// These by kind.
+    pub kinds: Vec<KindSums>,
     /// The images whose point stands behind the camera, ascending.
     pub behind: Vec<usize>,
     /// Why there are no cofactors although they were asked for: what the adjusted values leave undetermined.
@@ -76,6 +94,8 @@ pub struct Solution {
     /// What a combination of unknowns moves that is determined so weakly that no step could follow it to its end, photo and
     /// unknown (0 to 5: pose, then camera); none where the adjustment ended otherwise.
     pub weak: Vec<(usize, usize)>,
+    /// The same for cameras that several photos share, camera and parameter.
+    pub weak_cameras: Vec<(usize, usize)>,
     /// What was held to give a datum where nothing else does: photo and unknown. In the datum of inner constraints, what they were
     /// taken from.
     pub datum: Vec<(usize, usize)>,
@@ -102,30 +122,37 @@ impl Solution {
         mut adjustment: Adjustment,
         collapsed: Vec<usize>,
     ) -> Self {
-        let Assembled { problem, points, dropped, .. } = assembled;
+        let Assembled { problem, dropped, .. } = assembled;
         let unknowns = std::mem::take(&mut adjustment.unknowns);
-        let (sums_of_squares, degrees_of_freedom) =
-            statistics(options.unit_variance, problem, &adjustment, &unknowns);
+        let observations = observations(network, problem, &adjustment);
+        let sums_of_squares = sums_of_squares(problem, &adjustment, &unknowns, &observations);
+        let degrees_of_freedom = degrees_of_freedom(options.unit_variance, problem, &adjustment);
         let over_freedom = |sum: f64| (degrees_of_freedom > 0).then(|| sum / degrees_of_freedom as f64);
         let variance_of_unit_weight = match options.unit_variance {
             UnitVariance::Unity => Some(1.0),
-            UnitVariance::Free => over_freedom(sums_of_squares.ground + sums_of_squares.plates),
+            UnitVariance::Free => over_freedom(sums_of_squares.measured()),
             UnitVariance::Constrained => over_freedom(sums_of_squares.total()),
         };
         let mut images = vec![None; network.images.len()];
         for (group, &image) in problem.model.order.iter().enumerate() {
             images[image] = Some(adjustment.observed(group, network.images[image].sd));
         }
+        let photos_end = problem.model.first[network.photos.len()];
         let of_photo = |&unknown: &usize| of_photo(problem, unknown);
+        let photos = photos(network, assembled, &adjustment, &unknowns);
         let mut solution = Self {
-            photos: photos(network, assembled, &adjustment, &unknowns),
-            photo_corrections: adjustment.corrections().collect(),
+            cameras: network.adjusted_cameras(assembled, &adjustment, &unknowns, &photos),
+            photos,
+            photo_corrections: adjustment.corrections().map(|all| all[..photos_end].to_vec()).collect(),
             points: adjusted_points(network, assembled, &adjustment, &unknowns),
             images,
+            kinds: KindSums::all(&network.observations, &observations),
+            observations,
             behind: vec![],
-            undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, points)),
-            weak: adjustment.weak.iter().map(of_photo).collect(),
-            datum: adjustment.datum.iter().map(of_photo).collect(),
+            undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, assembled)),
+            weak: adjustment.weak.iter().filter_map(of_photo).collect(),
+            weak_cameras: adjustment.weak.iter().filter_map(|&unknown| of_camera(problem, unknown)).collect(),
+            datum: adjustment.datum.iter().filter_map(of_photo).collect(),
             dropped: dropped.clone(),
             collapsed,
             sums_of_squares,
@@ -141,15 +168,16 @@ impl Solution {
 
     /// Finds the images whose point stands behind the camera.
     fn find_behind(&mut self, Assembled { problem, points, .. }: &Assembled, unknowns: &[f64]) {
-        let (model, layout) = (&problem.model, problem.layout());
-        let (coordinates, photos) = unknowns.split_at(layout.all_locals().end);
-        let photos = model.photos(photos);
-        for (local, (&point, &at)) in points.iter().zip(coordinates.as_chunks().0).enumerate() {
+        let model = &problem.model;
+        let photos = model.photos(&unknowns[model.of_stations()]);
+        for ((&point, &at), images) in
+            points.iter().zip(model.coordinates(unknowns)).zip(model.start.windows(2))
+        {
             let position = model.space.cartesian(at);
             let hidden =
-                |&group: &usize| photos[model.images[group].photo].orientation.pose().depth(&position) < 0.0;
+                |&image: &usize| photos[model.images[image].photo].orientation.pose().depth(&position) < 0.0;
             let found: Vec<usize> =
-                layout.groups_of(local).filter(hidden).map(|group| model.order[group]).collect();
+                (images[0]..images[1]).filter(hidden).map(|image| model.order[image]).collect();
             if let Some(point) = &mut self.points[point] {
                 point.behind = found.len();
             }
@@ -159,21 +187,55 @@ impl Solution {
     }
 }
 
-/// The photo and the number of one of its unknowns.
-fn of_photo(problem: &Problem<Bundle>, unknown: usize) -> (usize, usize) {
-    let (first, kept) = (&problem.model.first, unknown - problem.layout().all_kept().start);
-    let photo = first.partition_point(|&start| start <= kept) - 1;
-    (photo, kept - first[photo])
+/// The photo and the number of one of its unknowns; None for unknowns of anything else.
+fn of_photo(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
+    let (block, number) = of_block(problem, unknown)?;
+    (block < problem.model.cameras.len()).then_some((block, number))
+}
+
+/// The shared camera and the number of one of its parameters; None for unknowns of anything else.
+fn of_camera(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
+    let (block, parameter) = of_block(problem, unknown)?;
+    let shared = block.checked_sub(problem.model.cameras.len())?;
+    Some((problem.model.shared[shared], parameter))
+}
+
+/// The photo or shared camera, and the number of one of its unknowns; None for unknowns of points.
+fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
+    let all = model.of_stations();
+    let kept = all.contains(&unknown).then(|| unknown - all.start)?;
+    let block = model.first.partition_point(|&start| start <= kept) - 1;
+    Some((block, kept - model.first[block]))
+}
+
+/// The observations beside images.
+fn observations(
+    network: &Network,
+    problem: &Problem<Bundle>,
+    adjustment: &Adjustment,
+) -> Vec<Option<AdjustedObservation>> {
+    let (model, layout) = (&problem.model, problem.layout());
+    let first = layout.groups() * layout.rows();
+    let mut all = vec![None; network.observations.len()];
+    for (i, tied) in model.observations.iter().enumerate() {
+        let tie = model.tied_images() + i;
+        let rows = layout.tie_rows(tie);
+        let shares = adjustment.cofactors.as_ref().map(|found| &found.ties[layout.tie_block(tie)]);
+        let weight = adjustment.weights.as_ref().map_or(1.0, |all| all[layout.groups() + tie]);
+        let whitened = &adjustment.residuals[first + rows.start..first + rows.end];
+        all[tied.index] = Some(AdjustedObservation::new(tied, whitened, shares, weight));
+    }
+    all
 }
 
 fn photos(
     network: &Network,
-    Assembled { problem, origin, .. }: &Assembled,
+    Assembled { problem, .. }: &Assembled,
     adjustment: &Adjustment,
     unknowns: &[f64],
 ) -> Vec<AdjustedPhoto> {
     let model = &problem.model;
-    let locals = problem.layout().all_kept().start;
+    let (locals, origin) = (model.of_stations().start, model.origin);
     let positions = if let PoseNumbers::Angles(_) = network.poses { 3 } else { 0 };
     let mut start = 0;
     let photo = |(index, photo): (usize, &super::Photo)| {
@@ -194,7 +256,11 @@ fn photos(
         let redundancy = adjustment.prior_redundancy.as_ref();
         AdjustedPhoto {
             pose: std::array::from_fn(absolute),
-            camera: if values.len() > 6 { values[6..].to_vec() } else { model.cameras[index].parameters() },
+            camera: match model.camera_block[index] {
+                Some(block) => unknowns[model.of_block(block)].to_vec(),
+                None if values.len() > 6 => values[6..].to_vec(),
+                None => model.cameras[index].parameters(),
+            },
             cofactors: cofactors.map_or_else(
                 || vec![f64::NAN; count],
                 |all| in_angles(model, index, values, &all.kept[given..given + count]),
@@ -232,47 +298,77 @@ fn in_angles(model: &Bundle, photo: usize, values: &[f64], cofactors: &[f64]) ->
 
 fn adjusted_points(
     network: &Network,
-    Assembled { problem, points, origin, .. }: &Assembled,
+    Assembled { problem, points, .. }: &Assembled,
     adjustment: &Adjustment,
     unknowns: &[f64],
 ) -> Vec<Option<AdjustedPoint>> {
     let mut adjusted = vec![None; network.points.len()];
+    let (model, origin) = (&problem.model, problem.model.origin);
     let cofactors = adjustment.cofactors.as_ref();
-    for (local, (&point, values)) in points.iter().zip(unknowns.as_chunks::<3>().0).enumerate() {
+    let corrections = last_corrections(adjustment);
+    for (i, (&point, values)) in points.iter().zip(model.coordinates(unknowns)).enumerate() {
         let Point { coordinates, sd } = network.points[point];
         let absolute = |k: usize| if sd[k] == 0.0 { coordinates[k] } else { values[k] + origin[k] };
+        let first = model.of_point(i).start;
+        let own = cofactors.map(|all| match i.checked_sub(model.locals) {
+            None => &all.local[9 * i..],
+            // The last kept blocks.
+            Some(tied) => &all.kept[all.kept.len() - 9 * (points.len() - model.locals - tied)..],
+        });
         adjusted[point] = Some(AdjustedPoint {
             coordinates: std::array::from_fn(absolute),
-            cofactors: leading_matrix(cofactors.map(|all| &all.local[9 * local..])),
-            redundancy: adjustment.prior_redundancy(3 * local),
-            last_correction: std::array::from_fn(|k| adjustment.last_local_corrections[3 * local + k]),
-            rays: problem.layout().groups_of(local).len(),
+            cofactors: leading_matrix(own),
+            redundancy: adjustment.prior_redundancy(first),
+            last_correction: std::array::from_fn(|k| corrections(first + k)),
+            rays: model.images_of(i).len(),
             behind: 0,
         });
     }
     adjusted
 }
 
-/// Sums of squares by group, and degrees of freedom (GIANT guide, Appendix E): observations are the image coordinates, the
-/// held components of control and, with constrained photos, the weighted unknowns of these.
-fn statistics(
-    unit_variance: UnitVariance,
+/// The correction of each unknown in the last iteration; zero where there was none.
+fn last_corrections(adjustment: &Adjustment) -> impl Fn(usize) -> f64 {
+    let local = &adjustment.last_local_corrections;
+    let kept = adjustment.history.last_chunk::<2>();
+    move |unknown| match unknown.checked_sub(local.len()) {
+        None => local[unknown],
+        Some(kept_unknown) => kept.map_or(0.0, |[before, after]| after[kept_unknown] - before[kept_unknown]),
+    }
+}
+
+/// Sums of squares by group (GIANT guide, Appendix E).
+fn sums_of_squares(
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
     unknowns: &[f64],
-) -> (SumsOfSquares, i64) {
-    let layout = problem.layout();
-    let squares = |range: std::ops::Range<usize>| range.map(|i| problem.prior_square(i, unknowns[i])).sum();
-    let sums = SumsOfSquares {
-        camera: squares(layout.all_kept()),
-        ground: squares(layout.all_locals()),
-        plates: adjustment.reweighted_sum_of_squares(&problem.observation_sd),
-    };
+    observations: &[Option<AdjustedObservation>],
+) -> SumsOfSquares {
+    let stations = problem.model.of_stations();
+    let squares = |range: Range<usize>| range.map(|i| problem.prior_square(i, unknowns[i])).sum::<f64>();
+    let rows = problem.layout().rows();
+    let of_images = &problem.observation_sd[..rows * problem.model.images.len()];
+    SumsOfSquares {
+        camera: squares(stations.clone()),
+        ground: squares(0..stations.start) + squares(stations.end..unknowns.len()),
+        plates: adjustment.reweighted_sum_of_squares(of_images, rows),
+        observations: observations.iter().flatten().fold(0.0, |sum, own| sum + own.square),
+    }
+}
+
+/// Degrees of freedom (GIANT guide, Appendix E): observations are the image coordinates and what was observed beside them, the
+/// held components of control and, with constrained photos, the weighted unknowns of these.
+fn degrees_of_freedom(
+    unit_variance: UnitVariance,
+    problem: &Problem<Bundle>,
+    adjustment: &Adjustment,
+) -> i64 {
     let counts = adjustment.counts;
-    let weighted_cameras = layout.all_kept().filter(|&unknown| problem.is_weighted(unknown)).count();
+    let stations = problem.model.of_stations();
+    let weighted_cameras = stations.filter(|&unknown| problem.is_weighted(unknown)).count();
     let weighted = match unit_variance {
         UnitVariance::Constrained => counts.weighted,
         UnitVariance::Free | UnitVariance::Unity => counts.weighted - weighted_cameras,
     };
-    (sums, (counts.observations + weighted) as i64 - counts.unknowns as i64)
+    (counts.observations + weighted) as i64 - counts.unknowns as i64
 }

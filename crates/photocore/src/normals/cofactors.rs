@@ -30,6 +30,8 @@ pub struct Cofactors {
     /// a Q a^T of each equation a x = l, in the order of groups and rows, then of ties and rows: the share of the equation that its own
     /// unknowns take up. One minus it is the redundancy number of an observation.
     pub equations: Vec<f64>,
+    /// a Q a^T of the equations a of each tie, a square block row by row, one after the other.
+    pub ties: Vec<f64>,
 }
 
 impl Cofactors {
@@ -45,6 +47,7 @@ impl Cofactors {
         let mut local = control.allocated(zeros(layout.locals() * l * l))?;
         let mut equations = control.allocated(zeros(layout.equations()))?;
         let (of_groups, of_ties) = equations.split_at_mut(layout.groups() * rows);
+        let mut ties = control.allocated(zeros(layout.tie_blocks().end))?;
         for (index, at_home) in found.iter().enumerate() {
             let mut values = at_home.equations.chunks_exact(rows.max(1));
             let blocks = at_home.local.chunks_exact(l * l);
@@ -58,8 +61,11 @@ impl Cofactors {
             }
             let mut values = &at_home.ties[..];
             for &tie in system.ties.at(index) {
-                let (own, rest) = values.split_at(layout.ties()[tie as usize].rows);
-                of_ties[layout.tie_rows(tie as usize)].copy_from_slice(own);
+                let (tie, rows) = (tie as usize, layout.ties()[tie as usize].rows);
+                let (own, rest) = values.split_at(rows * rows);
+                ties[layout.tie_block(tie)].copy_from_slice(own);
+                let diagonal = own.iter().step_by(rows + 1);
+                of_ties[layout.tie_rows(tie)].iter_mut().zip(diagonal).for_each(|(to, &share)| *to = share);
                 values = rest;
             }
         }
@@ -70,7 +76,7 @@ impl Cofactors {
             border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
             kept_border = blocks.filter_map(|block| inverse.block(block, layout.kept())).flatten().collect();
         }
-        Some(Self { local, kept, border, kept_border, equations })
+        Some(Self { local, kept, border, kept_border, equations, ties })
     }
 }
 
@@ -79,7 +85,7 @@ impl Cofactors {
 pub(super) struct AtHome {
     local: Vec<f64>,
     equations: Vec<f64>,
-    /// Of the equations of the ties at home there, in their order.
+    /// Of the equations of the ties at home there, in their order: a square block for each.
     ties: Vec<f64>,
     /// Time that it took.
     pub seconds: f64,
@@ -130,7 +136,7 @@ impl AtHome {
     }
 }
 
-/// a Q a^T of the equations of the ties at home in a supernode.
+/// a Q a^T of the equations of the ties at home in a supernode, a square block for each.
 fn ties_at_home<E: Equations>(
     system: &System,
     index: usize,
@@ -141,12 +147,15 @@ fn ties_at_home<E: Equations>(
     let (mut tie, mut found) = (TieEquations::default(), Vec::new());
     for &each in system.ties.at(index) {
         tie.gather(system, equations, index, each as usize);
-        found.extend(tie.rows().map(|(coefficients, _)| {
-            let at = || tie.columns().iter().zip(coefficients);
-            let by_column =
-                |&column: &usize| at().map(|(&row, value)| front[column * height + row] * value).sum::<f64>();
-            at().map(|(column, value)| value * by_column(column)).sum::<f64>()
-        }));
+        let columns = tie.columns();
+        for (own, _) in tie.rows() {
+            // a Q, the columns of the tie.
+            let by_column = |&column: &usize| {
+                columns.iter().zip(own).map(|(&row, value)| front[column * height + row] * value).sum::<f64>()
+            };
+            let product: Vec<f64> = columns.iter().map(by_column).collect();
+            found.extend(tie.rows().map(|(other, _)| dot(&product, other)));
+        }
     }
     found
 }
@@ -279,9 +288,10 @@ impl Others {
         rows: usize,
         part: &Part,
     ) -> (usize, &'s [f64]) {
-        let Rows { values, stride, width, .. } = stack.part_rows(t, p, part, rows).rows;
+        let equation = t * rows + row;
+        let Rows { values, width, .. } = stack.part_rows(p, part, equation..equation + 1).rows;
         let start = self.strips[stack.slots.len() + part.segment].1 + part.shift;
-        (start, &values[row * stride..][..width])
+        (start, &values[..width])
     }
 
     /// Computes H = L^-T V and its product with the inverse, for local block `t` of the stack.

@@ -30,6 +30,8 @@ pub struct Layout {
     ties: Vec<Tie>,
     /// Where the equations of each tie start among those of all ties; one more at the end.
     tie_ptr: Vec<usize>,
+    /// Where the square block of the equations of each tie starts; one more at the end.
+    block_ptr: Vec<usize>,
     places: Option<Vec<[f64; 3]>>,
 }
 
@@ -153,6 +155,7 @@ impl Layout {
             group_border,
             ties: Vec::new(),
             tie_ptr: vec![0],
+            block_ptr: vec![0],
             places: None,
         })
     }
@@ -218,8 +221,10 @@ impl Layout {
             return Err(LayoutError::Tie { tie });
         }
         self.tie_ptr.truncate(1);
+        self.block_ptr.truncate(1);
         for tie in &ties {
             self.tie_ptr.push(self.tie_ptr[self.tie_ptr.len() - 1] + tie.rows);
+            self.block_ptr.push(self.block_ptr[self.block_ptr.len() - 1] + tie.rows.pow(2));
         }
         self.ties = ties;
         Ok(self)
@@ -273,6 +278,16 @@ impl Layout {
     /// The equations of a tie, counted from the first of all ties.
     pub fn tie_rows(&self, tie: usize) -> Range<usize> {
         self.tie_ptr[tie]..self.tie_ptr[tie + 1]
+    }
+
+    /// Where the square block of the equations of a tie stands among the blocks of all ties.
+    pub fn tie_block(&self, tie: usize) -> Range<usize> {
+        self.block_ptr[tie]..self.block_ptr[tie + 1]
+    }
+
+    /// Where the square blocks of all ties stand.
+    pub fn tie_blocks(&self) -> Range<usize> {
+        0..self.block_ptr[self.ties.len()]
     }
 
     /// Number of equations: those of all groups, then those of all ties.

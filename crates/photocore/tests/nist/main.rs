@@ -153,7 +153,7 @@ fn any_control_of_steps_goes_with_any_rule_that_stops_it() {
     let rules = [Stop::Fraction(1e-9), Stop::Decrease(1e-14)];
     for certified in PROBLEMS.iter().filter(|certified| certified.name != PLATEAU.0) {
         for method in rules.into_iter().flat_map(|rule| [Method::Damped(rule), Method::TrustRegion(rule)]) {
-            let adjusted = run(certified, &certified.starts[1], method).unwrap();
+            let adjusted = run(certified, certified.starts[1], method).unwrap();
             assert_eq!(adjusted.status, Status::Converged, "{} {method:?}", certified.name);
             let found = agreement(certified, &adjusted);
             assert!(found.iter().all(|&digits| digits > WANTED), "{} {method:?} {found:?}", certified.name);

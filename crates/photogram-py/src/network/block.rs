@@ -92,6 +92,7 @@ fn adjust_block(
         photos,
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
+        observations: vec![],
     };
     let method = match criterion {
         "fraction" => Method::Damped(Stop::Fraction(limit)),

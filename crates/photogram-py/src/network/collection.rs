@@ -112,6 +112,7 @@ fn adjust_collection(
         photos: given.iter().zip(&sd).enumerate().map(photo).collect(),
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
+        observations: vec![],
     };
     let options = Options {
         adjustment: AdjustmentOptions {

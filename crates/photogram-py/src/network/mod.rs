@@ -81,7 +81,10 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
     let (kind, photos, points) = match error {
         Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
-        Failure::UndeterminedPhotos(combinations) => ("undetermined photos", combinations.clone(), vec![]),
+        Failure::Undetermined(combinations) => {
+            let photos = combinations.iter().map(|combination| combination.photos.clone()).collect();
+            ("undetermined photos", photos, vec![])
+        }
         Failure::Coarse(Coarse { photos, points }) => ("coarse", vec![photos.clone()], points.clone()),
         Failure::Empty => ("empty", vec![], vec![]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
@@ -89,7 +92,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
-        | Failure::SharedCamera(_)
+        | Failure::Observation { .. }
         | Failure::Vectors
         | Failure::Datum(_)
         | Failure::Layout(_)

@@ -39,26 +39,31 @@ impl Stack {
             }
         }
         if !self.segments.is_empty() {
-            self.add_parts(simd, columns, rows);
+            self.add_parts::<S, D>(simd, columns, rows);
             self.add_segments::<S, L, D>(simd, columns);
         }
     }
 
     /// Adds the products of what groups have in common with others: with itself and with their main blocks.
     #[inline(always)]
-    fn add_parts<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize) {
+    fn add_parts<S: Simd, const D: usize>(&self, simd: S, columns: &mut Columns<'_>, rows: usize) {
         for slot in &self.slots {
+            let width = size::<D>(slot.dim);
+            // Where each local block has one group on the main block, the equations of all of them stand one after the other.
+            let together = if slot.groups.len() == 1 { self.locals.len() } else { 1 };
+            let count = together * rows;
             for (k, p) in slot.groups.clone().enumerate() {
-                for t in 0..self.locals.len() {
+                for t in (0..self.locals.len()).step_by(together) {
                     let at = (t * slot.groups.len() + k) * rows;
-                    let values = &self.kept_rows[slot.kept + at * slot.dim..];
-                    let kept = Rows { values, width: slot.dim, stride: slot.dim, count: rows };
-                    let constants = &self.constants[slot.constants + at..][..rows];
+                    let values = &self.kept_rows[slot.kept + at * width..];
+                    let kept = Strip { at: slot.row, rows: Rows { values, width, stride: width, count } };
+                    let constants = &self.constants[slot.constants + at..][..count];
                     for (index, part) in self.parts(p).iter().enumerate() {
-                        let own = self.part_rows(t, p, part, rows);
-                        add_below(simd, columns, own, Strip { at: slot.row, rows: kept });
+                        let equations = t * rows..t * rows + count;
+                        let own = self.part_rows(p, part, equations.clone());
+                        add_below(simd, columns, own, kept);
                         for other in &self.parts(p)[..index] {
-                            add_below(simd, columns, own, self.part_rows(t, p, other, rows));
+                            add_below(simd, columns, own, self.part_rows(p, other, equations.clone()));
                         }
                         if columns.contain(own.at) {
                             columns.add_product(simd, 1.0, own, own);

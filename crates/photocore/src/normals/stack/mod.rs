@@ -147,13 +147,13 @@ impl Stack {
         &self.parts[self.places[p].parts.clone()]
     }
 
-    /// The coefficients of a part of group `p` of the pattern, for local block `t` of the stack.
+    /// The coefficients of a part of group `p` of the pattern in some of its equations, which are counted local block by local block.
     #[inline(always)]
-    pub fn part_rows(&self, t: usize, p: usize, part: &Part, rows: usize) -> Strip<'_> {
+    pub fn part_rows(&self, p: usize, part: &Part, equations: Range<usize>) -> Strip<'_> {
         let Place { width: stride, rows: start, .. } = self.places[p];
-        let values = &self.common_rows[start + t * rows * stride + part.column..];
+        let values = &self.common_rows[start + equations.start * stride + part.column..];
         let at = self.segments[part.segment].row + part.shift;
-        Strip { at, rows: Rows { values, width: part.width(), stride, count: rows } }
+        Strip { at, rows: Rows { values, width: part.width(), stride, count: equations.len() } }
     }
 }
 

@@ -6,7 +6,7 @@ use super::{Segment, Slot, Stack, dot};
 use crate::normals::equations::Prior;
 use crate::normals::system::System;
 use crate::normals::triangle::Triangle;
-use crate::normals::vectorised::{Kernel, Rows, run, size};
+use crate::normals::vectorised::{Kernel, run, size};
 
 impl Stack {
     /// Solves for the local blocks with the others in place: N x = A^T (l - A_other x_other). `others` are the unknowns that are
@@ -36,8 +36,8 @@ impl Stack {
                         - dot(&self.kept_rows[slot.kept + at * dim..][..dim], other);
                     for part in self.parts(p) {
                         let x = &common(&self.segments[part.segment])[part.shift..][..part.width()];
-                        let Rows { values, stride, .. } = self.part_rows(t, p, part, rows).rows;
-                        left -= dot(&values[row * stride..], x);
+                        let equation = t * rows + row;
+                        left -= dot(self.part_rows(p, part, equation..equation + 1).rows.values, x);
                     }
                     for a in 0..L {
                         right[a] += own[row][a] * left;

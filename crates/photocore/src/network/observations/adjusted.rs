@@ -1,0 +1,91 @@
+//! Observations after the adjustment.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Observation, TiedObservation};
+
+/// An observation after the adjustment, component by component.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdjustedObservation {
+    /// Observed minus computed, in the units of the components.
+    pub residual: Vec<f64>,
+    /// Redundancy numbers `(Qvv S^-1)_ii`, S being the covariance matrix a priori; single ones may leave 0 to 1 where the components are
+    /// correlated. NaN when not asked for.
+    pub redundancy: Vec<f64>,
+    /// Standardized residuals `(S^-1 v)_i / sqrt((S^-1 Qvv S^-1)_ii)`, a priori unit weight; NaN when not asked for, and without redundancy.
+    pub standardized: Vec<f64>,
+    /// v^T S^-1 v, the weight as the loss has changed it.
+    pub square: f64,
+    /// The factor by which a loss has changed its weight; 1 without a loss.
+    pub weight: f64,
+}
+
+/// All observations of one kind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KindSums {
+    /// The name of the kind.
+    pub kind: &'static str,
+    /// How many took part.
+    pub observations: usize,
+    /// How many components these have.
+    pub components: usize,
+    /// Sum of v^T S^-1 v, weights as the loss has changed them.
+    pub sum_of_squares: f64,
+    /// Sum of the redundancy numbers; NaN when not asked for.
+    pub redundancy: f64,
+}
+
+/// What rounding leaves of a redundancy of zero would make a test value of noise.
+const LEAST_REDUNDANCY: f64 = 1e-10;
+
+impl AdjustedObservation {
+    /// From z = L^-1 v and a Q a^T of the equations of unit weight, row by row, the latter where there are cofactors.
+    ///
+    /// With B = a Q a^T, a being whitened: Qvv = L (I - B) L^T, Qvv S^-1 = L (I - B) L^-1, S^-1 Qvv S^-1 = L^-T (I - B) L^-1.
+    pub(in super::super) fn new(
+        tied: &TiedObservation,
+        whitened: &[f64],
+        shares: Option<&[f64]>,
+        weight: f64,
+    ) -> Self {
+        let (n, root) = (whitened.len(), &tied.root);
+        let z = DVector::from_column_slice(whitened);
+        let residual = root * &z;
+        let inverse =
+            root.solve_lower_triangular(&DMatrix::identity(n, n)).unwrap_or_else(|| root * f64::NAN);
+        let (mut redundancy, mut standardized) = (vec![f64::NAN; n], vec![f64::NAN; n]);
+        if let Some(shares) = shares {
+            let left = DMatrix::identity(n, n) - DMatrix::from_row_slice(n, n, shares);
+            redundancy = (root * &left * &inverse).diagonal().as_slice().to_vec();
+            let variances = (inverse.transpose() * left * &inverse).diagonal();
+            let weights = inverse.tr_mul(&inverse).diagonal();
+            let weighted = inverse.tr_mul(&z);
+            for k in (0..n).filter(|&k| variances[k] > LEAST_REDUNDANCY * weights[k]) {
+                standardized[k] = weighted[k] / variances[k].sqrt();
+            }
+        }
+        let residual = residual.as_slice().to_vec();
+        Self { residual, redundancy, standardized, square: weight * z.norm_squared(), weight }
+    }
+}
+
+impl KindSums {
+    /// Of those kinds of which there are observations.
+    pub(in super::super) fn all(
+        observations: &[Observation],
+        adjusted: &[Option<AdjustedObservation>],
+    ) -> Vec<Self> {
+        let of_kind = |&kind: &&'static str| {
+            let own = observations.iter().zip(adjusted).filter(|(own, _)| own.kind() == kind);
+            let taking_part: Vec<_> = own.filter_map(|(_, adjusted)| adjusted.as_ref()).collect();
+            Self {
+                kind,
+                observations: taking_part.len(),
+                components: taking_part.iter().map(|own| own.residual.len()).sum(),
+                sum_of_squares: taking_part.iter().map(|own| own.square).sum(),
+                redundancy: taking_part.iter().flat_map(|own| &own.redundancy).sum(),
+            }
+        };
+        super::KINDS.iter().map(of_kind).filter(|sums| sums.observations > 0).collect()
+    }
+}

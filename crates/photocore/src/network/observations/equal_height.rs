@@ -1,0 +1,49 @@
+//! Points at one height.
+
+use super::{ObservationModel, Precision, Rows, Sites, Touches};
+
+/// Two points at one height, or with the difference of heights that was levelled.
+///
+/// h = Z_Q - Z_P, with the partials 1 by Z_Q and -1 by Z_P; heights above the ellipsoid in geographic space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EqualHeight {
+    /// P and Q.
+    pub points: [usize; 2],
+    /// The observed height of Q above P: zero, or what was levelled.
+    pub difference: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+}
+
+impl ObservationModel for EqualHeight {
+    const NAME: &'static str = "equal height";
+
+    fn touches(&self) -> Touches {
+        Touches::points(&self.points)
+    }
+
+    fn rows(&self) -> usize {
+        1
+    }
+
+    fn precision(&self) -> Precision {
+        Precision::Deviations(vec![self.sd])
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        rows.residual(0, &[self.difference - (sites.height(1) - sites.height(0))]);
+        rows.by_height(0, 0, -1.0);
+        rows.by_height(0, 1, 1.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::agrees;
+    use super::EqualHeight;
+
+    #[test]
+    fn partials_agree_with_differences() {
+        agrees(&EqualHeight { points: [0, 1], difference: 0.2, sd: 0.01 }.into());
+    }
+}

@@ -1,0 +1,48 @@
+//! How well an observation is known.
+
+use nalgebra::DMatrix;
+
+use super::Fault;
+
+/// The weight that belongs to a smaller standard deviation is not a number, nor is that of one as large as its reciprocal.
+const SMALLEST: f64 = 1e-100;
+/// What a covariance matrix may be unsymmetric by, relative to its diagonal.
+const SYMMETRIC: f64 = 1e-9;
+
+/// How well the components of an observation are known, in their units.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Precision {
+    /// Their standard deviations.
+    Deviations(Vec<f64>),
+    /// Their covariance matrix.
+    Covariance(DMatrix<f64>),
+}
+
+impl Precision {
+    /// L of the covariance matrix S = L L^T of so many components: L^-1 gives them unit weight.
+    pub(in super::super) fn root(&self, components: usize) -> Result<DMatrix<f64>, Fault> {
+        let deviates = |sd: f64| sd > SMALLEST && sd < SMALLEST.recip();
+        let given = match self {
+            Self::Deviations(sd) => sd.len(),
+            Self::Covariance(matrix) if matrix.ncols() == components => matrix.nrows(),
+            Self::Covariance(matrix) => matrix.ncols(),
+        };
+        if given != components {
+            return Err(Fault::Deviations { components, given });
+        }
+        match self {
+            Self::Deviations(sd) if sd.iter().all(|&sd| deviates(sd)) => {
+                Ok(DMatrix::from_fn(components, components, |i, j| if i == j { sd[i] } else { 0.0 }))
+            }
+            Self::Deviations(_) => Err(Fault::Deviation),
+            Self::Covariance(s) => {
+                let scale = |i: usize, j: usize| (s[(i, i)] * s[(j, j)]).sqrt();
+                let symmetric = |i: usize, j: usize| (s[(i, j)] - s[(j, i)]).abs() <= SYMMETRIC * scale(i, j);
+                let sound = (0..components)
+                    .all(|i| deviates(s[(i, i)].sqrt()) && (0..components).all(|j| symmetric(i, j)));
+                let root = sound.then(|| s.clone().cholesky()).flatten();
+                root.map(|root| root.l()).ok_or(Fault::Covariance)
+            }
+        }
+    }
+}

@@ -1,0 +1,595 @@
+//! Observations beside images: every kind in one close-range network against dense algebra, scale from one distance, refusals.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use faer::linalg::solvers::DenseSolveCore;
+use faer::prelude::Solve;
+use faer::{Mat, Side};
+use num_complex::Complex64 as C;
+use photocore::adjustment::{self, Loss, Method, Status, Stop};
+use photocore::geometry::{
+    self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3,
+    rotation,
+};
+use photocore::network::observations::{
+    Attitude, Control, Difference, Distance, EqualHeight, Fault, Position, Relative,
+};
+use photocore::network::{
+    Camera, Image, Network, NetworkError, Observation, Options, Photo, Point, Precision, Solution,
+};
+use rayon::ThreadPoolBuilder;
+
+const SENSE: RotationSense = RotationSense::GroundToPhoto;
+const PRINCIPAL_DISTANCE: f64 = -50.0;
+const IMAGE_SD: f64 = 0.002;
+const PHOTOS: usize = 5;
+const POINTS: usize = 14;
+const FREE: [f64; 3] = [f64::INFINITY; 3];
+
+/// A number between -1 and 1 for each index, the same on every machine.
+fn noise(index: usize) -> f64 {
+    ((index as f64 * 12.9898).sin() * 43758.5453).fract()
+}
+
+fn place(k: usize) -> [f64; 3] {
+    [0, 1, 2].map(|i| [500.0, 800.0, 20.0][i] + 1.2 * noise(7 * k + i))
+}
+
+/// Photos in an arc of 5 m about the object, looking at its middle.
+fn pose(k: usize) -> [f64; 6] {
+    let turn = 0.5 * (k as f64 - 2.0);
+    let back = Vector3::new(turn.sin(), -turn.cos(), 0.3 + 0.1 * noise(k)).normalize();
+    let right = Vector3::new(-back.y, back.x, 0.0).normalize();
+    let up = back.cross(&right);
+    let roll = rotation([0.0, 0.0, 1.2 * noise(30 + k)]);
+    let attitude = Matrix3::from_columns(&[right, up, back]) * roll;
+    let [x, y, z]: [f64; 3] = (Vector3::new(500.0, 800.0, 20.0) + 5.0 * back).into();
+    let [omega, phi, kappa] = AttitudeNumbers::OmegaPhiKappa(SENSE).numbers(&attitude);
+    [x, y, z, omega, phi, kappa]
+}
+
+fn attitude(pose: &[f64; 6]) -> Matrix3 {
+    AttitudeNumbers::OmegaPhiKappa(SENSE).attitude([pose[3], pose[4], pose[5]])
+}
+
+fn position(pose: &[f64; 6]) -> Vector3 {
+    Vector3::new(pose[0], pose[1], pose[2])
+}
+
+/// A full covariance matrix of components with the given standard deviations.
+fn covariance(sd: &[f64]) -> Precision {
+    let n = sd.len();
+    let entry = |i: usize, j: usize| sd[i] * sd[j] * if i == j { 1.0 } else { 0.3 * noise(11 * (i + j)) };
+    Precision::Covariance(nalgebra::DMatrix::from_fn(n, n, entry))
+}
+
+fn sd(values: &[f64]) -> Precision {
+    Precision::Deviations(values.to_vec())
+}
+
+/// Points on all photos, nothing else observed, all points and photos free.
+fn images_alone() -> Network {
+    let mut images = vec![];
+    for point in 0..POINTS {
+        for photo in 0..PHOTOS {
+            let [x, y, z, omega, phi, kappa] = pose(photo);
+            let (space, attitude) = (ObjectSpace::Rectangular, [omega, phi, kappa]);
+            let seen = geometry::Photo::new(space, SENSE, [x, y, z], attitude, PRINCIPAL_DISTANCE);
+            let exact = seen.project(&geometry::Point::new(space, place(point)));
+            let at = 500 + 2 * images.len();
+            let xy = [0, 1].map(|k| exact[k] + IMAGE_SD * noise(at + k));
+            images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
+        }
+    }
+    let photo = |k: usize| {
+        let start = std::array::from_fn(|i| pose(k)[i] + 0.01 * noise(900 + 6 * k + i));
+        Photo { pose: start, observed: start, sd: [f64::INFINITY; 6], camera: 0 }
+    };
+    Network {
+        space: ObjectSpace::Rectangular,
+        poses: PoseNumbers::Angles(SENSE),
+        refraction: None,
+        cameras: vec![Camera::held(Perspective { principal_distance: PRINCIPAL_DISTANCE }.into())],
+        photos: (0..PHOTOS).map(photo).collect(),
+        points: (0..POINTS).map(|_| Point { coordinates: [f64::NAN; 3], sd: FREE }).collect(),
+        images,
+        observations: vec![],
+    }
+}
+
+fn difference(a: usize, b: usize) -> Vector3 {
+    Vector3::from(place(b)) - Vector3::from(place(a))
+}
+
+fn distance(a: usize, b: usize) -> Observation {
+    let length = difference(a, b).norm() + 1e-3 * noise(a);
+    Distance { points: [a, b], length, sd: 1e-3 }.into()
+}
+
+/// Every kind at once.
+fn network() -> Network {
+    let mut network = images_alone();
+    network.points[2] = Point { coordinates: place(2), sd: [0.002, 0.0, 0.003] };
+    network.points[11] = Point { coordinates: place(11), sd: [f64::INFINITY, 0.004, f64::INFINITY] };
+    let control = |point: usize| {
+        let coordinates = std::array::from_fn(|k| place(point)[k] + 0.002 * noise(70 + point + k));
+        Control { point, coordinates, precision: covariance(&[0.002, 0.003, 0.002]) }.into()
+    };
+    let lever_arm = Vector3::new(0.1, -0.3, 0.2);
+    let gnss = |photo: usize, precision: Precision| {
+        let antenna = position(&pose(photo)) + attitude(&pose(photo)) * lever_arm;
+        let coordinates = std::array::from_fn(|k| antenna[k] + 0.01 * noise(80 + photo + k));
+        Position { photo, coordinates, lever_arm, precision }.into()
+    };
+    let imu = |photo: usize, precision: Precision| {
+        let boresight = rotation([1.5, 0.1, -0.4]);
+        let error = rotation([0, 1, 2].map(|k| 1e-3 * noise(90 + 3 * photo + k)));
+        Attitude { photo, attitude: attitude(&pose(photo)) * boresight * error, boresight, precision }.into()
+    };
+    let relative = |i: usize, j: usize| {
+        let (a, b) = (pose(i), pose(j));
+        let error = Vector3::from([0, 1, 2].map(|k| 2e-3 * noise(110 + k)));
+        let turned = rotation([0, 1, 2].map(|k| 5e-4 * noise(120 + k)));
+        let pose = Pose {
+            position: attitude(&a).tr_mul(&(position(&b) - position(&a))) + error,
+            attitude: attitude(&a).transpose() * attitude(&b) * turned,
+        };
+        let precision = covariance(&[0.002, 0.003, 0.002, 5e-4, 4e-4, 6e-4]);
+        Relative { photos: [i, j], pose, precision }.into()
+    };
+    let components = |a, b, seen: [bool; 3]| {
+        std::array::from_fn(|k| seen[k].then(|| difference(a, b)[k] + 1e-3 * noise(130 + k)))
+    };
+    let level = |a: usize, b: usize| {
+        EqualHeight { points: [a, b], difference: difference(a, b)[2] + 1e-3 * noise(140 + a), sd: 1e-3 }
+            .into()
+    };
+    network.observations = vec![
+        distance(3, 4),
+        control(0),
+        gnss(0, covariance(&[0.01, 0.01, 0.02])),
+        imu(1, sd(&[1e-3, 1e-3, 2e-3])),
+        Difference {
+            points: [3, 5],
+            components: components(3, 5, [true; 3]),
+            precision: covariance(&[1e-3, 2e-3, 1e-3]),
+        }
+        .into(),
+        level(6, 7),
+        relative(0, 1),
+        control(1),
+        distance(5, 6),
+        Difference {
+            points: [8, 7],
+            components: components(8, 7, [true, false, true]),
+            precision: sd(&[1e-3, 2e-3]),
+        }
+        .into(),
+        gnss(4, sd(&[0.01, 0.02, 0.01])),
+        imu(3, covariance(&[1e-3, 1e-3, 2e-3])),
+        level(9, 8),
+    ];
+    network
+}
+
+fn options(method: Method, loss: Option<Loss>) -> Options {
+    let adjustment = adjustment::Options { method, max_iterations: 50, covariance: true, loss };
+    Options { adjustment, ..Options::default() }
+}
+
+fn adjust_with(network: &Network, options: &Options, threads: usize) -> Result<Solution, NetworkError> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    network.adjust(options, &pool, &mut |_| std::ops::ControlFlow::Continue(()))
+}
+
+fn adjusted(network: &Network) -> Solution {
+    let solution = adjust_with(network, &options(Method::Damped(Stop::Fraction(1e-9)), None), 2).unwrap();
+    assert_eq!(solution.adjustment.status, Status::Converged);
+    solution
+}
+
+/// The equations once more, in complex numbers: vectors and matrices as arrays.
+mod dense {
+    use super::*;
+
+    type V = [C; 3];
+    /// Columns.
+    type M = [V; 3];
+
+    fn vector(v: &Vector3) -> V {
+        [v.x, v.y, v.z].map(C::from)
+    }
+
+    fn matrix(m: &Matrix3) -> M {
+        std::array::from_fn(|j| std::array::from_fn(|i| C::from(m[(i, j)])))
+    }
+
+    fn times(m: &M, v: &V) -> V {
+        std::array::from_fn(|i| m[0][i] * v[0] + m[1][i] * v[1] + m[2][i] * v[2])
+    }
+
+    fn product(a: &M, b: &M) -> M {
+        std::array::from_fn(|j| times(a, &b[j]))
+    }
+
+    fn transposed(m: &M) -> M {
+        std::array::from_fn(|j| std::array::from_fn(|i| m[i][j]))
+    }
+
+    fn minus(a: &V, b: &V) -> V {
+        std::array::from_fn(|k| a[k] - b[k])
+    }
+
+    /// Turns the axes about one of them.
+    fn about(axis: usize, angle: C) -> M {
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut m = [[C::from(0.0); 3]; 3];
+        (m[axis][axis], m[j][j], m[k][k]) = (C::from(1.0), angle.cos(), angle.cos());
+        (m[k][j], m[j][k]) = (angle.sin(), -angle.sin());
+        m
+    }
+
+    /// The rotation vector of a matrix that turns by little.
+    fn logarithm(r: &M) -> V {
+        let w = [r[1][2] - r[2][1], r[2][0] - r[0][2], r[0][1] - r[1][0]].map(|value| value / 2.0);
+        // asin s / s in powers of s^2: the function itself would lose the imaginary part.
+        let square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+        let factor = 1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (5.0 / 112.0)));
+        w.map(|value| value * factor)
+    }
+
+    /// What is computed for all observations, in this order: images, held components, the others.
+    pub struct Dense<'a> {
+        pub network: &'a Network,
+        /// Covariance of everything that is observed.
+        pub s: Mat<f64>,
+        /// The unknowns that are not fixed: those of points, then of photos.
+        pub free: Vec<usize>,
+    }
+
+    impl<'a> Dense<'a> {
+        pub fn new(network: &'a Network) -> Self {
+            let mut blocks: Vec<nalgebra::DMatrix<f64>> = vec![];
+            let diagonal = |sd: &[f64]| {
+                let squares = sd.iter().map(|sd| sd * sd);
+                nalgebra::DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(sd.len(), squares))
+            };
+            network.images.iter().for_each(|image| blocks.push(diagonal(&image.sd)));
+            held(network).for_each(|(_, _, sd)| blocks.push(diagonal(&[sd])));
+            for observation in &network.observations {
+                blocks.push(match observation.precision() {
+                    Precision::Deviations(sd) => diagonal(&sd),
+                    Precision::Covariance(matrix) => matrix,
+                });
+            }
+            let size = blocks.iter().map(|block| block.nrows()).sum();
+            let (mut s, mut start) = (Mat::zeros(size, size), 0);
+            for block in blocks {
+                for (i, j) in (0..block.nrows()).flat_map(|i| (0..block.nrows()).map(move |j| (i, j))) {
+                    s[(start + i, start + j)] = block[(i, j)];
+                }
+                start += block.nrows();
+            }
+            let fixed_points = network.points.iter().flat_map(|point| point.sd);
+            let all = fixed_points.chain(network.photos.iter().flat_map(|photo| photo.sd));
+            let free = all.enumerate().filter(|&(_, sd)| sd != 0.0).map(|(unknown, _)| unknown).collect();
+            Self { network, s, free }
+        }
+
+        /// Observed minus computed.
+        pub fn residuals(&self, x: &[C]) -> Vec<C> {
+            let point = |i: usize| -> V { std::array::from_fn(|k| x[3 * i + k]) };
+            let photo = |i: usize| -> (V, M) {
+                let own = &x[3 * self.network.points.len() + 6 * i..][..6];
+                let m = product(&about(2, own[5]), &product(&about(1, own[4]), &about(0, own[3])));
+                ([own[0], own[1], own[2]], transposed(&m))
+            };
+            let mut all = vec![];
+            for image in &self.network.images {
+                let (centre, a) = photo(image.photo);
+                let u = times(&transposed(&a), &minus(&point(image.point), &centre));
+                all.extend([0, 1].map(|k| image.xy[k] - PRINCIPAL_DISTANCE * u[k] / u[2]));
+            }
+            all.extend(held(self.network).map(|(unknown, value, _)| value - x[unknown]));
+            for observation in &self.network.observations {
+                match observation {
+                    Observation::Distance(own) => {
+                        let d = minus(&point(own.points[1]), &point(own.points[0]));
+                        all.push(own.length - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt());
+                    }
+                    Observation::Difference(own) => {
+                        let d = minus(&point(own.points[1]), &point(own.points[0]));
+                        all.extend((0..3).filter_map(|k| own.components[k].map(|value| value - d[k])));
+                    }
+                    Observation::EqualHeight(own) => {
+                        all.push(own.difference - (point(own.points[1])[2] - point(own.points[0])[2]));
+                    }
+                    Observation::Control(own) => {
+                        all.extend((0..3).map(|k| own.coordinates[k] - point(own.point)[k]));
+                    }
+                    Observation::Position(own) => {
+                        let (centre, a) = photo(own.photo);
+                        let arm = times(&a, &vector(&own.lever_arm));
+                        all.extend((0..3).map(|k| own.coordinates[k] - centre[k] - arm[k]));
+                    }
+                    Observation::Attitude(own) => {
+                        let computed = product(&photo(own.photo).1, &matrix(&own.boresight));
+                        all.extend(logarithm(&product(&transposed(&computed), &matrix(&own.attitude))));
+                    }
+                    Observation::Relative(own) => {
+                        let ((ci, ai), (cj, aj)) = (photo(own.photos[0]), photo(own.photos[1]));
+                        let t = times(&transposed(&ai), &minus(&cj, &ci));
+                        all.extend(minus(&vector(&own.pose.position), &t));
+                        let r = product(&transposed(&ai), &aj);
+                        all.extend(logarithm(&product(&transposed(&r), &matrix(&own.pose.attitude))));
+                    }
+                }
+            }
+            all
+        }
+
+        /// Residuals, and partials of the computed by complex steps.
+        pub fn linearized(&self, x: &[f64]) -> (Mat<f64>, Mat<f64>) {
+            const STEP: f64 = 1e-100;
+            let at: Vec<C> = x.iter().map(|&value| C::from(value)).collect();
+            let v = self.residuals(&at);
+            let mut a = Mat::zeros(v.len(), self.free.len());
+            for (column, &unknown) in self.free.iter().enumerate() {
+                let mut stepped = at.clone();
+                stepped[unknown].im = STEP;
+                for (row, value) in self.residuals(&stepped).iter().enumerate() {
+                    a[(row, column)] = -value.im / STEP;
+                }
+            }
+            (Mat::from_fn(v.len(), 1, |i, _| v[i].re), a)
+        }
+    }
+
+    /// Components of points that are weighted: unknown, value and standard deviation.
+    fn held(network: &Network) -> impl Iterator<Item = (usize, f64, f64)> {
+        let each = |(i, point): (usize, &Point)| {
+            let Point { coordinates, sd } = *point;
+            (0..3).map(move |k| (3 * i + k, coordinates[k], sd[k]))
+        };
+        let all = network.points.iter().enumerate().flat_map(each);
+        all.filter(|&(_, _, sd)| sd > 0.0 && sd.is_finite())
+    }
+
+    pub fn weighted(network: &Network) -> Vec<usize> {
+        held(network).map(|(unknown, _, _)| unknown).collect()
+    }
+}
+
+/// All unknowns of a solution: points, then photos.
+fn unknowns(solution: &Solution) -> Vec<f64> {
+    let points = solution.points.iter().flat_map(|point| point.expect("takes part").coordinates);
+    points.chain(solution.photos.iter().flat_map(|photo| photo.pose)).collect()
+}
+
+fn close(found: f64, expected: f64, scale: f64, limit: f64, what: &str) {
+    let error = (found - expected).abs() / scale;
+    assert!(error < limit, "{what}: {found} instead of {expected}, {error:e}");
+}
+
+#[test]
+fn every_kind_agrees_with_dense_algebra() {
+    let network = network();
+    let solution = adjusted(&network);
+    let dense = dense::Dense::new(&network);
+    let weights = dense.s.llt(Side::Lower).unwrap().inverse();
+
+    // From the solution a step of the dense adjustment is nothing.
+    let x = unknowns(&solution);
+    let (v, a) = dense.linearized(&x);
+    let normal = (a.transpose() * &weights * &a).llt(Side::Lower).unwrap();
+    let (q, step) = (normal.inverse(), normal.solve(a.transpose() * &weights * &v));
+    let mut cofactors = Mat::zeros(x.len(), x.len());
+    for (i, &row) in dense.free.iter().enumerate() {
+        close(step[(i, 0)], 0.0, q[(i, i)].sqrt(), 1e-7, "unknown");
+        dense.free.iter().enumerate().for_each(|(j, &column)| cofactors[(row, column)] = q[(i, j)]);
+    }
+
+    // Cofactors.
+    let block = |first: usize, found: &[f64], n: usize| {
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let scale = (cofactors[(first + i, first + i)] * cofactors[(first + j, first + j)]).sqrt();
+            let expected = cofactors[(first + i, first + j)];
+            close(found[n * i + j], expected, scale.max(1e-30), 1e-8, "cofactor");
+        }
+    };
+    for (i, point) in solution.points.iter().enumerate() {
+        block(3 * i, point.unwrap().cofactors.as_flattened(), 3);
+        assert_eq!(point.unwrap().rays, PHOTOS);
+    }
+    for (i, photo) in solution.photos.iter().enumerate() {
+        block(3 * POINTS + 6 * i, &photo.cofactors, 6);
+    }
+
+    // Residuals, redundancy numbers, standardized residuals.
+    let qvv = &dense.s - &a * &q * a.transpose();
+    let (redundancy, weighted) = (&qvv * &weights, &weights * &v);
+    let wqw = &weights * &qvv * &weights;
+    let standardized = |row: usize| weighted[(row, 0)] / wqw[(row, row)].sqrt();
+    let mut row = 0;
+    let mut check = |residual: f64, share: f64, test: f64| {
+        close(residual, v[(row, 0)], dense.s[(row, row)].sqrt(), 1e-7, "residual");
+        close(share, redundancy[(row, row)], 1.0, 1e-8, "redundancy number");
+        close(test, standardized(row), 1.0, 1e-6, "standardized residual");
+        row += 1;
+    };
+    for image in &solution.images {
+        let image = image.unwrap();
+        (0..2).for_each(|k| check(image.residual[k], image.redundancy[k], image.standardized[k]));
+    }
+    let mut total = 0.0;
+    for unknown in dense::weighted(&network) {
+        let point = solution.points[unknown / 3].unwrap();
+        let given = network.points[unknown / 3];
+        let (residual, share) = (given.coordinates[unknown % 3] - x[unknown], point.redundancy[unknown % 3]);
+        check(residual, share, residual / given.sd[unknown % 3] / share.sqrt());
+        total += share;
+    }
+    for observation in &solution.observations {
+        let own = observation.as_ref().unwrap();
+        (0..own.residual.len()).for_each(|k| check(own.residual[k], own.redundancy[k], own.standardized[k]));
+    }
+    assert_eq!(row, v.nrows());
+
+    // Sums.
+    let freedom = (v.nrows() - dense.free.len()) as i64;
+    assert_eq!(solution.degrees_of_freedom, freedom);
+    total += solution.images.iter().flat_map(|image| image.unwrap().redundancy).sum::<f64>();
+    total += solution.kinds.iter().map(|sums| sums.redundancy).sum::<f64>();
+    close(total, freedom as f64, 1.0, 1e-8, "sum of redundancy numbers");
+    assert!(solution.adjustment.redundancy_excess.unwrap().abs() < 1e-8);
+    let square = (v.transpose() * &weights * &v)[(0, 0)];
+    close(solution.sums_of_squares.total(), square, square, 1e-9, "sum of squares");
+    close(solution.variance_of_unit_weight.unwrap(), square / freedom as f64, 1.0, 1e-9, "variance");
+    let names: Vec<&str> = solution.kinds.iter().map(|sums| sums.kind).collect();
+    let kinds = ["control", "distance", "difference", "equal height", "position", "attitude", "relative"];
+    assert_eq!(names, kinds);
+    let counts: Vec<[usize; 2]> =
+        solution.kinds.iter().map(|sums| [sums.observations, sums.components]).collect();
+    assert_eq!(counts, [[2, 6], [2, 2], [2, 5], [2, 2], [2, 6], [2, 6], [1, 6]]);
+    let by_kind: f64 = solution.kinds.iter().map(|sums| sums.sum_of_squares).sum();
+    close(by_kind, solution.sums_of_squares.observations, 1.0, 1e-9, "sum by kind");
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let network = network();
+    let options = options(Method::Damped(Stop::Fraction(1e-9)), Some(Loss::Huber(1.0)));
+    let [one, two, three] = [1, 2, 3].map(|threads| adjust_with(&network, &options, threads).unwrap());
+    for other in [two, three] {
+        assert_eq!(unknowns(&one), unknowns(&other));
+        assert_eq!(one.observations, other.observations);
+        let cofactors = |solution: &Solution| -> Vec<_> {
+            solution.points.iter().map(|point| point.unwrap().cofactors).collect()
+        };
+        assert_eq!(cofactors(&one), cofactors(&other));
+    }
+    let weights: Vec<f64> = one.observations.iter().map(|own| own.as_ref().unwrap().weight).collect();
+    assert!(weights.iter().all(|&weight| weight > 0.0 && weight <= 1.0));
+    assert!(weights.iter().any(|&weight| weight < 1.0), "{weights:?}");
+}
+
+/// The first photo is fixed, scale comes from a distance of the given length between points 3 and 4.
+fn scaled(length: f64) -> Network {
+    let mut network = images_alone();
+    network.photos[0].sd = [0.0; 6];
+    network.observations = vec![Distance { points: [3, 4], length, sd: 1e-3 }.into()];
+    network
+}
+
+#[test]
+fn one_distance_gives_the_scale() {
+    let (once, twice) = (adjusted(&scaled(1.5)), adjusted(&scaled(3.0)));
+    let centre = position(&images_alone().photos[0].pose);
+    let from_centre = |solution: &Solution, point: usize| {
+        Vector3::from(solution.points[point].unwrap().coordinates) - centre
+    };
+    for point in 0..POINTS {
+        let difference = from_centre(&twice, point) - 2.0 * from_centre(&once, point);
+        assert!(difference.norm() < 1e-8, "{difference}");
+    }
+    for (solution, length) in [(&once, 1.5), (&twice, 3.0)] {
+        let own = solution.observations[0].as_ref().unwrap();
+        let adjusted = (from_centre(solution, 3) - from_centre(solution, 4)).norm();
+        assert!((adjusted - length).abs() < 1e-9);
+        assert!(own.redundancy[0].abs() < 1e-8 && own.standardized[0].is_nan(), "{own:?}");
+        // Two for each image, and the length; less three for each point and six for each photo but one.
+        let freedom = 2 * PHOTOS * POINTS + 1 - 3 * POINTS - 6 * (PHOTOS - 1);
+        assert_eq!(solution.degrees_of_freedom, freedom as i64);
+    }
+}
+
+#[test]
+fn a_free_network_with_a_scale_holds_six_unknowns() {
+    let mut network = scaled(1.5);
+    network.photos[0].sd = [f64::INFINITY; 6];
+    let free = adjust_with(&network, &options(Method::TrustRegion(Stop::Decrease(1e-12)), None), 2).unwrap();
+    assert_eq!(free.datum, (0..6).map(|unknown| (0, unknown)).collect::<Vec<_>>());
+    let fixed = adjusted(&scaled(1.5));
+    assert_eq!(free.degrees_of_freedom, fixed.degrees_of_freedom);
+    for (a, b) in free.images.iter().zip(&fixed.images) {
+        (0..2).for_each(|k| {
+            assert!((a.unwrap().redundancy[k] - b.unwrap().redundancy[k]).abs() < 1e-6);
+            assert!((a.unwrap().residual[k] - b.unwrap().residual[k]).abs() < 1e-4 * IMAGE_SD);
+        });
+    }
+}
+
+#[test]
+fn points_that_nothing_else_holds_are_named() {
+    // Photos are known, a point lies on the ray of the only photo that counts for it: another photo, the same ray.
+    let mut network = images_alone();
+    network.photos.iter_mut().enumerate().for_each(|(k, photo)| {
+        (photo.pose, photo.sd) = (pose(k), [0.0; 6]);
+    });
+    network.photos.push(network.photos[0]);
+    let [first, ..] = network.images.clone().try_into().unwrap_or_else(|all: Vec<Image>| [all[0]]);
+    network.images.retain(|image| image.point != 0);
+    network.images.push(first);
+    network.images.push(Image { photo: PHOTOS, ..first });
+    network.observations = vec![distance(1, 2)];
+    let refused = adjust_with(&network, &Options::default(), 1).err();
+    assert_eq!(refused, Some(NetworkError::UndeterminedPoints(vec![0])), "a local point");
+    network.observations = vec![EqualHeight { points: [3, 4], difference: 0.0, sd: 1.0 }.into()];
+    network.observations.push(EqualHeight { points: [0, 0], difference: 0.0, sd: 1.0 }.into());
+    let refused = adjust_with(&network, &Options::default(), 1).err();
+    let (index, kind, fault) = (1, "equal height", Fault::Twice);
+    assert_eq!(refused, Some(NetworkError::Observation { index, kind, fault }));
+    // Across the ray of a photo that looks along Y nothing is said by a difference in X.
+    let components = [Some(difference(0, 1)[0]), None, None];
+    network.observations = vec![Difference { points: [0, 1], components, precision: sd(&[0.01]) }.into()];
+    let solved = adjust_with(&network, &Options::default(), 1);
+    assert!(solved.is_ok(), "a difference finds the point on its ray: {:?}", solved.err());
+}
+
+#[test]
+fn observations_of_points_that_are_left_out_do_not_take_part() {
+    let mut network = network();
+    network.images.retain(|image| image.point != 6 || image.photo == 0);
+    let solution = adjusted(&network);
+    assert!(solution.points[6].is_none());
+    for (own, observation) in network.observations.iter().zip(&solution.observations) {
+        assert_eq!(own.touches().points.contains(&6), observation.is_none());
+    }
+    assert!(solution.adjustment.redundancy_excess.unwrap().abs() < 1e-8);
+    let counted: usize = solution.kinds.iter().map(|sums| sums.observations).sum();
+    assert_eq!(counted, network.observations.len() - 2);
+}
+
+#[test]
+fn what_cannot_be_is_refused_by_its_index() {
+    let refused = |index: usize, observation: Observation| {
+        let mut network = network();
+        let kind = observation.kind();
+        network.observations[index] = observation;
+        let expected = move |fault| NetworkError::Observation { index, kind, fault };
+        (adjust_with(&network, &Options::default(), 1).expect_err("refused"), expected)
+    };
+    let length = |points, length, sd| Distance { points, length, sd }.into();
+    let (found, expected) = refused(4, length([3, POINTS], 1.0, 0.1));
+    assert_eq!(found, expected(Fault::NoPoint(POINTS)));
+    assert_eq!(found.to_string(), "observation 4, of kind distance, names point 14, which is not there");
+    let (found, expected) = refused(2, length([3, 3], 1.0, 0.1));
+    assert_eq!(found, expected(Fault::Twice));
+    let (found, expected) = refused(2, length([3, 4], 1.0, -0.1));
+    assert_eq!(found, expected(Fault::Deviation));
+    let (found, expected) = refused(0, length([3, 4], f64::NAN, 0.1));
+    assert_eq!(found, expected(Fault::NotFinite));
+    let pose = Pose { position: Vector3::zeros(), attitude: Matrix3::identity() };
+    let relative = |photos, precision| Relative { photos, pose, precision }.into();
+    let (found, expected) = refused(1, relative([0, PHOTOS], sd(&[1.0; 6])));
+    assert_eq!(found, expected(Fault::NoPhoto(PHOTOS)));
+    let singular = nalgebra::DMatrix::from_element(6, 6, 1.0);
+    let (found, expected) = refused(1, relative([0, 1], Precision::Covariance(singular)));
+    assert_eq!(found, expected(Fault::Covariance));
+    let (found, expected) = refused(1, relative([0, 1], sd(&[1.0; 5])));
+    assert_eq!(found, expected(Fault::Deviations { components: 6, given: 5 }));
+    let components = [None; 3];
+    let nothing = Difference { points: [0, 1], components, precision: sd(&[]) };
+    let (found, expected) = refused(3, nothing.into());
+    assert_eq!(found, expected(Fault::Nothing));
+}

@@ -1,0 +1,347 @@
+//! Cameras with unknown parameters that several photos share, against an adjustment with dense matrices, partials by complex steps.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::ops::{ControlFlow, Range};
+
+use faer::linalg::solvers::{DenseSolveCore, Solve};
+use faer::{Mat, Side};
+use num_complex::Complex64 as C;
+use photocore::adjustment::{self, Method, Status, Stop};
+use photocore::geometry::{self, Bal, ObjectSpace, Perspective, PoseNumbers};
+use photocore::network::observations::Distance;
+use photocore::network::{
+    Camera, Combination, Image, Network, NetworkError, Options, Photo, Point, Solution,
+};
+use rayon::ThreadPoolBuilder;
+
+const FREE: f64 = f64::INFINITY;
+const PHOTOS: usize = 11;
+const POINTS: usize = 40;
+const IMAGE_SD: f64 = 0.5;
+const TIGHT: Method = Method::Damped(Stop::Fraction(1e-9));
+/// Two that several photos share, one of one photo, one that is held, and one with a principal distance alone.
+const CAMERA_OF: [usize; PHOTOS] = [0, 1, 0, 1, 0, 1, 0, 2, 3, 4, 4];
+
+/// A number between -1 and 1 for each index, the same on every machine.
+fn noise(index: usize) -> f64 {
+    ((index as f64 * 12.9898).sin() * 43758.5453).fract()
+}
+
+fn cameras() -> Vec<Camera> {
+    let bal = |focal_length, radial| geometry::Camera::from(Bal { focal_length, radial });
+    vec![
+        Camera { camera: bal(1000.0, [0.05, -0.02]), sd: vec![FREE; 3] },
+        // Weighted, free, fixed.
+        Camera { camera: bal(1100.0, [0.03, 0.01]), sd: vec![0.3, FREE, 0.0] },
+        Camera { camera: bal(900.0, [-0.04, 0.02]), sd: vec![FREE, 0.004, 0.01] },
+        Camera::held(bal(950.0, [0.0, 0.02])),
+        Camera { camera: Perspective { principal_distance: -1050.0 }.into(), sd: vec![FREE] },
+    ]
+}
+
+/// The rotated vector by the exponential series of the cross product.
+fn turned(w: &[C], v: [C; 3]) -> [C; 3] {
+    let cross = |b: [C; 3]| -> [C; 3] {
+        std::array::from_fn(|k| w[(k + 1) % 3] * b[(k + 2) % 3] - w[(k + 2) % 3] * b[(k + 1) % 3])
+    };
+    let (mut sum, mut term) = (v, v);
+    for n in 1..60 {
+        term = cross(term).map(|value| value / f64::from(n));
+        sum = std::array::from_fn(|k| sum[k] + term[k]);
+    }
+    sum
+}
+
+/// The image of a point: f or -c, and radial terms or none.
+fn image(pose: &[C], camera: &[C], point: &[C]) -> [C; 2] {
+    let r = turned(&pose[..3], [point[0], point[1], point[2]]);
+    let p = [0, 1].map(|k| -(r[k] + pose[3 + k]) / (r[2] + pose[5]));
+    let square = p[0] * p[0] + p[1] * p[1];
+    match camera {
+        [c] => p.map(|value| -c * value),
+        camera => p.map(|value| camera[0] * (1.0 + camera[1] * square + camera[2] * square * square) * value),
+    }
+}
+
+fn pose(photo: usize) -> [f64; 6] {
+    let around = -2.5 + 5.0 * photo as f64 / PHOTOS as f64;
+    let [a, b] = [0, 1].map(|k| 0.2 * noise(photo + 50 * k));
+    [a, -around, b, 0.3 * noise(photo + 100), 0.3 * noise(photo + 150), -10.0 + noise(photo + 200)]
+}
+
+fn place(point: usize) -> [f64; 3] {
+    std::array::from_fn(|k| 2.0 * noise(3 * point + k + 400))
+}
+
+fn complex(values: &[f64]) -> Vec<C> {
+    values.iter().map(|&value| C::new(value, 0.0)).collect()
+}
+
+/// Photos around a cloud of points, of which the first are observed, and two lengths: the points at their ends are kept.
+fn network() -> Network {
+    let cameras = cameras();
+    let mut images = Vec::new();
+    for point in 0..POINTS {
+        for photo in (0..PHOTOS).filter(|photo| (photo + point) % 3 > 0) {
+            let parameters: Vec<f64> = cameras[CAMERA_OF[photo]].camera.parameters();
+            let exact = image(&complex(&pose(photo)), &complex(&parameters), &complex(&place(point)));
+            let n = 2 * images.len();
+            let xy = [0, 1].map(|k| exact[k].re + IMAGE_SD * noise(n + k + 7000));
+            images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
+        }
+    }
+    let photo = |photo: usize| {
+        let pose = std::array::from_fn(|k| pose(photo)[k] + 0.01 * noise(6 * photo + k + 900));
+        Photo { pose, observed: pose, sd: [FREE; 6], camera: CAMERA_OF[photo] }
+    };
+    let point = |point: usize| {
+        let sd = if point < 6 { 0.002 } else { FREE };
+        Point { coordinates: place(point).map(|value| value + 0.001 * noise(point + 1300)), sd: [sd; 3] }
+    };
+    let length = |points: [usize; 2]| {
+        let [p, q] = points.map(place);
+        let length = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
+        Distance { points, length: length + 0.0005, sd: 0.001 }.into()
+    };
+    Network {
+        space: ObjectSpace::Rectangular,
+        poses: PoseNumbers::Vectors,
+        refraction: None,
+        cameras,
+        photos: (0..PHOTOS).map(photo).collect(),
+        points: (0..POINTS).map(point).collect(),
+        images,
+        observations: [[20, 21], [4, 30]].map(length).into(),
+    }
+}
+
+fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
+    let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
+    let options = Options { adjustment, ..Options::default() };
+    network.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
+}
+
+/// The same network with full matrices: poses, parameters of all cameras, points; those that are fixed have an equation of their own.
+struct Dense<'a> {
+    network: &'a Network,
+    first_parameter: Vec<usize>,
+    first_point: usize,
+    unknowns: usize,
+}
+
+impl<'a> Dense<'a> {
+    fn new(network: &'a Network) -> Self {
+        let mut first_parameter = vec![6 * PHOTOS];
+        for camera in &network.cameras {
+            first_parameter.push(first_parameter[first_parameter.len() - 1] + camera.sd.len());
+        }
+        let first_point = first_parameter[network.cameras.len()];
+        Self { network, first_parameter, first_point, unknowns: first_point + 3 * POINTS }
+    }
+
+    fn camera(&self, camera: usize) -> Range<usize> {
+        self.first_parameter[camera]..self.first_parameter[camera + 1]
+    }
+
+    fn point(&self, point: usize) -> Range<usize> {
+        self.first_point + 3 * point..self.first_point + 3 * point + 3
+    }
+
+    /// Values and standard deviations of unknowns that are observed or fixed.
+    fn observed(&self) -> (Vec<f64>, Vec<f64>) {
+        let Network { photos, cameras, points, .. } = self.network;
+        let poses = photos.iter().flat_map(|photo| photo.pose);
+        let parameters = cameras.iter().flat_map(|camera| camera.camera.parameters());
+        let values = poses.chain(parameters).chain(points.iter().flat_map(|point| point.coordinates));
+        let sd =
+            vec![FREE; 6 * PHOTOS].into_iter().chain(cameras.iter().flat_map(|camera| camera.sd.clone()));
+        (values.collect(), sd.chain(points.iter().flat_map(|point| point.sd)).collect())
+    }
+
+    /// Observed minus computed and partials, of unit weight: images, lengths, unknowns.
+    fn equations(&self, x: &[f64]) -> (Mat<f64>, Mat<f64>) {
+        const STEP: f64 = 1e-100;
+        let Network { images, photos, .. } = self.network;
+        let (observed, sd) = self.observed();
+        let mut a = Mat::zeros(2 * images.len() + 2 + self.unknowns, self.unknowns);
+        let mut left = Mat::zeros(a.nrows(), 1);
+        for (i, each) in images.iter().enumerate() {
+            let camera = self.camera(photos[each.photo].camera);
+            let pose = 6 * each.photo..6 * each.photo + 6;
+            let columns: Vec<usize> =
+                pose.clone().chain(camera.clone()).chain(self.point(each.point)).collect();
+            for (k, &column) in columns.iter().enumerate() {
+                let mut values: Vec<C> = columns.iter().map(|&column| C::new(x[column], 0.0)).collect();
+                values[k].im = STEP;
+                let (pose, rest) = values.split_at(6);
+                let (camera, point) = rest.split_at(camera.len());
+                let xy = image(pose, camera, point);
+                for row in 0..2 {
+                    // What is fixed has its own equation alone.
+                    let partial = if sd[column] == 0.0 { 0.0 } else { xy[row].im / STEP };
+                    a[(2 * i + row, column)] = partial / IMAGE_SD;
+                    left[(2 * i + row, 0)] = (each.xy[row] - xy[row].re) / IMAGE_SD;
+                }
+            }
+        }
+        for (k, (points, length)) in [[20, 21], [4, 30]].into_iter().zip(lengths(self.network)).enumerate() {
+            let row = 2 * images.len() + k;
+            let [p, q] = points.map(|point| self.point(point).start);
+            let difference = [0, 1, 2].map(|k| x[q + k] - x[p + k]);
+            let computed = difference.iter().map(|d| d * d).sum::<f64>().sqrt();
+            left[(row, 0)] = (length - computed) / 0.001;
+            for k in 0..3 {
+                a[(row, q + k)] = difference[k] / computed / 0.001;
+                a[(row, p + k)] = -a[(row, q + k)];
+            }
+        }
+        for i in 0..self.unknowns {
+            let weight = if sd[i] == 0.0 { 1.0 } else { sd[i].recip() };
+            a[(2 * images.len() + 2 + i, i)] = weight;
+            left[(2 * images.len() + 2 + i, 0)] = weight * (observed[i] - x[i]);
+        }
+        (a, left)
+    }
+
+    /// Adjusted unknowns and the inverse normal matrix.
+    fn adjust(&self) -> (Vec<f64>, Mat<f64>) {
+        let (mut x, _) = self.observed();
+        for _ in 0..20 {
+            let (a, left) = self.equations(&x);
+            let normal = a.transpose() * &a;
+            let step = normal.llt(Side::Lower).unwrap().solve(a.transpose() * left);
+            (0..x.len()).for_each(|i| x[i] += step[(i, 0)]);
+        }
+        let (a, _) = self.equations(&x);
+        let mut inverse = (a.transpose() * &a).llt(Side::Lower).unwrap().inverse();
+        // Fixed ones have none.
+        let (_, sd) = self.observed();
+        (0..x.len()).filter(|&i| sd[i] == 0.0).for_each(|i| inverse[(i, i)] = 0.0);
+        (x, inverse)
+    }
+}
+
+fn lengths(network: &Network) -> Vec<f64> {
+    let length = |observation: &photocore::network::Observation| match observation {
+        photocore::network::Observation::Distance(distance) => distance.length,
+        other => panic!("{other:?}"),
+    };
+    network.observations.iter().map(length).collect()
+}
+
+fn compare(found: &[f64], cofactors: &[f64], unknowns: &[usize], x: &[f64], q: &Mat<f64>, what: &str) {
+    for (i, &u) in unknowns.iter().enumerate() {
+        let sd = q[(u, u)].sqrt();
+        assert!((found[i] - x[u]).abs() <= 1e-7 * sd, "{what} {i}: {} instead of {}", found[i], x[u]);
+        for (j, &v) in unknowns.iter().enumerate() {
+            let scale = sd * q[(v, v)].sqrt();
+            let (value, expected) = (cofactors[i * unknowns.len() + j], q[(u, v)]);
+            assert!((value - expected).abs() <= 1e-8 * scale, "{what} {i} {j}: {value:e} {expected:e}");
+        }
+    }
+}
+
+#[test]
+fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
+    let network = network();
+    let (dense, solution) = (Dense::new(&network), adjust(&network, TIGHT).unwrap());
+    assert_eq!(solution.adjustment.status, Status::Converged);
+    let (x, q) = dense.adjust();
+    let (_, sd) = dense.observed();
+    for (i, photo) in solution.photos.iter().enumerate() {
+        let mut unknowns: Vec<usize> = (6 * i..6 * i + 6).collect();
+        let mut values = photo.pose.to_vec();
+        if CAMERA_OF[i] == 2 {
+            unknowns.extend(dense.camera(2));
+            values.extend(&photo.camera);
+        }
+        compare(&values, &photo.cofactors, &unknowns, &x, &q, &format!("photo {i}"));
+        assert_eq!(photo.camera, solution.cameras[CAMERA_OF[i]].parameters);
+    }
+    for (i, camera) in solution.cameras.iter().enumerate() {
+        let unknowns: Vec<usize> = dense.camera(i).collect();
+        compare(&camera.parameters, &camera.cofactors, &unknowns, &x, &q, &format!("camera {i}"));
+        for (k, &u) in unknowns.iter().enumerate() {
+            let weighted = sd[u] > 0.0 && sd[u] < FREE;
+            let expected = if weighted { 1.0 - q[(u, u)] / sd[u].powi(2) } else { 0.0 };
+            assert!((camera.redundancy[k] - expected).abs() < 1e-8, "camera {i}, parameter {k}");
+        }
+        let of_camera = |image: &&Image| CAMERA_OF[image.photo] == i;
+        let photos = CAMERA_OF.iter().filter(|&&camera| camera == i).count();
+        let images = network.images.iter().filter(of_camera).count();
+        assert_eq!((camera.photos, camera.images), (photos, images));
+    }
+    for (i, point) in solution.points.iter().enumerate() {
+        let point = point.unwrap();
+        let unknowns: Vec<usize> = dense.point(i).collect();
+        let cofactors = point.cofactors.as_flattened();
+        compare(&point.coordinates, cofactors, &unknowns, &x, &q, &format!("point {i}"));
+    }
+    let (a, left) = dense.equations(&x);
+    let taken_up = &a * &q;
+    for (i, image) in solution.images.iter().enumerate() {
+        for row in 0..2 {
+            let equation = 2 * i + row;
+            let share: f64 = (0..x.len()).map(|k| taken_up[(equation, k)] * a[(equation, k)]).sum();
+            let image = image.unwrap();
+            assert!((image.redundancy[row] - (1.0 - share)).abs() < 1e-8, "image {i}");
+            assert!((image.residual[row] / IMAGE_SD - left[(equation, 0)]).abs() < 1e-6, "image {i}");
+        }
+    }
+    let total: f64 = (0..left.nrows()).map(|i| left[(i, 0)].powi(2)).sum();
+    assert!((solution.sums_of_squares.total() - total).abs() < 1e-9 * total);
+}
+
+/// Without control: what the datum holds are photos, and redundancy numbers add up to the degrees of freedom.
+#[test]
+fn redundancy_numbers_of_a_free_network_add_up() {
+    let mut network = network();
+    network.points.iter_mut().for_each(|point| point.sd = [FREE; 3]);
+    network.observations.clear();
+    let solution = adjust(&network, Method::TrustRegion(Stop::Decrease(1e-10))).unwrap();
+    assert_eq!(solution.datum.len(), 7);
+    let parameters = 3 + 2 + 3 + 1;
+    let weighted = 1 + 2;
+    let unknowns = (6 * PHOTOS + parameters + 3 * POINTS - 7) as i64;
+    let expected = (2 * network.images.len() + weighted) as i64 - unknowns;
+    assert_eq!(solution.degrees_of_freedom, expected);
+    let of_images = solution.images.iter().flatten().flat_map(|image| image.redundancy);
+    let of_cameras = solution.cameras.iter().flat_map(|camera| camera.redundancy.clone());
+    let total: f64 = of_images.chain(of_cameras).sum();
+    assert!((total - expected as f64).abs() < 1e-7 * expected as f64, "{total} of {expected}");
+}
+
+/// Vertical photos of a plane: a longer principal distance is a greater flying height.
+#[test]
+fn a_camera_that_is_not_determined_is_named_with_its_photos() {
+    let camera = Perspective { principal_distance: -1000.0 };
+    let places: Vec<[f64; 3]> = (0..9).map(|k| [(k % 3) as f64, (k / 3) as f64, 0.0]).collect();
+    let stations = [[-0.5, -1.0], [-1.0, -1.2], [-1.5, -0.8]];
+    let mut network = Network {
+        space: ObjectSpace::Rectangular,
+        poses: PoseNumbers::Vectors,
+        refraction: None,
+        cameras: vec![Camera::held(camera.into()), Camera { camera: camera.into(), sd: vec![FREE] }],
+        photos: vec![],
+        points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
+        images: vec![],
+        observations: vec![],
+    };
+    for (photo, [x, y]) in stations.into_iter().enumerate() {
+        let pose = [0.0, 0.0, 0.0, x, y, -10.0];
+        network.photos.push(Photo { pose, observed: pose, sd: [FREE; 6], camera: 1 });
+        for (point, place) in places.iter().enumerate() {
+            let xy = image(&complex(&pose), &complex(&[-1000.0]), &complex(place)).map(|value| value.re);
+            network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
+        }
+    }
+    let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1] };
+    assert_eq!(adjust(&network, TIGHT).unwrap_err(), NetworkError::Undetermined(vec![combination]));
+    // A weight is enough.
+    network.cameras[1].sd = vec![0.1];
+    let solution = adjust(&network, TIGHT).unwrap();
+    assert!((solution.cameras[1].cofactors[0].sqrt() - 0.1).abs() < 1e-9);
+    assert!(solution.cameras[1].redundancy[0].abs() < 1e-8);
+}

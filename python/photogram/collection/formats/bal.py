@@ -1,0 +1,125 @@
+"""The text format of "Bundle Adjustment in the Large".
+
+First line: photos, points, images; then for each image `photo point x y`; then nine parameters of each
+photo and three coordinates of each point, one number a line. Any white space separates numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.collection.collection import Collection
+from photogram.collection.formats.format import Format
+from photogram.errors import InputError
+from photogram.io.words import PIECE, at, whole
+from photogram.memory import require
+
+__all__ = ["FORMAT"]
+
+ROOM = 64
+"""Characters that a number and the white space after it take at the most, in the mean over a file."""
+HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3
+"""Numbers of the first line, of an image, of a photo, of a point."""
+COUNTS = "the numbers of photos, points and images"
+
+
+def read(path: Path, pieces: Iterator[bytes]) -> Collection:
+    """Read a collection."""
+    counts, numbers = _numbers(path, pieces)
+    photos, points, images = counts.photos, counts.points, counts.images
+    first_photo = HEAD + IMAGE * images
+    first_point = first_photo + PHOTO * photos
+    rows = numbers[HEAD:first_photo].reshape(images, IMAGE)
+    for column, (name, count) in enumerate((("photo", photos), ("point", points))):
+        bad = np.flatnonzero(~whole(rows[:, column]) | (rows[:, column] >= count))
+        if len(bad):
+            message = f"{rows[bad[0], column]:g} is no {name}: they count from 0 to {count - 1}"
+            raise at(path, HEAD + IMAGE * int(bad[0]), message)
+    return Collection(
+        photo_parameters=numbers[first_photo:first_point].reshape(photos, PHOTO),
+        point_positions=numbers[first_point:].reshape(points, POINT),
+        image_photos=rows[:, 0].astype(np.int64),
+        image_points=rows[:, 1].astype(np.int64),
+        image_xy=rows[:, 2:],
+    )
+
+
+def to_bytes(collection: Collection) -> bytes:
+    """Return a collection in the format; numbers read back to the last bit."""
+    head = f"{len(collection.photo_parameters)} {len(collection.point_positions)} {len(collection.image_xy)}"
+    columns = zip(
+        collection.image_photos.tolist(),
+        collection.image_points.tolist(),
+        *collection.image_xy.T.tolist(),
+        strict=True,
+    )
+    images = [f"{photo} {point} {x!r} {y!r}" for photo, point, x, y in columns]
+    values = [
+        *map(repr, collection.photo_parameters.ravel().tolist()),
+        *map(repr, collection.point_positions.ravel().tolist()),
+    ]
+    return "\n".join([head, *images, *values, ""]).encode()
+
+
+@dataclass(frozen=True)
+class _Counts:
+    """How many photos, points and images the first line announces."""
+
+    photos: int
+    points: int
+    images: int
+
+    @property
+    def numbers(self) -> int:
+        """Numbers of the whole file."""
+        return HEAD + IMAGE * self.images + PHOTO * self.photos + POINT * self.points
+
+    def __str__(self) -> str:
+        return (
+            f"{self.numbers} numbers of {self.photos} photos, {self.points} points and {self.images} images"
+        )
+
+
+def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[_Counts, Floats]:
+    """Read as many numbers as the first line announces, and no more text than they can take."""
+    counts: _Counts | None = None
+    parts: list[Floats] = []
+    read = length = 0
+    for piece in pieces:
+        numbers, good = _photocore.read_numbers(piece)
+        if counts is None and len(numbers) >= HEAD:
+            if not whole(numbers[:HEAD]).all():
+                raise at(path, 0, f"the first line is not {COUNTS}")
+            counts = _Counts(*(int(count) for count in numbers[:HEAD]))
+        wanted = COUNTS if counts is None else str(counts)
+        if counts is not None and read + len(numbers) > counts.numbers:
+            raise at(path, counts.numbers, f"numbers beyond the {wanted}")
+        read += len(numbers)
+        if not good:
+            raise at(path, read, f"is not a finite number, where there should be {wanted}")
+        parts.append(numbers)
+        length += len(piece)
+        if length > PIECE + ROOM * (counts.numbers if counts is not None else HEAD):
+            raise InputError(f"is far longer than the {wanted} can be", file=path)
+        # The parts, and what is made of them.
+        require(4 * read * numbers.itemsize, f"{path}: {read} numbers")
+    if counts is None or read < counts.numbers:
+        raise InputError(f"ends before {COUNTS if counts is None else counts}", file=path)
+    return counts, np.concatenate(parts)
+
+
+FORMAT = Format(
+    name="bal",
+    title='problem of "Bundle Adjustment in the Large"',
+    suffix=".txt",
+    # Any text may be meant for one: the reader says what is wrong.
+    begins=lambda _: True,
+    read=read,
+    to_bytes=to_bytes,
+)

@@ -1,0 +1,177 @@
+"""The text format of Bundler, version 0.3 (Snavely, Seitz and Szeliski 2006): `bundle.out`.
+
+After the line `# Bundle file v0.3` there are the numbers of cameras and points; for each camera f, k1, k2,
+the rows of R and t; for each point X, Y, Z, a colour, and its views: how many, and for each the camera, a
+key, x and y. P = R X + t; the camera looks along -z, and image coordinates are pixels from the middle, x to
+the right, y up. A camera that was not registered has zeros only. Colours and keys are not kept.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
+from photogram.collection.collection import Collection
+from photogram.collection.formats.format import Format
+from photogram.errors import InputError
+from photogram.io.words import at, whole
+from photogram.memory import require
+
+__all__ = ["FORMAT"]
+
+HEADER = re.compile(rb"#[ \t]*Bundle file v(\S+)[^\n]*\n?")
+VERSION = b"0.3"
+COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4
+"""Numbers after the first line, of a camera, of a point with the number of its views, of a view."""
+ORTHONORMAL = 1e-6
+"""What R R^T may differ from the unit matrix."""
+
+
+class _Numbers:
+    """The numbers of a file after its first line, taken one after the other."""
+
+    def __init__(self, path: Path, pieces: Iterator[bytes]) -> None:
+        first = next(pieces)
+        header = HEADER.match(first)
+        if header is None or header[1] != VERSION:
+            line = first.split(b"\n", 1)[0].decode("latin-1").strip()
+            raise InputError("is no Bundle file of version 0.3", file=path, record=1, text=line)
+        self.path = path
+        self.words = len(header[0].split())
+        """Of the first line: what messages count from."""
+        self.taken = 0
+        self.values = self._all(first[header.end() :], pieces)
+
+    def _all(self, first: bytes, pieces: Iterator[bytes]) -> Floats:
+        parts: list[Floats] = []
+        read = 0
+        piece: bytes | None = first
+        while piece is not None:
+            numbers, good = _photocore.read_numbers(piece)
+            read += len(numbers)
+            if not good:
+                raise self.fault(read, "is not a finite number")
+            parts.append(numbers)
+            # The parts, and what is made of them.
+            require(4 * read * numbers.itemsize, f"{self.path}: {read} numbers")
+            piece = next(pieces, None)
+        return np.concatenate(parts)
+
+    def take(self, count: int, what: str) -> Floats:
+        """Return the next numbers."""
+        values = self.values[self.taken : self.taken + count]
+        if len(values) < count:
+            raise InputError(f"ends before the {count} numbers of {what}", file=self.path)
+        self.taken += count
+        return values
+
+    def fault(self, index: int, message: str) -> InputError:
+        """Return an error at the line of a number."""
+        return at(self.path, self.words + index, message)
+
+
+def read(path: Path, pieces: Iterator[bytes]) -> Collection:
+    """Read a collection; cameras keep their numbers, those that were not registered have no images."""
+    numbers = _Numbers(path, pieces)
+    counts = numbers.take(COUNTS, "the second line")
+    if not whole(counts).all():
+        raise numbers.fault(0, "the second line is not the numbers of cameras and points")
+    cameras, points = (int(count) for count in counts)
+    parameters = _parameters(numbers, cameras)
+    positions, views, starts = _points(numbers, points)
+    if numbers.taken < len(numbers.values):
+        raise numbers.fault(numbers.taken, f"numbers beyond the {points} points")
+    rows = numbers.values[starts[:, np.newaxis] + np.arange(VIEW)]
+    bad = np.flatnonzero(~whole(rows[:, 0]) | (rows[:, 0] >= cameras))
+    if len(bad):
+        message = f"{rows[bad[0], 0]:g} is no camera: they count from 0 to {cameras - 1}"
+        raise numbers.fault(int(starts[bad[0]]), message)
+    photos = rows[:, 0].astype(np.int64)
+    bad = np.flatnonzero(parameters[photos, 6] == 0)
+    if len(bad):
+        message = f"camera {photos[bad[0]]} was not registered (f is 0) and can have no views"
+        raise numbers.fault(int(starts[bad[0]]), message)
+    return Collection(
+        photo_parameters=parameters,
+        point_positions=positions,
+        image_photos=photos,
+        image_points=views,
+        image_xy=rows[:, 2:],
+    )
+
+
+def _parameters(numbers: _Numbers, cameras: int) -> Floats:
+    """Return (cameras, 9) rotation vectors, t, f, k1, k2."""
+    first = numbers.taken
+    rows = numbers.take(CAMERA * cameras, f"{cameras} cameras").reshape(cameras, CAMERA)
+    registered = rows[:, 0] != 0
+    matrices = np.where(registered[:, np.newaxis, np.newaxis], rows[:, 3:12].reshape(-1, 3, 3), np.eye(3))
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        bad = np.flatnonzero(~(apart < ORTHONORMAL) | ~(np.linalg.det(matrices) > 0))
+    if len(bad):
+        mirrored = apart[bad[0]] < ORTHONORMAL
+        what = "is mirrored" if mirrored else f"has rows that are not orthonormal to {ORTHONORMAL:g}"
+        raise numbers.fault(first + CAMERA * int(bad[0]) + 3, f"the rotation of camera {bad[0]} {what}")
+    return np.hstack([_photocore.rotation_vectors(matrices), rows[:, 12:], rows[:, :3]])
+
+
+def _points(numbers: _Numbers, points: int) -> tuple[Floats, Indices, Indices]:
+    """Return (points, 3) positions, and for each view its point and the index of its first number."""
+    if points * POINT > len(numbers.values):
+        raise InputError(f"ends before the {POINT * points} numbers of {points} points", file=numbers.path)
+    positions = np.empty((points, 3))
+    firsts, counts = np.empty(points, np.int64), np.empty(points, np.int64)
+    for point in range(points):
+        own = numbers.take(POINT, f"point {point}")
+        if not whole(own[-1:])[0]:
+            raise numbers.fault(
+                numbers.taken - 1, f"the number of views of point {point} cannot be {own[-1]:g}"
+            )
+        positions[point], firsts[point], counts[point] = own[:3], numbers.taken, own[-1]
+        numbers.take(VIEW * int(own[-1]), f"the views of point {point}")
+    views = np.repeat(np.arange(points), counts)
+    within = np.arange(len(views)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return positions, views, np.repeat(firsts, counts) + VIEW * within
+
+
+def to_bytes(collection: Collection) -> bytes:
+    """Return a collection in the format; points are black, and keys count the views of a photo."""
+    lines = ["# Bundle file v0.3", f"{len(collection.photo_parameters)} {len(collection.point_positions)}"]
+    matrices = _photocore.vector_rotations(collection.photo_parameters[:, :3])
+    matrices[collection.photo_parameters[:, 6] == 0] = 0.0
+    for parameters, matrix in zip(collection.photo_parameters, matrices, strict=True):
+        lines += [_line(row) for row in (parameters[6:], *matrix, parameters[3:6])]
+    views: list[list[str]] = [[] for _ in collection.point_positions]
+    keys = [0] * len(collection.photo_parameters)
+    images = zip(
+        collection.image_points.tolist(),
+        collection.image_photos.tolist(),
+        collection.image_xy.tolist(),
+        strict=True,
+    )
+    for point, photo, (x, y) in images:
+        views[point].append(f"{photo} {keys[photo]} {x!r} {y!r}")
+        keys[photo] += 1
+    for position, own in zip(collection.point_positions, views, strict=True):
+        lines += [_line(position), "0 0 0", " ".join([str(len(own)), *own])]
+    return "\n".join([*lines, ""]).encode()
+
+
+def _line(numbers: Floats) -> str:
+    return " ".join(map(repr, numbers.tolist()))
+
+
+FORMAT = Format(
+    name="bundler",
+    title="Bundle file (Bundler, version 0.3)",
+    suffix=".out",
+    begins=lambda begin: HEADER.match(begin) is not None,
+    read=read,
+    to_bytes=to_bytes,
+)

@@ -1,0 +1,64 @@
+"""The formats that are known, and which of them a file has."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from itertools import chain
+from pathlib import Path
+
+from photogram.collection.collection import Collection
+from photogram.collection.formats.format import Format
+from photogram.errors import InputError
+from photogram.io.words import packed, pieces
+from photogram.memory import turned
+
+__all__ = ["FORMATS", "read", "recognised", "to_bytes"]
+
+FORMATS: dict[str, Format] = {
+    name: import_module(f"photogram.collection.formats.{name}").FORMAT
+    for name in (
+        "bundler",
+        "bal",
+    )
+}
+"""By name; a file has the first format that it begins like."""
+
+
+def recognised(path: Path) -> tuple[Collection, Format]:
+    """Read a collection, packed by bzip2 or gzip or not, and say what format it has.
+
+    All unknowns are free, and the standard deviation of image coordinates is one pixel.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or holds something else; names file, line and what stands there.
+    """
+    with turned(f"reading {path}"):
+        content = pieces(path)
+        begin = next(content, b"")
+        found = next(each for each in FORMATS.values() if each.begins(begin))
+        return found.read(path, chain([begin], content)), found
+
+
+def read(path: Path) -> Collection:
+    """Read a collection, packed by bzip2 or gzip or not; see `recognised`."""
+    return recognised(path)[0]
+
+
+def to_bytes(collection: Collection, suffix: str = "", file_format: str = "bal") -> bytes:
+    """Return a collection in the named format, packed as the suffix (`.bz2`, `.gz`) says.
+
+    Raises
+    ------
+    InputError
+        There is no such format, or it cannot hold the cameras.
+    """
+    if file_format not in FORMATS:
+        raise InputError(f"file_format is one of {', '.join(FORMATS)}, not {file_format!r}")
+    chosen = FORMATS[file_format]
+    if collection.camera != chosen.camera:
+        raise InputError(
+            f"a {chosen.title} holds cameras of the model {chosen.camera}, not {collection.camera}"
+        )
+    return packed(chosen.to_bytes(collection), suffix)

@@ -1,0 +1,95 @@
+"""Collections with cameras of other models than "Bundle Adjustment in the Large" has."""
+
+import json
+
+import numpy as np
+import pytest
+
+from photogram import InputError, _photocore
+from photogram.collection import Collection, adjust, simulate
+
+MADE = simulate(photos=8, points=80, noise=0.3, seed=5)
+PRINCIPAL_POINT = np.array([612.5, 388.25])
+
+
+def radial(collection, cx=PRINCIPAL_POINT[0], cy=PRINCIPAL_POINT[1]):
+    """Return the same photos counted from the upper-left corner."""
+    parameters = collection.photo_parameters
+    centre = np.tile([cx, cy], (len(parameters), 1))
+    sd = np.full((len(parameters), 11), np.inf)
+    sd[:, 7:9] = 0.0
+    return collection.replace(
+        camera="radial",
+        photo_parameters=np.hstack([parameters[:, :7], centre, parameters[:, 7:]]),
+        photo_sd=sd,
+        image_xy=PRINCIPAL_POINT + collection.image_xy * [1.0, -1.0],
+    )
+
+
+def test_with_the_principal_point_held_it_is_the_same_adjustment():
+    bal, other = adjust(MADE.collection), adjust(radial(MADE.collection))
+    columns = [*range(7), 9, 10]
+    assert other.converged
+    assert other.cost == pytest.approx(bal.cost, rel=1e-9)
+    np.testing.assert_allclose(other.photo_parameters[:, columns], bal.photo_parameters, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(other.photo_sd[:, columns], bal.photo_sd, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(other.redundancy, bal.redundancy, atol=1e-7)
+    np.testing.assert_allclose(other.residuals, bal.residuals * [1.0, -1.0], atol=1e-5)
+    np.testing.assert_array_equal(other.photo_sd[:, 7:9], 0.0)
+
+
+def test_free_principal_points_scatter_as_their_covariances_say():
+    squares = []
+    for seed in range(100, 112):
+        made = simulate(photos=8, points=80, noise=0.3, seed=seed)
+        start = radial(made.collection, 600.0, 400.0)
+        result = adjust(start.replace(photo_sd=np.array(np.inf), image_sd=0.3))
+        assert result.converged
+        assert np.nansum(result.redundancy) == pytest.approx(result.degrees_of_freedom, abs=1e-5)
+        truth = np.insert(made.truth.photo_parameters[:, 6:], [1, 1], PRINCIPAL_POINT, axis=1)
+        squares.append(
+            (((result.photo_parameters[:, 6:] - truth) / result.photo_sd[:, 6:]) ** 2).mean(axis=0)
+        )
+    # The photos of a ring are wrong together: 12 rings are 12 samples, not 96.
+    np.testing.assert_array_less(np.mean(squares, axis=0), 2.2)
+    np.testing.assert_array_less(0.4, np.mean(squares, axis=0))
+
+
+def test_a_weighted_principal_point_is_an_observation():
+    sd = np.full((8, 11), np.inf)
+    sd[:, 7:9] = 2.0
+    result = adjust(radial(MADE.collection).replace(photo_sd=sd, image_sd=0.3))
+    table = result.station_table()
+    assert (table["redundancy_cx"] > 0.05).all()
+    assert np.isfinite(table["standardized_cy"]).all()
+    np.testing.assert_allclose(table["residual_cx_px"], PRINCIPAL_POINT[0] - result.photo_parameters[:, 7])
+
+
+def test_report_and_document_name_the_parameters_of_the_camera():
+    result = adjust(radial(MADE.collection))
+    assert "cx, px" in result.report()
+    document = json.loads(result.to_json())
+    assert document["camera"] == "radial"
+    assert document["parameters"][6:] == ["f", "cx", "cy", "k1", "k2"]
+    assert document["units"]["f, cx, cy, residual_px"] == "pixel"
+    assert "(cx, cy) + f (1 + k1 p^2" in document["conventions"]["camera"]
+    assert {"sd_cx_px", "sd_k1"} <= set(result.photo_table())
+
+
+def test_every_model_of_the_crate_can_be_named():
+    for name in _photocore.CAMERAS:
+        formula, parameters = _photocore.camera_model(name)
+        assert "image = " in formula
+        values = np.ones((1, 6 + len(parameters)))
+        collection = Collection(values, np.ones((1, 3)), [0], [0], np.ones((1, 2)), camera=name)
+        assert len(collection.units) == len(collection.parameters) == values.shape[1]
+        assert np.isfinite(collection.computed_xy()).all()
+
+
+def test_models_that_cannot_be_are_refused_by_name():
+    with pytest.raises(InputError, match="camera is one of perspective, bal, radial, not 'x'"):
+        MADE.collection.replace(camera="x")
+    with pytest.raises(InputError, match=r"photo_parameters has the shape \(8, 9\), not \(8, 11\)"):
+        MADE.collection.replace(camera="radial")
+    with pytest.raises(ValueError, match="camera cannot be"):
+        _photocore.camera_model("x")
