@@ -167,7 +167,7 @@ impl Assembled {
         let photos = photos.map(|&photo| model.of_block(photo).start);
         let lengths = |first: usize| {
             let at = std::array::from_fn(|k| self.problem.initial[first + k]);
-            let partials = *Point::new(model.space, at).partials();
+            let partials = Point::new(model.space, at).partials();
             [0, 1, 2].map(|k| (first + k, partials.column(k).norm()))
         };
         let carriers = points.chain(photos).flat_map(lengths).collect();
