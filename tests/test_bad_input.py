@@ -250,12 +250,23 @@ def test_photo_with_two_images(small_block):
 
 def test_no_control_and_no_weights(small_block):
     free = small_block.replace(point_sd=np.array(np.inf))
-    with pytest.raises(RankError, match="all 6 photos together") as caught:
-        adjust(free)
-    assert "leave 7 combinations of unknowns undetermined" in str(caught.value)
-    assert "there is no control; standard deviations for the positions" in str(caught.value)
-    assert "datum" in str(caught.value)
-    assert caught.value.photos == small_block.photo_ids
+    controlled = adjust(small_block)
+    for as_published in (None, AsPublished()):
+        result = adjust(free, as_published=as_published)
+        assert result.converged
+        # The middle photo of the first strip sees most; that of the other strip at the other end is farthest.
+        assert "there is no control, and nothing else gives a datum: held at" in str(result.messages[0])
+        assert "phi of 0102" in str(result.messages[0])
+        assert "there is no control" in result.report().split("Adjustment")[0]
+        free_of = result.counts.observations + result.counts.weighted - result.counts.unknowns
+        assert np.nansum(result.redundancy) == pytest.approx(free_of, abs=1e-6)
+    # Distances are those of the scale that was held; their ratios are those of the controlled block.
+    ratio = [
+        np.linalg.norm(np.subtract(*each.photo_positions[[0, 2]]))
+        / np.linalg.norm(np.subtract(*each.photo_positions[[0, 5]]))
+        for each in (adjust(free), controlled)
+    ]
+    assert ratio[0] == pytest.approx(ratio[1], rel=1e-3)
 
 
 def test_no_control_but_weights(small_block):

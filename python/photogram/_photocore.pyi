@@ -563,6 +563,13 @@ class BlockSolution(_NetworkSolution):
         """
 
     @property
+    def datum(self) -> list[tuple[int, int]]:
+        """Photos and their unknowns (0 to 5) held to give a datum.
+
+        Empty where observations and weights give one.
+        """
+
+    @property
     def dropped(self) -> list[tuple[int, str]]:
         """Points left out, each with the reason."""
 
@@ -1433,4 +1440,4 @@ class CollectionSolution(_NetworkSolution):
 
     @property
     def datum(self) -> list[tuple[int, int]]:
-        """Photos and parameters held to give the cofactors a datum."""
+        """Photos and parameters held to give a datum; empty where observations and weights give one."""

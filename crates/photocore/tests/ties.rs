@@ -5,7 +5,10 @@
 use std::ops::ControlFlow;
 
 use faer::{Mat, Side};
-use photocore::adjustment::{Datum, Loss, Method, Model, Options, Problem, Status, Stop, adjust, in_datum};
+use photocore::adjustment::{
+    Datum, DatumError, Loss, Method, Model, Motions, Options, Problem, Published, Status, Stop, adjust,
+    in_datum,
+};
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -50,8 +53,17 @@ impl Model for Trilateration {
         rows.coefficients[2..].copy_from_slice(&partials.map(|value| -value));
     }
 
-    fn datum(&self, _unknowns: &[f64]) -> Vec<usize> {
-        self.held.clone()
+    fn motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        let preferred = self.held.iter().copied().chain(0..unknowns.len()).collect();
+        Some(Motions { vectors: null_vectors(unknowns), preferred })
+    }
+
+    fn move_along(&self, unknowns: &mut [f64], amounts: &[f64]) {
+        let (sin, cos) = amounts[2].sin_cos();
+        for point in unknowns.chunks_exact_mut(2) {
+            let [x, y] = [point[0], point[1]];
+            (point[0], point[1]) = (cos * x - sin * y + amounts[0], sin * x + cos * y + amounts[1]);
+        }
     }
 }
 
@@ -163,10 +175,10 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     let pool = pool();
     let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
     assert_eq!(found.status, Status::Converged);
-    let all: Vec<usize> = (0..problem.layout().unknowns()).collect();
-    let datum = Datum { vectors: null_vectors(&found.unknowns), carriers: all };
-    let free = in_datum(&problem, &found, &datum, &problem.initial, &pool, &mut go).unwrap();
-    let a = design(&problem, &found.unknowns);
+    let all = (0..problem.layout().unknowns()).map(|unknown| (unknown, 1.0)).collect();
+    let datum = Datum { carriers: all, left: vec![] };
+    let free = in_datum(&problem, &options(), &found, &datum, &problem.initial, &pool, &mut go).unwrap();
+    let a = design(&problem, &free.unknowns);
     let q = pseudo_inverse(&a);
     for kept in 0..12 {
         assert!(kept_block(&problem, &free.cofactors.kept, kept, &q) < 1e-9);
@@ -179,7 +191,7 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
         }
     }
     // The carriers move least: what they have moved has no part along the null vectors.
-    for vector in null_vectors(&found.unknowns) {
+    for vector in null_vectors(&free.unknowns) {
         let along: f64 =
             vector.iter().zip(&free.unknowns).zip(&problem.initial).map(|((g, x), x0)| g * (x - x0)).sum();
         let length = vector.iter().map(|g| g * g).sum::<f64>().sqrt();
@@ -205,8 +217,8 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
         let problem = network(held);
         let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
         // Carried by three kept points only.
-        let datum = Datum { vectors: null_vectors(&found.unknowns), carriers: (20..26).collect() };
-        in_datum(&problem, &found, &datum, &problem.initial, &pool, &mut go).unwrap()
+        let datum = Datum { carriers: (20..26).map(|unknown| (unknown, 1.0)).collect(), left: vec![] };
+        in_datum(&problem, &options(), &found, &datum, &problem.initial, &pool, &mut go).unwrap()
     };
     let one = in_datum_of(vec![16, 17, 19]);
     let other = in_datum_of(vec![38, 39, 30]);
@@ -221,14 +233,45 @@ fn too_few_carriers_are_refused() {
     let problem = network(vec![16, 17, 19]);
     let pool = pool();
     let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
-    // One point carries shifts, but no rotation about itself.
-    let origin: Vec<f64> = found
-        .unknowns
-        .chunks_exact(2)
-        .flat_map(|p| [p[0] - found.unknowns[16], p[1] - found.unknowns[17]])
-        .collect();
-    let datum = Datum { vectors: null_vectors(&origin), carriers: vec![16, 17] };
-    assert!(in_datum(&problem, &found, &datum, &problem.initial, &pool, &mut go).is_err());
+    // One point carries shifts, but no rotation about itself; one coordinate of four points no shift along the other.
+    for carriers in [vec![16, 17], vec![16, 18, 20, 22]] {
+        let carriers = carriers.into_iter().map(|unknown| (unknown, 1.0)).collect();
+        let datum = Datum { carriers, left: vec![] };
+        let refused = in_datum(&problem, &options(), &found, &datum, &problem.initial, &pool, &mut go);
+        assert_eq!(refused.unwrap_err(), DatumError::NotCarried);
+    }
+}
+
+#[test]
+fn what_is_open_is_found_by_trying_and_held() {
+    let pool = pool();
+    let adjusted = |change: &dyn Fn(&mut Problem<Trilateration>), method: Method| {
+        let mut problem = network(vec![16, 17, 19]);
+        change(&mut problem);
+        (adjust(&problem, &Options { method, ..options() }, &pool, &mut go).unwrap(), problem)
+    };
+    for method in [
+        Method::default(),
+        Method::TrustRegion(Stop::Decrease(1e-14)),
+        Method::Full(Published::Percent(1e-6)),
+    ] {
+        let (free, _) = adjusted(&|_| {}, method);
+        assert_eq!((free.status, &free.datum[..]), (Status::Converged, &[16, 17, 19][..]), "{method:?}");
+        let redundancy: f64 = free.redundancy.iter().flatten().sum();
+        assert!((redundancy - free.counts.degrees_of_freedom() as f64).abs() < 1e-8);
+        assert_eq!(free.counts.degrees_of_freedom(), 32 + 36 - 40 + 3);
+        // A fixed point leaves the rotation; one that is observed in x the shift along y and the rotation.
+        let (turning, _) = adjusted(&|problem| problem.sd[24..26].fill(0.0), method);
+        assert_eq!(turning.datum, [16]);
+        let (loose, _) = adjusted(&|problem| problem.sd[24] = 0.5, method);
+        assert_eq!(loose.datum, [16, 17]);
+        // Two give a datum.
+        let (placed, problem) = adjusted(&|problem| problem.sd[24..28].fill(0.5), method);
+        assert!(placed.datum.is_empty());
+        let datum = Datum { carriers: (0..40).map(|unknown| (unknown, 1.0)).collect(), left: vec![] };
+        let refused = in_datum(&problem, &options(), &placed, &datum, &problem.initial, &pool, &mut go);
+        assert_eq!(refused.unwrap_err(), DatumError::NotFree);
+    }
 }
 
 #[test]

@@ -13,7 +13,7 @@ from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["behind", "hidden", "rounded", "too_coarse", "undetermined"]
+__all__ = ["behind", "datum", "hidden", "rounded", "too_coarse", "undetermined"]
 
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
@@ -27,19 +27,38 @@ def undetermined(
     if error is not None:
         messages.append(Message(f"there are no covariances: {error}"))
     if solution.weak:
-        names = [*position_columns(block), *ATTITUDE_COLUMNS]
-        moved = [
-            f"{names[unknown].removesuffix('_deg')} of"
-            f" {listed([block.photo_ids[photo] for photo, other in solution.weak if other == unknown])}"
-            for unknown in sorted({unknown for _, unknown in solution.weak})
-        ]
         messages.append(
             Message(
                 "the sum of squares stands still, but the observations hardly determine a combination of"
-                f" unknowns that moves {'; '.join(moved)}: other values along it fit as well"
+                f" unknowns that moves {_unknowns(block, solution.weak)}: other values along it fit as well"
             )
         )
     return messages
+
+
+def datum(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+    """Remark on what a block without control rests on: the weights of its photos, or what was held."""
+    held = np.isfinite(block.point_sd) & (solution.point_rays > 0)[:, np.newaxis]
+    if solution.datum:
+        return [
+            Message(
+                "there is no control, and nothing else gives a datum: held at their initial values are"
+                f" {_unknowns(block, solution.datum)}; coordinates and standard deviations refer to these"
+            )
+        ]
+    if held.any() or (block.photo_position_sd == 0).all():
+        return []
+    return [Message("there is no control: the datum of the block rests on the weights of its photos")]
+
+
+def _unknowns(block: Block, unknowns: list[tuple[int, int]]) -> str:
+    """Name photos and their unknowns (0 to 5)."""
+    names = [*position_columns(block), *ATTITUDE_COLUMNS]
+    return "; ".join(
+        f"{names[unknown].removesuffix('_deg')} of"
+        f" {listed([block.photo_ids[photo] for photo, other in unknowns if other == unknown])}"
+        for unknown in sorted({unknown for _, unknown in unknowns})
+    )
 
 
 def rounded(excess: float | None) -> list[Message]:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.prediction import predict
@@ -121,6 +123,13 @@ def plan(
         raise InputError("a plan needs one block, or several with the same linear unit and kind of space")
     made = []
     for name, block in patterns.items():
+        if not (np.isfinite(block.point_sd).any() or np.isfinite(block.photo_position_sd).any()):
+            raise RankError(
+                f"{name}: the observations leave position and scale open: a plan needs control, or standard"
+                " deviations for the positions of photos",
+                list(block.photo_ids),
+                [],
+            )
         try:
             made.append(Pattern(name, predict(block, threads=threads, progress=progress)))
         except RankError as error:

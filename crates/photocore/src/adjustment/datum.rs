@@ -2,33 +2,38 @@
 //! "S-transformations and criterion matrices").
 //!
 //! Where observations leave d degrees of freedom of a network open (its position, its orientation, its scale), the columns of G, the
-//! *null vectors*, say how the unknowns move along them: A G = 0. A datum is a choice of d conditions; here B^T dx = 0, B being G
-//! in the rows of the unknowns that carry the datum and zero elsewhere: these unknowns move least (inner constraints over all of
-//! them, Meissl 1969). With x and Q in any datum,
+//! *null vectors*, say how the unknowns move along them: A G = 0 (see [`Motions`]). A datum is a choice of d conditions; here
+//! B^T (x - x_0) = 0, B being G in the rows of the unknowns that carry the datum and zero elsewhere: these unknowns move least (inner
+//! constraints over all of them, Meissl 1969), their rows of B being multiplied by the squares of their factors. The network is moved
+//! there as a whole, exactly; with Q in any datum there,
 //!
-//! S = I - G (B^T G)^-1 B^T,    x_S = x_0 + S (x - x_0),    Q_S = S Q S^T,
+//! S = I - G (B^T G)^-1 B^T,    Q_S = S Q S^T,
 //!
-//! and with F = G (B^T G)^-1 and P = Q B, which takes d further right-hand sides, a block of it is
-//! Q_ij - F_i P_j^T - P_i F_j^T + F_i (B^T P) F_j^T. Redundancy numbers and residuals are the same in every datum.
+//! and with T = G (B^T G)^-1 and W = Q B, which takes d further right-hand sides, a block of it is
+//! Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W) T_j^T. Redundancy numbers and residuals are the same in every datum.
 
 use std::ops::{ControlFlow, Range};
 
-use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 use rayon::ThreadPool;
+use thiserror::Error;
 
-use super::normal_equations::NormalEquations;
-use super::problem::{Model, Problem};
+use super::loss::Reweighting;
+use super::motions::{Motions, Open};
+use super::options::Options;
+use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, Adjustment};
-use crate::normals::{Cofactors, Layout};
+use super::run::unless_stopped;
+use crate::normals::{Cofactors, Inversion, Layout};
 
 /// A datum of a network whose observations leave one open.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Datum {
-    /// The null vectors G at the adjusted values, each of the length of the vector of unknowns.
-    pub vectors: Vec<Vec<f64>>,
-    /// The unknowns that carry the datum.
-    pub carriers: Vec<usize>,
+    /// The unknowns that carry it, each with the factor that makes its changes comparable with those of the others: units of length in
+    /// one of its own.
+    pub carriers: Vec<(usize, f64)>,
+    /// Those of the model's motions that stay with the unknowns that are held: their numbers. A network keeps its scale so.
+    pub left: Vec<usize>,
 }
 
 /// An adjusted network in another datum.
@@ -40,74 +45,181 @@ pub struct InDatum {
     pub cofactors: Cofactors,
 }
 
+/// Why an adjusted network cannot be taken to a datum.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum DatumError {
+    /// Observations and weights leave nothing open: there is one datum only, that which they give.
+    #[error("the network is not free: its observations and weights give its datum")]
+    NotFree,
+    /// The adjustment ended without cofactors, or without a datum.
+    #[error("the adjusted network has no cofactors")]
+    NoCofactors,
+    /// The carriers do not tell all motions apart: too few, on one line, in one place.
+    #[error("what is to carry the datum does not determine it")]
+    NotCarried,
+    /// What ends adjustments.
+    #[error(transparent)]
+    Adjust(#[from] AdjustError),
+}
+
 /// Null vectors that the carriers tell apart by less than this share are not carried.
 const SEPARABLE: f64 = 1e-10;
+/// The network is moved until so many moves have not halved what the carriers are still to go: rounding then.
+const STALLS: usize = 3;
+/// Moves converge quadratically, near the end.
+const MOST_MOVES: usize = 100;
 
 /// Takes an adjusted network to another datum.
 ///
+/// * `options`: those of the adjustment;
 /// * `adjustment`: with cofactors, in the datum of the unknowns it held;
 /// * `reference`: the values x_0 from which the carriers move least, usually the initial ones.
 ///
 /// # Errors
-/// An adjustment without cofactors, or carriers that do not carry all null vectors: [`AdjustError::Undetermined`]; an interruption.
+/// A network that is not free, carriers that do not carry all null vectors, an adjustment without cofactors; an interruption.
 pub fn in_datum<M: Model>(
     problem: &Problem<M>,
+    options: &Options,
     adjustment: &Adjustment,
     datum: &Datum,
     reference: &[f64],
     pool: &ThreadPool,
     between: &mut dyn FnMut(usize) -> ControlFlow<()>,
-) -> Result<InDatum, AdjustError> {
-    let undetermined = || AdjustError::Undetermined(vec![]);
-    let mut cofactors = adjustment.cofactors.clone().ok_or_else(undetermined)?;
-    let held = &adjustment.datum;
-    let (count, vectors) = (problem.layout().unknowns(), datum.vectors.len());
-    let g = Mat::from_fn(count, vectors, |i, k| datum.vectors[k][i]);
-    let mut b = Mat::<f64>::zeros(count, vectors);
-    for &carrier in &datum.carriers {
-        (0..vectors).for_each(|k| b[(carrier, k)] = g[(carrier, k)]);
+) -> Result<InDatum, DatumError> {
+    if adjustment.cofactors.is_none() {
+        return Err(DatumError::NoCofactors);
     }
-    let f = inverted(&b, &g).ok_or_else(undetermined)?;
+    let (unknowns, basis) = moved(problem, &adjustment.unknowns, datum, reference, pool)?;
+    let held = &adjustment.datum;
+    let reweighting = options.loss.map(|loss| Reweighting { loss, curved: false });
+    let equations = pool.install(|| Linearized::new(problem, &unknowns, held, reweighting));
+    let prior = problem.prior_equations(&unknowns, held);
+    let factor = unless_stopped(problem.system.factor(pool, &equations, &prior, 0.0, between))?;
 
     // Held unknowns stand in the normal equations with unit weight: their columns of Q are zero.
-    let mut rights = vec![0.0; count * vectors];
-    for k in 0..vectors {
-        let free = |carrier: &&usize| !held.contains(carrier) && problem.sd[**carrier] != 0.0;
-        datum.carriers.iter().filter(free).for_each(|&carrier| rights[k * count + carrier] = b[(carrier, k)]);
+    let (count, d) = (unknowns.len(), basis.t.ncols());
+    let mut rights = vec![0.0; count * d];
+    let free = |unknown: usize| !held.contains(&unknown) && problem.sd[unknown] != 0.0;
+    for (row, &(carrier, _)) in datum.carriers.iter().enumerate().filter(|(_, carrier)| free(carrier.0)) {
+        (0..d).for_each(|k| rights[k * count + carrier] = basis.b[(row, k)]);
     }
-    let unknowns = &adjustment.unknowns;
-    let normal = NormalEquations::form(problem, unknowns, held, pool, between)?;
-    let columns = normal.solve_for(&rights, between)?;
-    let p = Mat::from_fn(count, vectors, |i, k| columns[k * count + i]);
-    let common = b.transpose() * &p;
+    let solved = problem.system.solve_for(pool, &factor, &equations, &prior, 0.0, &rights, between);
+    let columns = unless_stopped(solved)?;
+    let w = Mat::from_fn(count, d, |i, k| columns[k * count + i]);
+    let of_carriers = Mat::from_fn(datum.carriers.len(), d, |row, k| w[(datum.carriers[row].0, k)]);
+    let common = basis.b.transpose() * of_carriers;
 
-    let transformation = Transformation { f: &f, p: &p, common: &common };
-    transformation.apply(problem.layout(), &mut cofactors);
-    let moved = Mat::from_fn(count, 1, |i, _| unknowns[i] - reference[i]);
-    let back = &f * (b.transpose() * moved);
-    let step: Vec<f64> = (0..count).map(|i| -back[(i, 0)]).collect();
-    Ok(InDatum { unknowns: problem.advanced(unknowns, &step), cofactors })
+    let inverted = problem.system.invert(pool, factor, &equations, &prior, between);
+    let Inversion { mut cofactors, .. } = unless_stopped(inverted)?;
+    problem.finish_cofactors(&mut cofactors, held);
+    Transformation { t: &basis.t, w: &w, common: &common }.apply(problem.layout(), &mut cofactors);
+    Ok(InDatum { unknowns, cofactors })
 }
 
-/// G (B^T G)^-1; None where the carriers do not carry all null vectors. B^T G is the sum over the carriers of the squares of G,
-/// symmetric: its columns are brought to one scale before.
-fn inverted(b: &Mat<f64>, g: &Mat<f64>) -> Option<Mat<f64>> {
-    let product = b.transpose() * g;
-    let scale: Vec<f64> = (0..product.nrows()).map(|k| product[(k, k)].sqrt().recip()).collect();
-    let scaled = Mat::from_fn(product.nrows(), product.ncols(), |i, k| product[(i, k)] * scale[i] * scale[k]);
+/// B in the rows of the carriers, and T = G (B^T G)^-1, in the columns for which B divided by the factors is orthonormal.
+struct Basis {
+    b: Mat<f64>,
+    t: Mat<f64>,
+}
+
+/// The basis, and how the carriers would come nearer to their references.
+struct Carried {
+    basis: Basis,
+    /// Of each open combination.
+    amounts: Vec<f64>,
+    /// By how much they would, in units of length, all taken together.
+    length: f64,
+}
+
+/// Moves a network as a whole to where its carriers are as near to their references as they come.
+///
+/// Gauss and Newton's method for least squares of the distances, with exact motions.
+fn moved<M: Model>(
+    problem: &Problem<M>,
+    adjusted: &[f64],
+    datum: &Datum,
+    reference: &[f64],
+    pool: &ThreadPool,
+) -> Result<(Vec<f64>, Basis), DatumError> {
+    let mut unknowns = adjusted.to_vec();
+    let (mut before, mut stalls) = (f64::INFINITY, 0);
+    for _ in 0..MOST_MOVES {
+        let (motions, kept) = motions_of(problem, &unknowns, datum, pool).ok_or(DatumError::NotFree)?;
+        let open = problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?;
+        let Carried { basis, amounts, length } =
+            carried(&open, datum, &unknowns, reference).ok_or(DatumError::NotCarried)?;
+        stalls += usize::from(length >= 0.5 * before);
+        if length == 0.0 || stalls == STALLS {
+            return Ok((unknowns, basis));
+        }
+        before = length;
+        let mut along = vec![0.0; kept.1];
+        for (row, &motion) in kept.0.iter().enumerate() {
+            along[motion] = (0..amounts.len()).map(|k| open.combinations[(row, k)] * amounts[k]).sum();
+        }
+        problem.model.move_along(&mut unknowns, &along);
+    }
+    Err(DatumError::NotCarried)
+}
+
+/// The motions that the datum does not leave, their numbers, and how many there are in all.
+fn motions_of<M: Model>(
+    problem: &Problem<M>,
+    unknowns: &[f64],
+    datum: &Datum,
+    pool: &ThreadPool,
+) -> Option<(Motions, (Vec<usize>, usize))> {
+    let Motions { mut vectors, preferred } = pool.install(|| problem.model.motions(unknowns))?;
+    let all = vectors.len();
+    let kept: Vec<usize> = (0..all).filter(|number| !datum.left.contains(number)).collect();
+    let vectors = kept.iter().map(|&number| std::mem::take(&mut vectors[number])).collect();
+    Some((Motions { vectors, preferred }, (kept, all)))
+}
+
+/// The basis at some values, and by how much the open combinations still bring the carriers nearer to their references: with F G = Q R,
+/// F the factors, B^T G = R^T R, so that in the columns of G R^-1 it is I. None where the carriers do not carry all null vectors.
+fn carried(open: &Open, datum: &Datum, unknowns: &[f64], reference: &[f64]) -> Option<Carried> {
+    let g = &open.vectors;
+    let d = g.ncols();
+    let scaled_row = |row: usize, k: usize| datum.carriers[row].1 * g[(datum.carriers[row].0, k)];
+    let b = Mat::from_fn(datum.carriers.len(), d, scaled_row);
+    if b.nrows() < d {
+        return None;
+    }
+    let product = b.transpose() * &b;
+    let scale: Vec<f64> = (0..d).map(|k| product[(k, k)].sqrt().recip()).collect();
+    let scaled = Mat::from_fn(d, d, |i, k| product[(i, k)] * scale[i] * scale[k]);
     let least = scaled.self_adjoint_eigenvalues(Side::Lower).ok()?.first().copied()?;
     if least.is_nan() || least <= SEPARABLE {
         return None;
     }
-    let inverse = scaled.llt(Side::Lower).ok()?.inverse();
-    let unscaled =
-        Mat::from_fn(inverse.nrows(), inverse.ncols(), |i, k| inverse[(i, k)] * scale[i] * scale[k]);
-    Some(g * unscaled)
+    let decomposed = b.qr();
+    let (q, r) = (decomposed.compute_thin_Q(), decomposed.thin_R().to_owned());
+    // G R^-1, column by column from the left.
+    let mut t = g.clone();
+    for k in 0..d {
+        for i in 0..t.nrows() {
+            let before: f64 = (0..k).map(|m| t[(i, m)] * r[(m, k)]).sum();
+            t[(i, k)] = (t[(i, k)] - before) / r[(k, k)];
+        }
+    }
+    let apart = |row: usize| {
+        let (carrier, factor) = datum.carriers[row];
+        factor * (reference[carrier] - unknowns[carrier])
+    };
+    let mut amounts: Vec<f64> =
+        (0..d).map(|k| (0..q.nrows()).map(|row| q[(row, k)] * apart(row)).sum()).collect();
+    let length = amounts.iter().map(|amount| amount * amount).sum::<f64>().sqrt();
+    for k in (0..d).rev() {
+        let after: f64 = (k + 1..d).map(|m| r[(k, m)] * amounts[m]).sum();
+        amounts[k] = (amounts[k] - after) / r[(k, k)];
+    }
+    let b = Mat::from_fn(q.nrows(), d, |row, k| datum.carriers[row].1 * q[(row, k)]);
+    Some(Carried { basis: Basis { b, t }, amounts, length })
 }
-
 struct Transformation<'a> {
-    f: &'a Mat<f64>,
-    p: &'a Mat<f64>,
+    t: &'a Mat<f64>,
+    w: &'a Mat<f64>,
     common: &'a Mat<f64>,
 }
 
@@ -140,13 +252,13 @@ impl Transformation<'_> {
         let d = self.common.nrows();
         let width = columns.len();
         for (i, row) in rows.enumerate() {
-            let f_common: Vec<f64> =
-                (0..d).map(|k| (0..d).map(|m| self.f[(row, m)] * self.common[(m, k)]).sum()).collect();
+            let t_common: Vec<f64> =
+                (0..d).map(|k| (0..d).map(|m| self.t[(row, m)] * self.common[(m, k)]).sum()).collect();
             for (j, column) in columns.clone().enumerate() {
                 block[i * width + j] += (0..d)
                     .map(|k| {
-                        (f_common[k] - self.p[(row, k)]) * self.f[(column, k)]
-                            - self.f[(row, k)] * self.p[(column, k)]
+                        (t_common[k] - self.w[(row, k)]) * self.t[(column, k)]
+                            - self.t[(row, k)] * self.w[(column, k)]
                     })
                     .sum::<f64>();
             }

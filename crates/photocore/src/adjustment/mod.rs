@@ -58,6 +58,7 @@ mod datum;
 mod distributions;
 mod loss;
 mod method;
+mod motions;
 mod normal_equations;
 mod options;
 mod problem;
@@ -68,12 +69,13 @@ mod statistics;
 mod trust_region;
 mod walk;
 
-pub use datum::{Datum, InDatum, in_datum};
+pub use datum::{Datum, DatumError, InDatum, in_datum};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
 };
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
+pub use motions::Motions;
 pub use normal_equations::NormalEquations;
 pub use options::{Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Problem};

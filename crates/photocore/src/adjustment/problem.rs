@@ -3,6 +3,7 @@
 use rayon::ThreadPool;
 
 use super::loss::Reweighting;
+use super::motions::Motions;
 use crate::normals::{Equations, GroupRows, Layout, Prior, System, TieRows};
 
 /// How observations follow from unknowns.
@@ -39,10 +40,21 @@ pub trait Model: Sync {
         vec![]
     }
 
-    /// Unknowns that give a datum when they are held at their values, without forcing the observations: one for each degree of freedom
-    /// that these leave open. Empty where observations and weights give a datum.
-    fn datum(&self, _unknowns: &[f64]) -> Vec<usize> {
-        vec![]
+    /// Motions of the whole that observations and weights may leave open at the given values. Which of them they do leave open is found by
+    /// trying, and as many unknowns are held; None where it is known that they give a datum, which then costs nothing.
+    fn motions(&self, _unknowns: &[f64]) -> Option<Motions> {
+        None
+    }
+
+    /// Moves the unknowns by amounts of its motions, which need not be small. By default along their vectors, which is exact where the
+    /// motions are linear in the unknowns.
+    fn move_along(&self, unknowns: &mut [f64], amounts: &[f64]) {
+        let Some(motions) = self.motions(unknowns) else { return };
+        let mut step = vec![0.0; unknowns.len()];
+        for (vector, amount) in motions.vectors.iter().zip(amounts) {
+            step.iter_mut().zip(vector).for_each(|(x, g)| *x += amount * g);
+        }
+        self.advance(unknowns, &step);
     }
 }
 
@@ -125,6 +137,11 @@ impl<'a, M: Model> Linearized<'a, M> {
         held.iter().for_each(|&unknown| fixed[unknown] = true);
         let fixed = fixed.contains(&true).then_some(fixed);
         Self { problem, prepared: problem.model.prepare(values), fixed, reweighting }
+    }
+
+    /// With the columns of fixed unknowns, and without a loss.
+    pub fn of_all(problem: &'a Problem<M>, values: &[f64]) -> Self {
+        Self { problem, prepared: problem.model.prepare(values), fixed: None, reweighting: None }
     }
 
     /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).

@@ -51,7 +51,7 @@ pub struct Adjustment {
     /// The unknowns, none of them local, that a combination moves which is determined so weakly that the sum of squares stood still
     /// while no full step along it lowered it; none where the adjustment ended otherwise.
     pub weak: Vec<usize>,
-    /// The unknowns held to give the cofactors a datum (see [`super::Model::datum`]), none where the problem has one.
+    /// The unknowns held to give a datum (see [`super::Model::motions`]), none where the problem has one.
     pub datum: Vec<usize>,
     /// Redundancy number of each observation, when asked for.
     pub redundancy: Option<Vec<f64>>,

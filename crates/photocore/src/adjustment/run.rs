@@ -65,7 +65,13 @@ pub fn adjust<M: Model>(
         weak: vec![],
         collapsed: vec![],
     };
-    let damping = if let Method::TrustRegion(_) = options.method { FIRST_DAMPING } else { 0.0 };
+    let damping = match options.method {
+        Method::TrustRegion(_) => FIRST_DAMPING,
+        Method::Full(_) | Method::Damped(_) => {
+            run.datum = problem.to_hold(&problem.initial, pool);
+            0.0
+        }
+    };
     let start = run.form(problem.initial.clone(), damping)?;
     if !start.sum_of_squares.is_finite() {
         return Err(AdjustError::NotFinite);
@@ -148,7 +154,7 @@ pub(super) struct Run<'a, 'w, M: Model> {
     pub iterations: Vec<Iteration>,
     history: Vec<Vec<f64>>,
     last_local_corrections: Vec<f64>,
-    /// Unknowns held for a datum; empty until the iterations are over.
+    /// Unknowns held for a datum; in a trust region empty until the iterations are over.
     pub datum: Vec<usize>,
     /// Whether to take in the second-order term of the loss from now on: once the steps are short.
     pub curved: bool,

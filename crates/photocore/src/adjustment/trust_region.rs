@@ -126,9 +126,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
         Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone(), None)))
     }
 
-    /// Ends at the values reached, in the datum that the model chooses.
+    /// Ends at the values reached, with a datum there.
     fn rest(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a, M>, AdjustError> {
-        self.datum = self.problem.model.datum(&unknowns);
+        self.datum = self.problem.to_hold(&unknowns, self.pool);
         if !self.options.covariance {
             return Ok(End::at(status, unknowns, None));
         }

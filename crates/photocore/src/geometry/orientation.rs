@@ -1,5 +1,7 @@
 //! A photo's pose with what each of its six unknowns does to it: position and rotation step, or the numbers of a file.
 
+use nalgebra::Matrix6;
+
 use super::attitude::{AttitudeNumbers, RotationSense};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
 use super::space::{Lift, ObjectSpace, Point};
@@ -154,6 +156,17 @@ impl Orientation {
                 [0, 1, 2].map(|k| (3 + k, u[k]))
             }
         }
+    }
+
+    /// How the six unknowns move with a step of the pose, dC, then rho: the inverse of [`Orientation::steps`]. None where angles are
+    /// singular.
+    pub fn unknowns_by_step(&self) -> Option<Matrix6<f64>> {
+        let mut steps = Matrix6::zeros();
+        for (k, (shift, rho)) in self.steps().iter().enumerate() {
+            steps.fixed_view_mut::<3, 1>(0, k).copy_from(shift);
+            steps.fixed_view_mut::<3, 1>(3, k).copy_from(rho);
+        }
+        steps.try_inverse()
     }
 
     /// u, the point in the photo's axes.

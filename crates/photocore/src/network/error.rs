@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::observations::Fault;
 use super::precision::Coarse;
 use super::problem::Assembled;
-use crate::adjustment::{AdjustError, gib};
+use crate::adjustment::{AdjustError, DatumError, gib};
 use crate::normals::LayoutError;
 
 /// Why a network cannot be adjusted, or has no cofactors. Photos, cameras and points are indices into the network.
@@ -31,7 +31,7 @@ pub enum NetworkError {
         fault: Fault,
     },
     /// Poses in vectors in a space where they are not defined.
-    #[error("poses in vectors need rectangular space and no refraction")]
+    #[error("poses in vectors need rectangular space and no refraction, and carry no datum")]
     Vectors,
     /// Nothing to adjust.
     #[error("no point is left to adjust: none is on two photos")]
@@ -65,6 +65,9 @@ pub enum NetworkError {
     /// An allocation of so many bytes failed.
     #[error("there is no memory for an array of {0} bytes")]
     OutOfMemory(usize),
+    /// It cannot be taken to a datum.
+    #[error(transparent)]
+    Datum(#[from] DatumError),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),

@@ -52,6 +52,7 @@
 //! ```
 
 mod cameras;
+mod datum;
 mod error;
 mod model;
 mod neighbourhood;
@@ -71,6 +72,7 @@ use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
 pub use cameras::AdjustedCamera;
+pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
@@ -230,6 +232,30 @@ impl Network {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
+        self.adjusted(options, None, pool, watch)
+    }
+
+    /// Adjusts a network that is free, and takes it to the datum of inner constraints.
+    ///
+    /// # Errors
+    /// Those of [`Network::adjust`]; a network that is not free, or points and photos that do not carry its datum.
+    pub fn adjust_in_datum(
+        &self,
+        options: &Options,
+        datum: &InnerConstraints,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solution, NetworkError> {
+        self.adjusted(options, Some(datum), pool, watch)
+    }
+
+    fn adjusted(
+        &self,
+        options: &Options,
+        datum: Option<&InnerConstraints>,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solution, NetworkError> {
         self.check()?;
         let mut left_out = vec![false; self.points.len()];
         let mut before: Option<(Adjustment, problem::Reached)> = None;
@@ -253,6 +279,9 @@ impl Network {
             let earlier = before.take();
             adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
             if adjusted.collapsed.is_empty() {
+                if let Some(inner) = datum {
+                    self.take_to(inner, &options.adjustment, &assembled, &mut adjusted, pool, watch)?;
+                }
                 let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
                 return Ok(Solution::new(self, options, &assembled, adjusted, collapsed));
             }
@@ -260,6 +289,29 @@ impl Network {
             let reached = assembled.reached(&adjusted.unknowns, self.points.len());
             before = Some((adjusted, reached));
         }
+    }
+
+    /// Takes an adjusted network to the datum of inner constraints.
+    fn take_to(
+        &self,
+        inner: &InnerConstraints,
+        options: &adjustment::Options,
+        assembled: &problem::Assembled,
+        adjusted: &mut Adjustment,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<(), NetworkError> {
+        if self.poses == PoseNumbers::Vectors && !inner.photos.is_empty() {
+            return Err(NetworkError::Vectors);
+        }
+        let (datum, reference) = assembled.datum(inner);
+        let total = assembled.points.len();
+        let mut between = |done| watch(Event::Progress { phase: adjustment::Phase::Invert, done, total });
+        let problem = &assembled.problem;
+        let found = adjustment::in_datum(problem, options, adjusted, &datum, &reference, pool, &mut between)?;
+        adjusted.unknowns = found.unknowns;
+        adjusted.cofactors = Some(found.cofactors);
+        Ok(())
     }
 
     /// Refuses a network that contradicts itself.

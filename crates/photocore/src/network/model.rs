@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::observations::{TiedModel, TiedObservation};
 use super::{Image, Point};
-use crate::adjustment::Model;
+use crate::adjustment::{Model, Motions};
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
     self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
@@ -418,22 +418,12 @@ impl Model for Bundle {
         near.iter().map(|near| near.point).collect()
     }
 
-    /// The pose of the first photo and, unless an observation gives the scale, the component of another's position or translation that
-    /// changes most when the scale does.
-    fn datum(&self, unknowns: &[f64]) -> Vec<usize> {
-        let kept = self.of_stations();
-        let photos = self.photos(&unknowns[kept.clone()]);
-        let with_images = || (0..photos.len()).filter(|&photo| self.images_on[photo] > 0);
-        let (false, Some(first)) = (self.placed, with_images().next()) else { return vec![] };
-        let centre = photos[first].orientation.centre();
-        let shifts = with_images().filter(|&photo| photo != first).flat_map(|photo| {
-            let shift = photos[photo].orientation.shifts_along(&centre);
-            shift.map(|(number, change)| (change.abs(), self.first[photo] + number))
-        });
-        let scale = shifts.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, unknown)| unknown);
-        let pose = self.first[first]..self.first[first] + 6;
-        let scale = scale.filter(|_| self.observations.is_empty());
-        pose.chain(scale).map(|unknown| kept.start + unknown).collect()
+    fn motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        self.rigid_motions(unknowns)
+    }
+
+    fn move_along(&self, unknowns: &mut [f64], amounts: &[f64]) {
+        self.move_rigidly(unknowns, amounts);
     }
 }
 

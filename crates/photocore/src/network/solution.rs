@@ -96,7 +96,8 @@ pub struct Solution {
     pub weak: Vec<(usize, usize)>,
     /// The same for cameras that several photos share, camera and parameter.
     pub weak_cameras: Vec<(usize, usize)>,
-    /// What was held to give the cofactors a datum: photo and unknown.
+    /// What was held to give a datum where nothing else does: photo and unknown. In the datum of inner constraints, what they were
+    /// taken from.
     pub datum: Vec<(usize, usize)>,
     /// The points that were left out at first.
     pub dropped: Vec<Dropped>,

@@ -94,6 +94,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::CameraDeviations(_)
         | Failure::Observation { .. }
         | Failure::Vectors
+        | Failure::Datum(_)
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
     };

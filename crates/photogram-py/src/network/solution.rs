@@ -186,6 +186,11 @@ macro_rules! solution_class {
                 seconds(py, &self.solution.adjustment)
             }
 
+            #[getter]
+            fn datum(&self) -> Vec<(usize, usize)> {
+                self.solution.datum.clone()
+            }
+
             $($own)*
         }
     };
@@ -284,11 +289,6 @@ solution_class! {
         #[getter]
         fn sum_of_squares(&self) -> f64 {
             self.solution.sums_of_squares.total()
-        }
-
-        #[getter]
-        fn datum(&self) -> Vec<(usize, usize)> {
-            self.solution.datum.clone()
         }
     }
 }

@@ -1,0 +1,214 @@
+//! What observations and weights leave open of a network as a whole, and what to hold where nothing else gives a datum.
+//!
+//! A motion of the whole (a shift, a rotation, a change of scale) moves the unknowns along a vector g. Observations leave it open when no row
+//! of their partials changes: A g = 0. Of several candidates, the columns of G, all combinations z are found with A G z = 0, from the
+//! normal matrix of the candidates, (A G)^T (A G), which takes one pass over the observations and no factorisation.
+
+use faer::{Mat, Side};
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::problem::{Linearized, Model, Problem};
+use super::walk::Buffers;
+use crate::normals::{Equations, Layout};
+
+/// Motions of a network as a whole, which its observations may leave open.
+#[derive(Debug, Clone)]
+pub struct Motions {
+    /// How each moves the unknowns, by a small amount: vectors of their length, in the units of the columns of the partials (see
+    /// [`Model::advance`]).
+    pub vectors: Vec<Vec<f64>>,
+    /// The unknowns that had best be held for a datum, the best first. Those that others hold already are passed over.
+    pub preferred: Vec<usize>,
+}
+
+/// The combinations of motions that are open at some values of the unknowns.
+pub(super) struct Open {
+    /// Motions (rows) in each combination (columns).
+    pub combinations: Mat<f64>,
+    /// The null vectors: how each combination moves the unknowns.
+    pub vectors: Mat<f64>,
+    /// As many unknowns as combinations, where there are so many that tell these apart.
+    pub hold: Vec<usize>,
+}
+
+/// What a combination may change of the observations, as the square of a share of what its parts change, and be rounding.
+const NULL: f64 = 1e-12;
+/// An unknown holds a combination when that moves it by more than this share of what its parts do.
+const HOLDS: f64 = 1e-6;
+/// Local blocks that are added up one after the other.
+const AT_ONCE: usize = 256;
+
+/// Sums over rows a, for candidates k and m. The second and third take the unknowns apart that the first lets act together.
+struct Sums {
+    /// (a . g_k) (a . g_m), and the same of every unknown that is weighted or fixed.
+    together: Vec<f64>,
+    /// The sum of (a_i g_ik)^2 over the unknowns i.
+    apart: Vec<f64>,
+    /// Room for the a . g_k of a row.
+    along: Vec<f64>,
+}
+
+impl Sums {
+    fn zero(count: usize) -> Self {
+        Self { together: vec![0.0; count * count], apart: vec![0.0; count], along: vec![0.0; count] }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.together.iter_mut().zip(&other.together).for_each(|(sum, value)| *sum += value);
+        self.apart.iter_mut().zip(&other.apart).for_each(|(sum, value)| *sum += value);
+    }
+}
+
+/// The candidates, unknown by unknown, and which of the unknowns are fixed.
+struct Candidates<'a> {
+    count: usize,
+    by_unknown: &'a [f64],
+    fixed: &'a [bool],
+}
+
+impl Candidates<'_> {
+    /// How they move an unknown.
+    fn of(&self, unknown: usize) -> &[f64] {
+        &self.by_unknown[unknown * self.count..][..self.count]
+    }
+
+    /// Adds one row of partials. A fixed unknown is an observation of the weight that this row gives it.
+    fn add_row(&self, sums: &mut Sums, row: impl Iterator<Item = (usize, f64)>) {
+        sums.along.fill(0.0);
+        for (unknown, coefficient) in row {
+            let moved = self.of(unknown);
+            for (k, g) in moved.iter().enumerate() {
+                sums.along[k] += coefficient * g;
+                sums.apart[k] += (coefficient * g).powi(2);
+            }
+            if self.fixed[unknown] {
+                add_square(&mut sums.together, coefficient * coefficient, moved);
+            }
+        }
+        add_square(&mut sums.together, 1.0, &sums.along);
+    }
+
+    /// Adds the rows of a local block.
+    fn add_local<E: Equations>(
+        &self,
+        sums: &mut Sums,
+        buffers: &mut Buffers,
+        layout: &Layout,
+        equations: &E,
+        local: usize,
+    ) {
+        for group in layout.groups_of(local) {
+            let mut rows = buffers.rows(layout, group);
+            equations.write(local, group, &mut rows);
+            for row in 0..layout.rows() {
+                let of = |values: &[f64]| {
+                    let width = values.len() / layout.rows();
+                    row * width..(row + 1) * width
+                };
+                let own = layout.local_range(local).zip(&rows.local[of(rows.local)]);
+                let kept = layout.kept_range(layout.kept_of(group)).zip(&rows.kept[of(rows.kept)]);
+                let common = layout.common_columns(group).zip(&rows.common[of(rows.common)]);
+                self.add_row(sums, own.chain(kept).chain(common).map(|(unknown, &value)| (unknown, value)));
+            }
+        }
+    }
+}
+
+/// Adds w (b b^T).
+fn add_square(sum: &mut [f64], weight: f64, b: &[f64]) {
+    let d = b.len();
+    (0..d * d).for_each(|at| sum[at] += weight * b[at / d] * b[at % d]);
+}
+
+impl<M: Model> Problem<M> {
+    /// Which of some motions observations and weights leave open at given values; None where it is none.
+    pub(super) fn open(&self, values: &[f64], motions: &Motions, pool: &ThreadPool) -> Option<Open> {
+        let sums = self.sums(values, motions, pool);
+        let count = motions.vectors.len();
+        let scale: Vec<f64> =
+            sums.apart.iter().map(|&sum| if sum > 0.0 { sum.sqrt().recip() } else { 0.0 }).collect();
+        let scaled = Mat::from_fn(count, count, |k, m| {
+            // What moves nothing that is observed is no motion of this network.
+            if k == m && scale[k] == 0.0 { 1.0 } else { sums.together[k * count + m] * scale[k] * scale[m] }
+        });
+        let eigen = scaled.self_adjoint_eigen(Side::Lower).ok()?;
+        let open: Vec<usize> = (0..count).filter(|&k| eigen.S()[k] < NULL).collect();
+        let combinations =
+            Mat::from_fn(count, open.len(), |k, column| scale[k] * eigen.U()[(k, open[column])]);
+        let along = |unknown: usize, column: usize| -> f64 {
+            (0..count).map(|k| motions.vectors[k][unknown] * combinations[(k, column)]).sum()
+        };
+        let vectors = Mat::from_fn(values.len(), open.len(), along);
+        let length = |&unknown: &usize| {
+            let square = |k: usize| (motions.vectors[k][unknown] * scale[k]).powi(2);
+            (unknown, (0..count).map(square).sum::<f64>().sqrt())
+        };
+        let free = motions.preferred.iter().filter(|&&unknown| self.sd[unknown] != 0.0);
+        let hold = to_hold(&vectors, free.map(length));
+        (!open.is_empty()).then_some(Open { combinations, vectors, hold })
+    }
+
+    /// The unknowns to hold at given values; none where there is a datum.
+    pub(super) fn to_hold(&self, values: &[f64], pool: &ThreadPool) -> Vec<usize> {
+        let motions = pool.install(|| self.model.motions(values));
+        let open = motions.and_then(|motions| self.open(values, &motions, pool));
+        open.map_or(vec![], |open| open.hold)
+    }
+
+    fn sums(&self, values: &[f64], motions: &Motions, pool: &ThreadPool) -> Sums {
+        let layout = self.layout();
+        let count = motions.vectors.len();
+        let moved = |unknown: usize| motions.vectors.iter().map(move |vector| vector[unknown]);
+        let by_unknown: Vec<f64> = (0..values.len()).flat_map(moved).collect();
+        let fixed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
+        let candidates = Candidates { count, by_unknown: &by_unknown, fixed: &fixed };
+        let equations = pool.install(|| Linearized::of_all(self, values));
+        let chunk = |chunk: usize| {
+            let (mut sums, mut buffers) = (Sums::zero(count), Buffers::default());
+            let end = ((chunk + 1) * AT_ONCE).min(layout.locals());
+            for local in chunk * AT_ONCE..end {
+                candidates.add_local(&mut sums, &mut buffers, layout, &equations, local);
+            }
+            sums
+        };
+        let chunks = (0..layout.locals().div_ceil(AT_ONCE)).into_par_iter();
+        let mut sums = Sums::zero(count);
+        pool.install(|| chunks.map(chunk).collect::<Vec<Sums>>()).iter().for_each(|part| sums.add(part));
+        self.for_ties(|tie, rows| {
+            equations.write_tie(tie, rows);
+            let width = layout.tie_columns(tie).count();
+            for row in rows.coefficients.chunks_exact(width.max(1)) {
+                candidates.add_row(&mut sums, layout.tie_columns(tie).zip(row.iter().copied()));
+            }
+        });
+        for unknown in (0..values.len()).filter(|&unknown| self.is_weighted(unknown)) {
+            let (weight, moved) = (self.sd[unknown].powi(2).recip(), candidates.of(unknown));
+            add_square(&mut sums.together, weight, moved);
+            moved.iter().zip(&mut sums.apart).for_each(|(g, sum)| *sum += weight * g * g);
+        }
+        sums
+    }
+}
+
+/// The first of some unknowns, with the lengths of what moves them, that tell the null vectors apart (Gram and Schmidt).
+fn to_hold(vectors: &Mat<f64>, unknowns: impl Iterator<Item = (usize, f64)>) -> Vec<usize> {
+    let d = vectors.ncols();
+    let (mut basis, mut held): (Vec<Vec<f64>>, _) = (vec![], vec![]);
+    for (unknown, length) in unknowns {
+        if held.len() == d {
+            break;
+        }
+        let mut row: Vec<f64> = (0..d).map(|k| vectors[(unknown, k)]).collect();
+        for direction in &basis {
+            let along: f64 = row.iter().zip(direction).map(|(x, y)| x * y).sum();
+            row.iter_mut().zip(direction).for_each(|(x, y)| *x -= along * y);
+        }
+        let rest = row.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if rest > HOLDS * length {
+            basis.push(row.iter().map(|x| x / rest).collect());
+            held.push(unknown);
+        }
+    }
+    held
+}

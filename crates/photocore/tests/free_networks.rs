@@ -1,0 +1,308 @@
+//! Networks without control, against dense algebra.
+
+#![allow(clippy::unwrap_used)]
+
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+
+use faer::{Mat, Side};
+use photocore::adjustment::{self, DatumError, Method, Published, Status, Stop};
+use photocore::geometry::{
+    AttitudeNumbers, CameraModel, Ellipsoid, Matrix3, ObjectSpace, Orientation, Perspective, Point as At,
+    PoseNumbers, RotationSense, Vector3, angle_axis_rotation,
+};
+use photocore::network::{
+    Camera, Image, InnerConstraints, Network, NetworkError, Options, Photo, Point, Solution, Start,
+};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
+const SD: f64 = 0.002;
+const FREE: f64 = f64::INFINITY;
+const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(RotationSense::GroundToPhoto);
+const PHOTOS: usize = 6;
+const POINTS: usize = 12;
+
+/// Noise without a generator: incommensurable angles.
+fn noise(index: usize) -> f64 {
+    (1.7 * index as f64 * index as f64 + 0.3).sin()
+}
+
+fn noises(index: usize) -> Vector3 {
+    Vector3::from([3 * index, 3 * index + 1, 3 * index + 2].map(noise))
+}
+
+/// Photos on a circle about points of unknown place; the third sees one point less than the others, the second all.
+fn around() -> Network {
+    let space = ObjectSpace::Rectangular;
+    let places: Vec<Vector3> = (0..POINTS).map(noises).collect();
+    let (mut photos, mut images) = (vec![], vec![]);
+    for index in 0..PHOTOS {
+        let (sin, cos) = (TAU * index as f64 / PHOTOS as f64).sin_cos();
+        let station = Vector3::new(6.0 * cos, 5.0 * sin, 0.5 * noise(index));
+        let back = station.normalize();
+        let right = Vector3::z().cross(&back).normalize();
+        let attitude = Matrix3::from_columns(&[right, back.cross(&right), back]);
+        let orientation = Orientation::stepping(space, station.into(), &attitude);
+        let view = photocore::geometry::Photo { orientation, camera: CAMERA };
+        for (point, place) in places.iter().enumerate().filter(|(point, _)| index == 1 || *point != index) {
+            let [x, y] = view.project(&At::new(space, (*place).into()));
+            let n = 2 * images.len();
+            let xy = [x + SD * noise(n), y + SD * noise(n + 1)];
+            images.push(Image { photo: index, point, xy, sd: [SD; 2] });
+        }
+        let start = station + 0.05 * noises(40 + index);
+        let [omega, phi, kappa] =
+            NUMBERS.numbers(&(attitude * angle_axis_rotation(&(0.02 * noises(80 + index)))));
+        let pose = [start.x, start.y, start.z, omega, phi, kappa];
+        photos.push(Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 });
+    }
+    let point = |place: &Vector3| Point { coordinates: (*place).into(), sd: [FREE; 3] };
+    let poses = PoseNumbers::Angles(RotationSense::GroundToPhoto);
+    let points = places.iter().map(point).collect();
+    Network {
+        space,
+        poses,
+        refraction: None,
+        cameras: vec![Camera::held(CAMERA.into())],
+        photos,
+        points,
+        images,
+    }
+}
+
+fn pool() -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(2).build().unwrap()
+}
+
+fn options(method: Method) -> Options {
+    let adjustment = adjustment::Options { method, max_iterations: 200, ..Default::default() };
+    Options { adjustment, ..Options::default() }
+}
+
+const FINE: Method = Method::Damped(Stop::Fraction(1e-9));
+
+fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
+    network.adjust(&options(method), &pool(), &mut |_| ControlFlow::Continue(()))
+}
+
+fn in_datum(network: &Network, inner: &InnerConstraints) -> Result<Solution, NetworkError> {
+    network.adjust_in_datum(&options(FINE), inner, &pool(), &mut |_| ControlFlow::Continue(()))
+}
+
+/// The design matrix at the adjusted values, to unit weight: points, then positions and rotation steps of the photos.
+fn design(network: &Network, solution: &Solution) -> Mat<f64> {
+    let mut a = Mat::zeros(2 * network.images.len(), 3 * POINTS + 6 * PHOTOS);
+    for (index, image) in network.images.iter().enumerate() {
+        let [x, y, z, omega, phi, kappa] = solution.photos[image.photo].pose;
+        let attitude = NUMBERS.attitude([omega, phi, kappa]);
+        let orientation = Orientation::stepping(network.space, [x, y, z], &attitude);
+        let point = At::new(network.space, solution.points[image.point].unwrap().coordinates);
+        let u = orientation.sight(&point);
+        let gradients = CAMERA.linearize(&u).by_u;
+        for (row, gradient) in gradients.iter().enumerate() {
+            let (by_photo, by_point) = orientation.chain(&u, gradient, &point);
+            (0..3).for_each(|k| a[(2 * index + row, 3 * image.point + k)] = by_point[k] / SD);
+            (0..6).for_each(|k| a[(2 * index + row, 3 * POINTS + 6 * image.photo + k)] = by_photo[k] / SD);
+        }
+    }
+    a
+}
+
+/// S Q S^T with S = I - G (B^T G)^-1 B^T, Q the pseudo-inverse of A^T A and G its null space, `carriers` the rows of B.
+fn dense(a: &Mat<f64>, carriers: &[usize]) -> Mat<f64> {
+    let eigen = (a.transpose() * a).self_adjoint_eigen(Side::Lower).unwrap();
+    let (values, vectors) = (eigen.S(), eigen.U());
+    let count = vectors.nrows();
+    assert!(values[6] < 1e-9 * values[count - 1] && values[7] > 1e-9 * values[count - 1], "seven are open");
+    let part = |i: usize, k: usize| if k < 7 { 0.0 } else { vectors[(i, k)] / values[k] };
+    let q = Mat::from_fn(count, count, part) * vectors.transpose();
+    let g = Mat::from_fn(count, 7, |i, k| vectors[(i, k)]);
+    let b = Mat::from_fn(count, 7, |i, k| if carriers.contains(&i) { g[(i, k)] } else { 0.0 });
+    let product = b.transpose() * &g;
+    let inverse = faer::linalg::solvers::DenseSolveCore::inverse(&product.partial_piv_lu());
+    let s = Mat::<f64>::identity(count, count) - &g * inverse * b.transpose();
+    &s * q * s.transpose()
+}
+
+/// The greatest difference of the cofactors of points and positions from dense ones, relative to the largest of the block.
+fn apart(solution: &Solution, q: &Mat<f64>) -> f64 {
+    let block = |first: usize, found: &dyn Fn(usize, usize) -> f64| {
+        let largest = (0..3).map(|k| q[(first + k, first + k)]).fold(0.0, f64::max);
+        let each = (0..9).map(|at| (found(at / 3, at % 3) - q[(first + at / 3, first + at % 3)]).abs());
+        each.fold(0.0, f64::max) / largest
+    };
+    let points = (0..POINTS).map(|i| block(3 * i, &|k, m| solution.points[i].unwrap().cofactors[k][m]));
+    let photos =
+        (0..PHOTOS).map(|i| block(3 * POINTS + 6 * i, &|k, m| solution.photos[i].cofactors[6 * k + m]));
+    points.chain(photos).fold(0.0, f64::max)
+}
+
+fn redundancies(solution: &Solution) -> Vec<f64> {
+    solution.images.iter().flat_map(|image| image.unwrap().redundancy).collect()
+}
+
+#[test]
+fn a_network_without_control_is_adjusted_by_any_method() {
+    let network = around();
+    let expected = adjust(&network, FINE).unwrap();
+    for method in [
+        Method::default(),
+        Method::TrustRegion(Stop::Decrease(1e-13)),
+        Method::Full(Published::Percent(1e-8)),
+    ] {
+        let found = adjust(&network, method).unwrap();
+        assert_eq!(found.adjustment.status, Status::Converged, "{method:?}");
+        // The second photo has most images; no coordinate of another differs more than the fourth's X.
+        assert_eq!(found.datum[..6], [0, 1, 2, 3, 4, 5].map(|unknown| (1, unknown)));
+        assert_eq!(found.datum[6..], [(3, 0)]);
+        let freedom = 2 * network.images.len() as i64 - (3 * POINTS + 6 * PHOTOS) as i64 + 7;
+        assert_eq!(found.degrees_of_freedom, freedom);
+        let redundancy: f64 = redundancies(&found).iter().sum();
+        assert!((redundancy - freedom as f64).abs() < 1e-6, "{method:?} {redundancy}");
+        let ratio = found.sums_of_squares.total() / expected.sums_of_squares.total();
+        assert!((ratio - 1.0).abs() < 1e-8, "{method:?} {ratio}");
+    }
+    let held = &expected.photos[1];
+    assert_eq!(held.pose[..3], network.photos[1].pose[..3], "held where it started");
+    assert!(held.cofactors.iter().all(|&q| q == 0.0));
+}
+
+#[test]
+fn inner_constraints_are_those_of_the_pseudo_inverse() {
+    let network = around();
+    let minimal = adjust(&network, FINE).unwrap();
+    let points: Vec<usize> = (0..POINTS).collect();
+    let photos: Vec<usize> = (0..PHOTOS).collect();
+    for (points, photos) in [
+        (points.clone(), vec![]),
+        (vec![], photos.clone()),
+        (points[2..6].to_vec(), vec![0, 3]),
+        (points, photos),
+    ] {
+        let inner = InnerConstraints { points: points.clone(), photos: photos.clone(), scale: true };
+        let found = in_datum(&network, &inner).unwrap();
+        let carriers: Vec<usize> = points
+            .iter()
+            .map(|point| 3 * point)
+            .chain(photos.iter().map(|photo| 3 * POINTS + 6 * photo))
+            .flat_map(|first| first..first + 3)
+            .collect();
+        let a = design(&network, &found);
+        let apart = apart(&found, &dense(&a, &carriers));
+        assert!(apart < 1e-9, "{apart:e}");
+
+        // The carriers cannot be brought nearer to where they were: no motion of them goes along what they have moved.
+        let places =
+            points.iter().map(|&i| (found.points[i].unwrap().coordinates, network.points[i].coordinates));
+        let stations = photos.iter().map(|&i| {
+            [found.photos[i].pose, network.photos[i].pose].map(|pose| [pose[0], pose[1], pose[2]]).into()
+        });
+        let moved: Vec<(Vector3, Vector3)> = places
+            .chain(stations)
+            .map(|(at, was): ([f64; 3], [f64; 3])| (at.into(), Vector3::from(at) - Vector3::from(was)))
+            .collect();
+        let shift: Vector3 = moved.iter().map(|(_, by)| by).sum();
+        let turn: Vector3 = moved.iter().map(|(at, by)| at.cross(by)).sum();
+        let scale: f64 = moved.iter().map(|(at, by)| at.dot(by)).sum();
+        assert!(shift.amax() < 1e-11 && turn.amax() < 1e-10 && scale.abs() < 1e-10, "{shift} {turn} {scale}");
+
+        // What no datum touches.
+        for (r, expected) in redundancies(&found).iter().zip(redundancies(&minimal)) {
+            assert!((r - expected).abs() < 1e-9);
+        }
+        let distance = |solution: &Solution| {
+            let [a, b, c] = [0, 5, 9].map(|i| Vector3::from(solution.points[i].unwrap().coordinates));
+            (a - b).norm() / (a - c).norm()
+        };
+        assert!((distance(&found) - distance(&minimal)).abs() < 1e-10);
+    }
+}
+
+#[test]
+fn scale_stays_where_it_is_held_unless_it_is_asked_for() {
+    let network = around();
+    let minimal = adjust(&network, FINE).unwrap();
+    let inner = InnerConstraints { points: (0..POINTS).collect(), photos: vec![], scale: false };
+    let found = in_datum(&network, &inner).unwrap();
+    for (a, b) in [(0, 1), (3, 11), (7, 2)] {
+        let distance = |solution: &Solution| {
+            let [a, b] = [a, b].map(|i| Vector3::from(solution.points[i].unwrap().coordinates));
+            (a - b).norm()
+        };
+        assert!((distance(&found) - distance(&minimal)).abs() < 1e-10);
+    }
+}
+
+#[test]
+fn what_is_not_free_or_not_carried_is_refused() {
+    let network = around();
+    let inner = |points: Vec<usize>| InnerConstraints { points, photos: vec![], scale: true };
+    let not_carried = Some(NetworkError::Datum(DatumError::NotCarried));
+    assert_eq!(in_datum(&network, &inner(vec![])).err(), not_carried);
+    assert_eq!(
+        in_datum(&network, &inner(vec![0, 1])).err(),
+        not_carried,
+        "a line carries no turn about itself"
+    );
+    let mut controlled = network;
+    controlled.points[..4].iter_mut().for_each(|point| point.sd = [0.01; 3]);
+    assert_eq!(
+        in_datum(&controlled, &inner((0..9).collect())).err(),
+        Some(NetworkError::Datum(DatumError::NotFree))
+    );
+}
+
+#[test]
+fn known_attitudes_leave_place_and_scale_open() {
+    let mut network = around();
+    network.photos.iter_mut().for_each(|photo| photo.sd[3..].fill(0.01));
+    let found = adjust(&network, FINE).unwrap();
+    assert_eq!(found.datum, [(1, 0), (1, 1), (1, 2), (3, 0)]);
+    let redundancy: f64 = redundancies(&found).iter().sum();
+    let of_angles: f64 = found.photos.iter().flat_map(|photo| &photo.redundancy).sum();
+    assert!((redundancy + of_angles - found.degrees_of_freedom as f64).abs() < 1e-6);
+}
+
+#[test]
+fn geographic_networks_are_free_to_move_too() {
+    let ellipsoid = Ellipsoid::new(6_378_137.0, 6_356_752.314_2).unwrap();
+    let space = ObjectSpace::Geographic(ellipsoid);
+    let flat = around();
+    // A kilometre for a metre, on the ground at 9 degrees east, 48 north.
+    let place =
+        |at: [f64; 3]| [0.157 + at[0] * 1e3 / 4.27e6, 0.838 + at[1] * 1e3 / 6.37e6, 500.0 + 100.0 * at[2]];
+    let mut network = Network { space, images: vec![], ..flat.clone() };
+    for (point, of) in network.points.iter_mut().zip(&flat.points) {
+        point.coordinates = place(of.coordinates);
+    }
+    for (index, photo) in network.photos.iter_mut().enumerate() {
+        let [longitude, latitude, height] = place([noise(index), noise(index + 20), 40.0]);
+        let angles = [0.05 * noise(index + 50), 0.05 * noise(index + 60), noise(index + 70)];
+        let attitude = NUMBERS.attitude(angles);
+        let orientation = Orientation::stepping(space, [longitude, latitude, height], &attitude);
+        let view = photocore::geometry::Photo { orientation, camera: CAMERA };
+        for (point, at) in network.points.iter().enumerate() {
+            let [x, y] = view.project(&At::new(space, at.coordinates));
+            let n = 2 * network.images.len();
+            let xy = [x + SD * noise(n), y + SD * noise(n + 1)];
+            network.images.push(Image { photo: index, point, xy, sd: [SD; 2] });
+        }
+        photo.pose = [longitude, latitude, height, angles[0], angles[1], angles[2]];
+    }
+    // Geocentric coordinates are good to a nanometre.
+    let minimal = adjust(&network, Method::default()).unwrap();
+    assert_eq!((minimal.adjustment.status, minimal.datum.len()), (Status::Converged, 7));
+    let inner =
+        InnerConstraints { points: (0..POINTS).collect(), photos: (0..PHOTOS).collect(), scale: true };
+    let mut given = options(Method::default());
+    given.start = Start::Given;
+    let found = network.adjust_in_datum(&given, &inner, &pool(), &mut |_| ControlFlow::Continue(())).unwrap();
+    for (r, expected) in redundancies(&found).iter().zip(redundancies(&minimal)) {
+        assert!((r - expected).abs() < 1e-6);
+    }
+    // Its points are better known than when one photo is held.
+    let height =
+        |solution: &Solution| solution.points.iter().map(|point| point.unwrap().cofactors[2][2]).sum::<f64>();
+    assert!(height(&found) < height(&minimal));
+}
