@@ -258,8 +258,7 @@ def test_no_control_and_no_weights(small_block):
         assert "there is no control, and nothing else gives a datum: held at" in str(result.messages[0])
         assert "phi of 0102" in str(result.messages[0])
         assert "there is no control" in result.report().split("Adjustment")[0]
-        free_of = result.counts.observations + result.counts.weighted - result.counts.unknowns
-        assert np.nansum(result.redundancy) == pytest.approx(free_of, abs=1e-6)
+        assert np.nansum(result.redundancy) == pytest.approx(result.degrees_of_freedom, abs=1e-6)
     # Distances are those of the scale that was held; their ratios are those of the controlled block.
     ratio = [
         np.linalg.norm(np.subtract(*each.photo_positions[[0, 2]]))

@@ -68,6 +68,7 @@ fn around() -> Network {
         photos,
         points,
         images,
+        observations: vec![],
     }
 }
 
