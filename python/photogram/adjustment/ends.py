@@ -46,7 +46,7 @@ def datum(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
                 f" {_unknowns(block, solution.datum)}; coordinates and standard deviations refer to these"
             )
         ]
-    if held.any() or (block.photo_position_sd == 0).all():
+    if held.any() or block.observations or (block.photo_position_sd == 0).all():
         return []
     return [Message("there is no control: the datum of the block rests on the weights of its photos")]
 
