@@ -1,5 +1,7 @@
 //! Cameras whose parameters are unknown: those of one photo are unknowns of that, those of several are blocks of their own.
 
+use std::ops::Range;
+
 use super::model::Bundle;
 use super::precision::median;
 use super::problem::Assembled;
@@ -60,19 +62,28 @@ impl Network {
                 camera.take_over(photo);
             }
         }
+        let mut start = (0..model.cameras.len()).map(|photo| model.of_block(photo).len().pow(2)).sum();
         for (shared, &index) in model.shared.iter().enumerate() {
-            cameras[index].take_block(model, model.cameras.len() + shared, adjustment, unknowns);
+            let range = model.of_block(model.cameras.len() + shared);
+            let count = range.len().pow(2);
+            cameras[index].take_block(range, start..start + count, adjustment, unknowns);
+            start += count;
         }
         cameras
     }
 }
 
 impl Bundle {
-    /// The place of a shared camera: the median of those of its photos.
-    pub(super) fn place_of_camera(&self, shared: usize, photos: &[[f64; 3]]) -> [f64; 3] {
-        let block = Some(self.cameras.len() + shared);
-        let own = || photos.iter().zip(&self.camera_block).filter(|(_, camera)| **camera == block);
-        std::array::from_fn(|k| median(own().map(|(place, _)| place[k]).collect()).unwrap_or_default())
+    /// The places of the shared cameras: the medians of those of their photos.
+    pub(super) fn places_of_cameras(&self, photos: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let mut of_cameras: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.shared.len()];
+        for (place, block) in photos.iter().zip(&self.camera_block) {
+            block.iter().for_each(|block| of_cameras[block - self.cameras.len()].push(*place));
+        }
+        let middle = |places: Vec<[f64; 3]>| {
+            [0, 1, 2].map(|k| median(places.iter().map(|place| place[k]).collect()).unwrap_or_default())
+        };
+        of_cameras.into_iter().map(middle).collect()
     }
 }
 
@@ -86,16 +97,20 @@ impl AdjustedCamera {
             photo.cofactors.chunks_exact(width).skip(6).flat_map(|row| &row[6..]).copied().collect();
     }
 
-    /// Takes what was found of a kept block.
-    fn take_block(&mut self, model: &Bundle, block: usize, adjustment: &Adjustment, unknowns: &[f64]) {
-        let range = model.of_block(block);
-        self.parameters = unknowns[range.clone()].to_vec();
-        if let Some(cofactors) = &adjustment.cofactors {
-            let start: usize = (0..block).map(|block| model.of_block(block).len().pow(2)).sum();
-            self.cofactors = cofactors.kept[start..start + range.len().pow(2)].to_vec();
+    /// Takes what was found of a kept block of its own, known by its unknowns and their cofactors among those of all kept blocks.
+    fn take_block(
+        &mut self,
+        own: Range<usize>,
+        cofactors: Range<usize>,
+        adjustment: &Adjustment,
+        unknowns: &[f64],
+    ) {
+        self.parameters = unknowns[own.clone()].to_vec();
+        if let Some(all) = &adjustment.cofactors {
+            self.cofactors = all.kept[cofactors].to_vec();
         }
-        if let Some(redundancy) = &adjustment.prior_redundancy {
-            self.redundancy = redundancy[range].to_vec();
+        if let Some(all) = &adjustment.prior_redundancy {
+            self.redundancy = all[own].to_vec();
         }
     }
 }

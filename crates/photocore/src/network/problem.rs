@@ -162,8 +162,8 @@ impl Network {
         let tied = start[model.locals..].iter().map(|&at| self.space.cartesian(at));
         let centres: Vec<[f64; 3]> =
             stations.iter().map(|station| station.orientation.centre().into()).collect();
-        let cameras = (0..model.shared.len()).map(|shared| model.place_of_camera(shared, &centres));
-        let places = [centres.clone(), cameras.collect(), tied.map(Into::into).collect()].concat();
+        let cameras = model.places_of_cameras(&centres);
+        let places = [centres, cameras, tied.map(Into::into).collect()].concat();
         let of_images = model.images.iter().flat_map(|image| image.sd);
         let of_ties = model.observations.iter().flat_map(|tied| vec![1.0; tied.root.nrows()]);
         let problem = Problem {
