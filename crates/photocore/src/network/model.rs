@@ -50,7 +50,7 @@ pub struct Bundle {
     pub turning: Vec<bool>,
     /// What else was observed.
     pub observations: Vec<TiedObservation>,
-    /// Whether the position of anything is weighted, fixed or observed: then the datum is the user's.
+    /// Whether the position of anything is weighted or fixed: then the datum is the user's.
     pub placed: bool,
 }
 

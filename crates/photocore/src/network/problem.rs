@@ -227,7 +227,6 @@ impl Network {
         // Angles alone leave position and scale open.
         let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
         let placed = screened.points.iter().any(|&point| self.points[point].held() != [false; 3])
-            || observations.iter().any(|tied| !tied.observation.is_internal())
             || self.photos.iter().any(|photo| photo.sd[..positions].iter().any(|sd| sd.is_finite()));
         let images: Vec<Image> = screened.images.order.iter().map(|&image| self.images[image]).collect();
         Ok(Bundle {

@@ -38,15 +38,11 @@ impl ObservationModel for Distance {
         rows.by_position(0, 0, &-direction);
         rows.by_position(0, 1, &direction);
     }
-
-    fn is_internal(&self) -> bool {
-        true
-    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{agrees, is_internal};
+    use super::super::tests::{agrees, stays};
     use super::Distance;
 
     #[test]
@@ -56,6 +52,6 @@ mod tests {
 
     #[test]
     fn moves_with_the_network() {
-        assert!(is_internal(&Distance { points: [1, 0], length: 4.0, sd: 0.01 }.into()));
+        assert!(stays(&Distance { points: [1, 0], length: 4.0, sd: 0.01 }.into()));
     }
 }

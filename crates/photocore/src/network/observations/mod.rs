@@ -34,11 +34,6 @@ pub trait ObservationModel {
     /// Writes observed minus computed, and the partials of the computed values.
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>);
 
-    /// Whether it stays as it is when the network is shifted and turned as a whole: then it gives a scale and no other datum.
-    fn is_internal(&self) -> bool {
-        false
-    }
-
     /// Refuses what cannot be observed.
     ///
     /// # Errors
@@ -94,13 +89,6 @@ macro_rules! kinds {
             pub fn precision(&self) -> Precision {
                 match self {
                     $(Self::$name(own) => own.precision(),)*
-                }
-            }
-
-            /// See [`ObservationModel::is_internal`].
-            pub fn is_internal(&self) -> bool {
-                match self {
-                    $(Self::$name(own) => own.is_internal(),)*
                 }
             }
 

@@ -51,10 +51,6 @@ impl ObservationModel for Relative {
         rows.by_rotation(3, 1, &jacobian);
     }
 
-    fn is_internal(&self) -> bool {
-        true
-    }
-
     fn check(&self) -> Result<(), Fault> {
         rotates(&self.pose.attitude)
     }
@@ -62,7 +58,7 @@ impl ObservationModel for Relative {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{agrees, is_internal};
+    use super::super::tests::{agrees, stays};
     use super::{Precision, Relative};
     use crate::geometry::{Pose, Vector3, rotation};
 
@@ -78,6 +74,6 @@ mod tests {
 
     #[test]
     fn moves_with_the_network() {
-        assert!(is_internal(&relative().into()));
+        assert!(stays(&relative().into()));
     }
 }

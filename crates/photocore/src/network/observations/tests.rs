@@ -115,7 +115,7 @@ pub fn agrees(observation: &Observation) {
 }
 
 /// Whether an observation stays as it is when everything is shifted and turned.
-pub fn is_internal(observation: &Observation) -> bool {
+pub fn stays(observation: &Observation) -> bool {
     let scene = &scenes()[0];
     let turn = crate::geometry::rotation([0.2, -0.4, 0.3]);
     let numbers =
@@ -131,7 +131,7 @@ pub fn is_internal(observation: &Observation) -> bool {
         moved[6 + PHOTO * photo + 3..][..3].copy_from_slice(&angles);
     }
     let [before, after] = [&scene.unknowns, &moved].map(|values| scene.equations(observation, values).0);
-    observation.is_internal() && before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 1e-12)
+    before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 1e-12)
 }
 
 #[test]
