@@ -40,48 +40,57 @@ const HOLDS: f64 = 1e-6;
 /// Local blocks that are added up one after the other.
 const AT_ONCE: usize = 256;
 
+/// Candidates are taken so many at once, in the registers of one instruction: there are seven, and one that moves nothing.
+const LANES: usize = 8;
+
 /// Sums over rows a, for candidates k and m. The second and third take the unknowns apart that the first lets act together.
 struct Sums {
     /// (a . g_k) (a . g_m), and the same of every unknown that is weighted or fixed.
     together: Vec<f64>,
     /// The sum of (a_i g_ik)^2 over the unknowns i.
-    apart: Vec<f64>,
+    apart: Vec<[f64; LANES]>,
     /// Room for the a . g_k of a row.
-    along: Vec<f64>,
+    along: Vec<[f64; LANES]>,
 }
 
 impl Sums {
-    fn zero(count: usize) -> Self {
-        Self { together: vec![0.0; count * count], apart: vec![0.0; count], along: vec![0.0; count] }
+    /// For candidates that fill so many times the lanes.
+    fn zero(parts: usize) -> Self {
+        let none = vec![[0.0; LANES]; parts];
+        Self { together: vec![0.0; (parts * LANES).pow(2)], apart: none.clone(), along: none }
     }
 
     fn add(&mut self, other: &Self) {
         self.together.iter_mut().zip(&other.together).for_each(|(sum, value)| *sum += value);
-        self.apart.iter_mut().zip(&other.apart).for_each(|(sum, value)| *sum += value);
+        let (own, other) = (self.apart.as_flattened_mut(), other.apart.as_flattened());
+        own.iter_mut().zip(other).for_each(|(sum, value)| *sum += value);
     }
 }
 
 /// The candidates, unknown by unknown, and which of the unknowns are fixed.
 struct Candidates<'a> {
-    count: usize,
-    by_unknown: &'a [f64],
+    parts: usize,
+    by_unknown: &'a [[f64; LANES]],
     fixed: &'a [bool],
 }
 
 impl Candidates<'_> {
     /// How they move an unknown.
-    fn of(&self, unknown: usize) -> &[f64] {
-        &self.by_unknown[unknown * self.count..][..self.count]
+    fn of(&self, unknown: usize) -> &[[f64; LANES]] {
+        &self.by_unknown[unknown * self.parts..][..self.parts]
     }
 
     /// Adds one row of partials. A fixed unknown is an observation of the weight that this row gives it.
     fn add_row(&self, sums: &mut Sums, row: impl Iterator<Item = (usize, f64)>) {
-        sums.along.fill(0.0);
+        sums.along.fill([0.0; LANES]);
         for (unknown, coefficient) in row {
             let moved = self.of(unknown);
-            for (k, g) in moved.iter().enumerate() {
-                sums.along[k] += coefficient * g;
-                sums.apart[k] += (coefficient * g).powi(2);
+            for ((along, apart), moved) in sums.along.iter_mut().zip(&mut sums.apart).zip(moved) {
+                for k in 0..LANES {
+                    let change = coefficient * moved[k];
+                    along[k] += change;
+                    apart[k] += change * change;
+                }
             }
             if self.fixed[unknown] {
                 add_square(&mut sums.together, coefficient * coefficient, moved);
@@ -117,9 +126,12 @@ impl Candidates<'_> {
 }
 
 /// Adds w (b b^T).
-fn add_square(sum: &mut [f64], weight: f64, b: &[f64]) {
-    let d = b.len();
-    (0..d * d).for_each(|at| sum[at] += weight * b[at / d] * b[at % d]);
+fn add_square(sum: &mut [f64], weight: f64, b: &[[f64; LANES]]) {
+    let rows = sum.chunks_exact_mut(b.len() * LANES);
+    for (row, &left) in rows.zip(b.as_flattened()) {
+        let parts = row.as_chunks_mut::<LANES>().0.iter_mut().zip(b);
+        parts.for_each(|(sum, right)| (0..LANES).for_each(|k| sum[k] += weight * left * right[k]));
+    }
 }
 
 impl<M: Model> Problem<M> {
@@ -127,11 +139,14 @@ impl<M: Model> Problem<M> {
     pub(super) fn open(&self, values: &[f64], motions: &Motions, pool: &ThreadPool) -> Option<Open> {
         let sums = self.sums(values, motions, pool);
         let count = motions.vectors.len();
-        let scale: Vec<f64> =
-            sums.apart.iter().map(|&sum| if sum > 0.0 { sum.sqrt().recip() } else { 0.0 }).collect();
+        let stride = sums.apart.len() * LANES;
+        let scale: Vec<f64> = sums.apart.as_flattened()[..count]
+            .iter()
+            .map(|&sum| if sum > 0.0 { sum.sqrt().recip() } else { 0.0 })
+            .collect();
         let scaled = Mat::from_fn(count, count, |k, m| {
             // What moves nothing that is observed is no motion of this network.
-            if k == m && scale[k] == 0.0 { 1.0 } else { sums.together[k * count + m] * scale[k] * scale[m] }
+            if k == m && scale[k] == 0.0 { 1.0 } else { sums.together[k * stride + m] * scale[k] * scale[m] }
         });
         let eigen = scaled.self_adjoint_eigen(Side::Lower).ok()?;
         let open: Vec<usize> = (0..count).filter(|&k| eigen.S()[k] < NULL).collect();
@@ -159,14 +174,17 @@ impl<M: Model> Problem<M> {
 
     fn sums(&self, values: &[f64], motions: &Motions, pool: &ThreadPool) -> Sums {
         let layout = self.layout();
-        let count = motions.vectors.len();
-        let moved = |unknown: usize| motions.vectors.iter().map(move |vector| vector[unknown]);
-        let by_unknown: Vec<f64> = (0..values.len()).flat_map(moved).collect();
+        let parts = motions.vectors.len().div_ceil(LANES);
+        let moved = |at: usize| {
+            let (unknown, first) = (at / parts, at % parts * LANES);
+            std::array::from_fn(|k| motions.vectors.get(first + k).map_or(0.0, |vector| vector[unknown]))
+        };
+        let by_unknown: Vec<[f64; LANES]> = (0..values.len() * parts).map(moved).collect();
         let fixed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
-        let candidates = Candidates { count, by_unknown: &by_unknown, fixed: &fixed };
+        let candidates = Candidates { parts, by_unknown: &by_unknown, fixed: &fixed };
         let equations = pool.install(|| Linearized::of_all(self, values));
         let chunk = |chunk: usize| {
-            let (mut sums, mut buffers) = (Sums::zero(count), Buffers::default());
+            let (mut sums, mut buffers) = (Sums::zero(parts), Buffers::default());
             let end = ((chunk + 1) * AT_ONCE).min(layout.locals());
             for local in chunk * AT_ONCE..end {
                 candidates.add_local(&mut sums, &mut buffers, layout, &equations, local);
@@ -174,7 +192,7 @@ impl<M: Model> Problem<M> {
             sums
         };
         let chunks = (0..layout.locals().div_ceil(AT_ONCE)).into_par_iter();
-        let mut sums = Sums::zero(count);
+        let mut sums = Sums::zero(parts);
         pool.install(|| chunks.map(chunk).collect::<Vec<Sums>>()).iter().for_each(|part| sums.add(part));
         self.for_ties(|tie, rows| {
             equations.write_tie(tie, rows);
@@ -186,7 +204,8 @@ impl<M: Model> Problem<M> {
         for unknown in (0..values.len()).filter(|&unknown| self.is_weighted(unknown)) {
             let (weight, moved) = (self.sd[unknown].powi(2).recip(), candidates.of(unknown));
             add_square(&mut sums.together, weight, moved);
-            moved.iter().zip(&mut sums.apart).for_each(|(g, sum)| *sum += weight * g * g);
+            let apart = moved.as_flattened().iter().zip(sums.apart.as_flattened_mut());
+            apart.for_each(|(g, sum)| *sum += weight * g * g);
         }
         sums
     }

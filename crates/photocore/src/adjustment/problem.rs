@@ -36,7 +36,7 @@ pub trait Model: Sync {
     /// Local blocks that the iterations have led to where they harm all others: what they say of one kept block is so much more than
     /// all others say together that rounding takes what these say; and those that are on their way there. Asked after every damped
     /// step, with the unknowns before and after it.
-    fn collapsed(&self, _before: &[f64], _after: &[f64]) -> Vec<usize> {
+    fn collapsed(&self, _before: &[f64], _after: &Self::Prepared) -> Vec<usize> {
         vec![]
     }
 
@@ -133,10 +133,20 @@ impl<'a, M: Model> Linearized<'a, M> {
         held: &[usize],
         reweighting: Option<Reweighting>,
     ) -> Self {
+        Self::prepared(problem, problem.model.prepare(values), held, reweighting)
+    }
+
+    /// Of values that are prepared already.
+    pub fn prepared(
+        problem: &'a Problem<M>,
+        prepared: M::Prepared,
+        held: &[usize],
+        reweighting: Option<Reweighting>,
+    ) -> Self {
         let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
         held.iter().for_each(|&unknown| fixed[unknown] = true);
         let fixed = fixed.contains(&true).then_some(fixed);
-        Self { problem, prepared: problem.model.prepare(values), fixed, reweighting }
+        Self { problem, prepared, fixed, reweighting }
     }
 
     /// With the columns of fixed unknowns, and without a loss.

@@ -203,7 +203,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// The weighted sum of squares, of losses where the options ask for a loss, at the given values.
     pub(super) fn objective(&self, unknowns: &[f64]) -> f64 {
-        let residuals = self.problem.residuals(self.pool, unknowns);
+        self.objective_at(unknowns, &self.pool.install(|| self.problem.model.prepare(unknowns)))
+    }
+
+    /// The same of values that are prepared already.
+    pub(super) fn objective_at(&self, unknowns: &[f64], prepared: &M::Prepared) -> f64 {
+        let residuals = self.problem.residuals_at(self.pool, prepared);
         self.observed_sum(&residuals) + self.problem.prior_sum_of_squares(unknowns)
     }
 
@@ -216,10 +221,20 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
+        let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
+        self.form_at(unknowns, prepared, damping)
+    }
+
+    /// The same at values that are prepared already.
+    pub(super) fn form_at(
+        &mut self,
+        unknowns: Vec<f64>,
+        prepared: M::Prepared,
+        damping: f64,
+    ) -> Result<State<'a, M>, AdjustError> {
         let start = Instant::now();
         let reweighting = self.options.loss.map(|loss| Reweighting { loss, curved: self.curved });
-        let linearize = || Linearized::new(self.problem, &unknowns, &self.datum, reweighting);
-        let equations = self.pool.install(linearize);
+        let equations = Linearized::prepared(self.problem, prepared, &self.datum, reweighting);
         let prior = self.problem.prior_equations(&unknowns, &self.datum);
         let total = self.problem.layout().locals();
         let factored = {

@@ -96,19 +96,23 @@ impl<M> Problem<M> {
 impl<M: Model> Problem<M> {
     /// Observed minus computed of every observation at the given values of the unknowns.
     pub(super) fn residuals(&self, pool: &ThreadPool, values: &[f64]) -> Vec<f64> {
+        self.residuals_at(pool, &pool.install(|| self.model.prepare(values)))
+    }
+
+    /// The same at values that are prepared already.
+    pub(super) fn residuals_at(&self, pool: &ThreadPool, prepared: &M::Prepared) -> Vec<f64> {
         let layout = self.layout();
-        let prepared = pool.install(|| self.model.prepare(values));
         let by_local = self.for_locals(pool, |buffers, local| {
             let mut residuals = Vec::with_capacity(layout.groups_of(local).len() * layout.rows());
             for group in layout.groups_of(local) {
                 let mut rows = buffers.rows(layout, group);
-                self.model.observe(&prepared, local, group, &mut rows);
+                self.model.observe(prepared, local, group, &mut rows);
                 residuals.extend_from_slice(rows.constant);
             }
             residuals
         });
         let by_tie = self.for_ties(|tie, rows| {
-            self.model.observe_tie(&prepared, tie, rows);
+            self.model.observe_tie(prepared, tie, rows);
             rows.constant.to_vec()
         });
         let mut residuals = by_local.concat();

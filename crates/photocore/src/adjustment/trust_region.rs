@@ -27,8 +27,9 @@ struct Damping {
 }
 
 /// A step that may fail.
-struct Trial {
+struct Trial<P> {
     unknowns: Vec<f64>,
+    prepared: P,
     sum_of_squares: f64,
     /// By how much the linearized equations let it lower the sum of squares.
     predicted: f64,
@@ -89,7 +90,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 if last || whole && stop.at_decrease(decrease, lowest) {
                     return self.rest(trial.unknowns, Status::Converged);
                 }
-                state = self.form(trial.unknowns, damping.value)?;
+                state = self.form_at(trial.unknowns, trial.prepared, damping.value)?;
             } else if last || trial.predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE) {
                 return self.rest(unknowns, Status::Converged);
             } else {
@@ -101,27 +102,28 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// Where a step leads, and by how much it was predicted to lower the sum of squares.
-    fn tried(&self, before: &[f64], solved: Solved<'a, M>) -> Trial {
+    fn tried(&self, before: &[f64], solved: Solved<'a, M>) -> Trial<M::Prepared> {
         let Solved { basis, step, change } = solved;
         let predicted = basis.equations.decrease(self.pool, &basis.prior, &step);
         basis.factor.recycle(&self.problem.system);
         let unknowns = self.problem.advanced(before, &step);
-        let sum_of_squares = self.objective(&unknowns);
-        Trial { unknowns, sum_of_squares, predicted, change }
+        let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
+        let sum_of_squares = self.objective_at(&unknowns, &prepared);
+        Trial { unknowns, prepared, sum_of_squares, predicted, change }
     }
 
     /// Keeps a step; the end where it has led local blocks to where they harm all others.
     fn keep(
         &mut self,
         before: &[f64],
-        trial: &Trial,
+        trial: &Trial<M::Prepared>,
         damping: f64,
     ) -> Result<Option<End<'a, M>>, AdjustError> {
         let number = self.iterations.len() + 1;
         let &Trial { sum_of_squares, change: largest_change, .. } = trial;
         let iteration = Iteration { number, sum_of_squares, largest_change, damping };
         self.accept(iteration, before, &trial.unknowns)?;
-        self.collapsed = self.problem.model.collapsed(before, &trial.unknowns);
+        self.collapsed = self.problem.model.collapsed(before, &trial.prepared);
         let ends = !self.collapsed.is_empty();
         Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone(), None)))
     }

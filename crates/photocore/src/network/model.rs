@@ -407,12 +407,11 @@ impl Model for Bundle {
     }
 
     /// Points that have run into a station, or are on their way there: two rays that meet there ask for it.
-    fn collapsed(&self, before: &[f64], after: &[f64]) -> Vec<usize> {
-        let stations = self.prepare(after);
-        let mut near = self.approaches(&stations);
+    fn collapsed(&self, before: &[f64], after: &Stations) -> Vec<usize> {
+        let mut near = self.approaches(after);
         if !near.is_empty() {
-            let stations_before = self.prepare(before);
-            near.retain(|near| near.share > NEAR || self.is_same_place(near, &stations_before, &stations));
+            let before = self.prepare(before);
+            near.retain(|near| near.share > NEAR || self.is_same_place(near, &before, after));
         }
         near.dedup_by_key(|near| near.point);
         near.iter().map(|near| near.point).collect()
