@@ -5,7 +5,7 @@ use crate::geometry::Vector3;
 
 /// The position of the antenna of a photo.
 ///
-/// C + A l, with the partials I by C and -A [l]x by rho (Ackermann and Schade 1993); in geographic space positions and their errors are
+/// `C + A l`, with the partials `I` by C and `-A [l]x` by rho (Ackermann and Schade 1993); in geographic space positions and their errors are
 /// told in the axes east, north and up of the observed place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Position {
