@@ -19,9 +19,9 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use super::loss::Reweighting;
-use super::motions::{Motions, Open};
+use super::motions::Open;
 use super::options::Options;
-use super::problem::{Linearized, Model, Problem};
+use super::problem::{Linearized, Model, Motions, Problem};
 use super::result::{AdjustError, Adjustment};
 use super::run::unless_stopped;
 use crate::normals::{Cofactors, Inversion, Layout};

@@ -19,6 +19,9 @@ pub enum Method {
     TrustRegion(Stop),
 }
 
+/// Damping of the first step in a trust region.
+pub(super) const FIRST_DAMPING: f64 = 1e-4;
+
 impl Default for Method {
     /// Full steps, damped where they fail, to a hundred-thousandth of the standard deviations.
     fn default() -> Self {

@@ -75,10 +75,9 @@ pub use distributions::{
 };
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
-pub use motions::Motions;
 pub use normal_equations::NormalEquations;
 pub use options::{Event, Iteration, Options, Phase, Status};
-pub use problem::{Model, Problem};
+pub use problem::{Model, Motions, Problem};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
 pub use run::{Watch, adjust, on_all_processors};

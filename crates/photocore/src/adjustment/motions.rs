@@ -8,19 +8,9 @@ use faer::{Mat, Side};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::problem::{Linearized, Model, Problem};
+use super::problem::{Linearized, Model, Motions, Problem};
 use super::walk::Buffers;
 use crate::normals::{Equations, Layout};
-
-/// Motions of a network as a whole, which its observations may leave open.
-#[derive(Debug, Clone)]
-pub struct Motions {
-    /// How each moves the unknowns, by a small amount: vectors of their length, in the units of the columns of the partials (see
-    /// [`Model::advance`]).
-    pub vectors: Vec<Vec<f64>>,
-    /// The unknowns that had best be held for a datum, the best first. Those that others hold already are passed over.
-    pub preferred: Vec<usize>,
-}
 
 /// The combinations of motions that are open at some values of the unknowns.
 pub(super) struct Open {

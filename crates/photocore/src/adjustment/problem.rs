@@ -3,7 +3,6 @@
 use rayon::ThreadPool;
 
 use super::loss::Reweighting;
-use super::motions::Motions;
 use crate::normals::{Equations, GroupRows, Layout, Prior, System, TieRows};
 
 /// How observations follow from unknowns.
@@ -56,6 +55,16 @@ pub trait Model: Sync {
         }
         self.advance(unknowns, &step);
     }
+}
+
+/// Motions of a network as a whole, which its observations may leave open.
+#[derive(Debug, Clone)]
+pub struct Motions {
+    /// How each moves the unknowns, by a small amount: vectors of their length, in the units of the columns of the partials (see
+    /// [`Model::advance`]).
+    pub vectors: Vec<Vec<f64>>,
+    /// The unknowns that had best be held for a datum, the best first. Those that others hold already are passed over.
+    pub preferred: Vec<usize>,
 }
 
 /// A model with everything that is known beforehand.

@@ -6,11 +6,10 @@ use std::time::Instant;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::loss::Reweighting;
-use super::method::Method;
+use super::method::{FIRST_DAMPING, Method};
 use super::options::{Event, Iteration, Options, Phase, Status};
 use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
-use super::trust_region::FIRST_DAMPING;
 use crate::normals::{Cofactors, Factor, Inversion, Prior, Stopped};
 
 /// Whoever is told on the calling thread what is going on; breaking stops the work.

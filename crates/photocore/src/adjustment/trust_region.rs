@@ -1,14 +1,12 @@
 //! Levenberg-Marquardt: steps damped by how well the linearized equations predict what they do (Nielsen 1999; Madsen, Nielsen and
 //! Tingleff 2004, section 3.2).
 
-use super::method::Stop;
+use super::method::{FIRST_DAMPING, Stop};
 use super::options::{Iteration, Status};
 use super::problem::Model;
 use super::result::AdjustError;
 use super::run::{End, Run, Solved, State};
 
-/// Damping of the first step.
-pub(super) const FIRST_DAMPING: f64 = 1e-4;
 /// Less would leave the seven pivots of a network without datum among rounding errors.
 const LEAST_DAMPING: f64 = 1e-10;
 /// With this damping a step follows the gradient; if that does not lower the sum of squares, nothing will.
