@@ -234,9 +234,25 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         }
     }
     let adjusted = &dense.matrix * &inverse;
+    compare_equation_blocks(dense, &system, &selected, &adjusted);
     for (k, value) in cofactors.equations.iter().enumerate() {
         let exact: f64 = (0..layout.unknowns()).map(|i| adjusted[(k, i)] * dense.matrix[(k, i)]).sum();
         assert_close(*value, exact, 1e-9, "adjusted equation");
+    }
+}
+
+/// a Q a^T of every two equations of some local blocks; `adjusted` is A Q.
+fn compare_equation_blocks(dense: &Dense, system: &System, selected: &SelectedInverse, adjusted: &Mat<f64>) {
+    let layout = system.layout();
+    let exact = adjusted * dense.matrix.transpose();
+    for local in (0..layout.locals()).step_by(layout.locals().div_ceil(20).max(1)) {
+        let groups = layout.groups_of(local);
+        let (first, count) = (groups.start * layout.rows(), groups.len() * layout.rows());
+        let block = system.equation_block(selected, dense, &dense.prior, local);
+        assert_eq!(block.len(), count * count);
+        for (k, value) in block.iter().enumerate() {
+            assert_close(*value, exact[(first + k / count, first + k % count)], 1e-9, "block of equations");
+        }
     }
 }
 

@@ -6,8 +6,8 @@ use std::ops::ControlFlow;
 
 use faer::{Mat, Side};
 use photocore::adjustment::{
-    Datum, DatumError, Loss, Method, Model, Motions, Options, Problem, Published, Status, Stop, adjust,
-    in_datum,
+    Datum, DatumError, Loss, Method, Model, Motions, NormalEquations, Options, Problem, Published, Status,
+    Stop, adjust, in_datum,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -286,4 +286,44 @@ fn a_loss_takes_the_weight_of_a_wrong_tie() {
     let least = (0..weights.len()).min_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap();
     assert_eq!(least, wrong);
     assert!(weights[wrong] < 0.1);
+}
+
+#[test]
+fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say() {
+    let (problem, pool) = (network(vec![]), pool());
+    let mut go_on = |_| ControlFlow::Continue(());
+    let adjusted = adjust(&problem, &Options::default(), &pool, &mut |_| ControlFlow::Continue(())).unwrap();
+    let normal = || {
+        NormalEquations::form(&problem, &adjusted.unknowns, &adjusted.datum, &pool, &mut |_| {
+            ControlFlow::Continue(())
+        })
+    };
+    let local = 3;
+    let layout = problem.layout();
+    // The rows of the point, over all unknowns, in unit weight; what is held has no column.
+    let row = |group: usize| {
+        let mut row = vec![0.0; layout.unknowns()];
+        let (point, station) = (layout.local_range(local), layout.kept_range(layout.kept_of(group)));
+        let (_, partials) = problem.model.distance(&adjusted.unknowns, group, point.start, station.start);
+        for k in 0..2 {
+            row[point.start + k] = partials[k] / SD;
+            row[station.start + k] = -partials[k] / SD;
+        }
+        adjusted.datum.iter().for_each(|&held| row[held] = 0.0);
+        row
+    };
+    let rows: Vec<Vec<f64>> = layout.groups_of(local).map(row).collect();
+    let solved = normal().unwrap().solve_for(&rows.concat(), &mut go_on).unwrap();
+    let blocks = normal().unwrap().observation_blocks(&[local, 0], &mut go_on).unwrap();
+    assert_eq!(blocks.len(), 2);
+    for (k, value) in blocks[0].iter().enumerate() {
+        let column = &solved[k % 4 * layout.unknowns()..][..layout.unknowns()];
+        let expected: f64 = rows[k / 4].iter().zip(column).map(|(a, q)| a * q).sum();
+        assert!((value - expected).abs() < 1e-9, "{k}: {value} {expected}");
+    }
+    let redundancy = adjusted.redundancy.unwrap();
+    for (k, group) in layout.groups_of(local).enumerate() {
+        // The adjustment took its own before the last step, which is a hundred-thousandth of the standard deviations.
+        assert!((1.0 - blocks[0][5 * k] - redundancy[group]).abs() < 1e-6);
+    }
 }

@@ -84,6 +84,25 @@ impl<'a, M: Model> NormalEquations<'a, M> {
         self.factor.solve_reduced(layout, &rights)
     }
 
+    /// a Q a^T of every two observations of some local blocks, in unit weight: for each block a square matrix, row by row, in the order of
+    /// its groups and rows. One minus it is the cofactor matrix of their residuals: x and y of an image, all images of a point.
+    ///
+    /// One selected inverse serves all of them.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn observation_blocks(
+        self,
+        locals: &[usize],
+        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Vec<Vec<f64>>, AdjustError> {
+        let Self { problem, pool, equations, prior, factor, .. } = self;
+        let system = &problem.system;
+        let selected = unless_stopped(system.invert(pool, factor, &equations, &prior, between))?.selected;
+        let block = |&local: &usize| system.equation_block(&selected, &equations, &prior, local);
+        Ok(locals.iter().map(block).collect())
+    }
+
     /// Solves for other right-hand sides, each over all unknowns, one after the other; so are the solutions.
     ///
     /// # Errors

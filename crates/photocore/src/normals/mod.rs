@@ -40,6 +40,7 @@
 mod cofactors;
 mod dense;
 mod dissection;
+mod equation_block;
 mod equations;
 mod factor;
 mod front;

@@ -1,0 +1,97 @@
+//! What the equations of one local block take up together, from the selected inverse.
+
+use std::collections::BTreeMap;
+
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
+
+use super::equations::{Equations, GroupRows, Prior};
+use super::selected::SelectedInverse;
+use super::system::System;
+
+/// The equations of one local block: A x_local + B x_others = l.
+struct Own {
+    local: Mat<f64>,
+    others: Mat<f64>,
+    /// Each other block, the border counted after the last kept one, with its first column of B.
+    blocks: BTreeMap<usize, usize>,
+}
+
+impl System {
+    /// a Q a^T of every two equations of a local block: square, row by row, in the order of its groups and rows. NaN where they do not
+    /// determine the local block.
+    ///
+    /// The diagonal is in [`super::Cofactors::equations`]; besides it stands what x and y of an image, or all images of a point, have to
+    /// do with each other. With Q_oo the inverse over all that the block is tied to, H = N_ll^-1 N_lo and C = B - A H,
+    /// it is C Q_oo C^T + A N_ll^-1 A^T. `equations` and `prior` must be those that the inverse comes from.
+    pub fn equation_block<E: Equations>(
+        &self,
+        selected: &SelectedInverse,
+        equations: &E,
+        prior: &Prior,
+        local: usize,
+    ) -> Vec<f64> {
+        let Own { local: a, others: b, blocks } = self.own_equations(equations, local);
+        let rows = a.nrows();
+        let mut normal = a.transpose() * &a;
+        self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
+        let Ok(factor) = normal.llt(Side::Lower) else { return vec![f64::NAN; rows * rows] };
+        let by_local = factor.solve(a.transpose());
+        let c = &b - &a * (&by_local * &b);
+        let mut q = Mat::<f64>::zeros(b.ncols(), b.ncols());
+        for (&row, &first) in &blocks {
+            for (&column, &left) in &blocks {
+                let values = selected.block(row, column).unwrap_or_default();
+                let width = self.block_dim(column);
+                values.iter().enumerate().for_each(|(k, &v)| q[(first + k / width, left + k % width)] = v);
+            }
+        }
+        let found = &c * q * c.transpose() + &a * by_local;
+        (0..rows * rows).map(|k| found[(k / rows, k % rows)]).collect()
+    }
+
+    /// Unknowns of a kept block, or of the border, which is counted after the last.
+    fn block_dim(&self, block: usize) -> usize {
+        if block < self.layout.kept() { self.layout.kept_dim(block) } else { self.layout.border_dim() }
+    }
+
+    fn own_equations<E: Equations>(&self, equations: &E, local: usize) -> Own {
+        let layout = &self.layout;
+        let (rows, l, groups) = (layout.rows(), layout.local_dim(), layout.groups_of(local));
+        let touched = groups.clone().flat_map(|group| layout.blocks_of(group));
+        let border = (layout.border_dim() > 0).then_some(layout.kept());
+        let mut blocks: BTreeMap<usize, usize> = touched.chain(border).map(|block| (block, 0)).collect();
+        let (mut width, mut columns) = (0, BTreeMap::new());
+        for (&block, first) in &mut blocks {
+            *first = width;
+            let unknowns =
+                if Some(block) == border { layout.border_range() } else { layout.kept_range(block) };
+            columns.extend(unknowns.zip(width..));
+            width += self.block_dim(block);
+        }
+        let mut own = Own {
+            local: Mat::zeros(groups.len() * rows, l),
+            others: Mat::zeros(groups.len() * rows, width),
+            blocks,
+        };
+        for (index, group) in groups.enumerate() {
+            let main = layout.kept_range(layout.kept_of(group));
+            let mut parts = [l, main.len(), layout.common_width(group)].map(|width| vec![0.0; rows * width]);
+            let mut constant = vec![0.0; rows];
+            let [local_part, kept, common] = &mut parts;
+            let mut written = GroupRows { constant: &mut constant, local: local_part, kept, common };
+            equations.write(local, group, &mut written);
+            for row in 0..rows {
+                let at = index * rows + row;
+                (0..l).for_each(|k| own.local[(at, k)] = parts[0][row * l + k]);
+                let others = main.clone().zip(&parts[1][row * main.len()..]);
+                let width = layout.common_width(group);
+                let common = layout.common_columns(group).zip(&parts[2][row * width..]);
+                others
+                    .chain(common)
+                    .for_each(|(unknown, &value)| own.others[(at, columns[&unknown])] = value);
+            }
+        }
+        own
+    }
+}
