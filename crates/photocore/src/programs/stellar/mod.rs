@@ -6,6 +6,59 @@
 //! of its images has a local block of its own.
 //!
 //! Unit weight is that of the plate coordinates' weights: its mean error has their unit over the root of theirs.
+//!
+//! A camera of 300 mm whose principal distance and attitude are known to some millimetres and minutes of arc, and nine stars:
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! use photocore::adjustment;
+//! use photocore::geometry::{Air, Station, sky::REFRACTION};
+//! use photocore::programs::stellar::{
+//!     Attitude, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Options, Star, Weights,
+//! };
+//!
+//! let station = Station::new(0.6, 0.0, Air::new(290.0, 750.0));
+//! let kind = Kind { form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: true };
+//! let (attitude, time) = ([0.2, -0.1, 0.6], 1.0);
+//! let mut common = [0.0; COMMON];
+//! (common[3], common[4]) = (0.3, 0.3); // principal distances in metres
+//! common[COMMON - 4..].copy_from_slice(&REFRACTION);
+//! let camera = Camera::new(kind, std::array::from_fn(|k| common[k]));
+//!
+//! let (mut stars, mut images) = (vec![], vec![]);
+//! for star in 0..9 {
+//!     // A grid of three by three around the zenith, where the camera sees it.
+//!     let standard = [0.1 * (star % 3) as f64, 0.1 * (star / 3) as f64];
+//!     let place = station.place(standard, time, &REFRACTION);
+//!     stars.push(Star { place, catalogue: place, weight: None, fixed: true });
+//!     let seen = station.standard(place, time, &REFRACTION);
+//!     let xy = camera.linearize(&Attitude::new(attitude), seen.coordinates).xy;
+//!     let weight = [[1.0, 0.0], [0.0, 1.0]];
+//!     images.push(Image { star, pointing: 0, xy, weight, sidereal_time: time, shift: [0.0; 2] });
+//! }
+//! let initial = [attitude[0] + 1e-3, attitude[1] - 1e-3, attitude[2] + 2e-3];
+//! let mut fixed = vec![true; 3 + COMMON];
+//! fixed[..3].fill(false);
+//! fixed[3 + 3] = false; // the principal distance, the same in x and y
+//! (common[3], common[4]) = (0.303, 0.303);
+//! let calibration = Calibration {
+//!     station,
+//!     kind,
+//!     pointings: vec![initial],
+//!     common,
+//!     fixed,
+//!     weights: Weights { parameters: vec![], values: vec![], root: vec![] },
+//!     stars,
+//!     images,
+//!     axis: None,
+//! };
+//! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+//! let options = Options { adjustment: adjustment::Options::default(), unit: 1e-6, whole: false };
+//! let solution = calibration.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))?;
+//! assert!((solution.parameters[3 + 3] - 0.3).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod camera;
 mod cycle;
