@@ -8,7 +8,8 @@ import pytest
 from example_scripts import load
 from photogram import Block, InputError, Spheroid, adjust, predict, simulate
 from photogram.giant import Project
-from photogram.network.geometry import geographic_to_geocentric, local_frames, rotation_matrix
+from photogram.network.attitudes import Attitudes
+from photogram.network.geometry import geographic_to_geocentric, local_frames, project, rotation_matrix
 from photogram.network.observations import (
     Attitude,
     Control,
@@ -223,3 +224,54 @@ def test_a_block_refuses_what_it_does_not_know(example):
     with pytest.raises(InputError, match="observations is no list"):
         block.replace(observations=5)
     assert isinstance(block, Block)
+
+
+def around(noise, **weights):
+    """Return twelve photos around an object, two of which have a phi of 90 degrees, with some control."""
+    turns = np.radians(np.arange(0, 360, 30))
+    positions = np.column_stack([10 * np.cos(turns), 10 * np.sin(turns), 0.4 * np.sin(3 * turns)])
+    z = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(12)])
+    y = np.broadcast_to([0.0, 0.0, 1.0], z.shape)
+    matrices = np.stack([np.cross(y, z), y, z], axis=2)
+    angles = Attitudes(matrices).values("omega_phi_kappa")
+    points = noise.uniform(-2, 2, (30, 3))
+    photos, seen = np.repeat(np.arange(12), 30), np.tile(np.arange(30), 12)
+    xy = project(points[seen], positions[photos], angles[photos], np.full(360, -50.0))
+    step = Attitudes.of("rotation_vector", noise.normal(0, 0.05, (12, 3))).matrices
+    known = (np.arange(30) < 6)[:, np.newaxis]
+    block = Block(
+        photo_ids=[f"photo {i}" for i in range(12)],
+        photo_positions=positions + noise.normal(0, 0.05, (12, 3)),
+        photo_attitudes=Attitudes(matrices @ step).values("omega_phi_kappa"),
+        principal_distances=np.full(12, -50.0),
+        point_ids=[f"P{i}" for i in range(30)],
+        point_positions=np.where(known, points, np.nan),
+        point_sd=np.where(known, 0.002, np.inf) * np.ones(3),
+        image_photos=photos,
+        image_points=seen,
+        image_xy=xy + noise.normal(0, 0.002, xy.shape),
+        image_sd=np.full(xy.shape, 0.002),
+        **weights,
+    )
+    return block, matrices, points
+
+
+@pytest.mark.parametrize("sd", [10.0, 1.0, 0.1, 0.01])
+def test_observed_attitudes_have_no_singular_place(sd):
+    noise = np.random.default_rng(4)
+    block, matrices, points = around(noise)
+    errors = Attitudes.of("rotation_vector", noise.normal(0, min(sd, 0.3), (12, 3))).matrices
+    observed = zip(block.photo_ids, matrices @ errors, strict=True)
+    result = adjust(block.replace(observations=[Attitude(photo, each, sd=sd) for photo, each in observed]))
+    assert result.converged
+    assert len(result.iterations) <= 6
+    assert np.abs(result.point_positions - points).max() < 0.003
+    assert not any("phi is within" in str(message) for message in result.messages)
+
+
+def test_weighted_angles_near_90_degrees_are_named():
+    block, *_ = around(np.random.default_rng(4), photo_attitude_sd=np.full((12, 3), 0.1))
+    steep = [message for message in adjust(block).messages if "phi is within 5 degrees of 90" in str(message)]
+    assert len(steep) == 1
+    assert "photo 0" in str(steep[0])
+    assert "photo 3" not in str(steep[0])
