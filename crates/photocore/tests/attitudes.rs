@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
+mod golden;
+
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use photocore::geometry::angle_axis::{
@@ -14,6 +16,8 @@ use photocore::geometry::{
 };
 use proptest::prelude::*;
 use serde_json::Value;
+
+use golden::{golden, list, rows};
 
 const ALL: [fn() -> AttitudeNumbers; 9] = [
     || AttitudeNumbers::OmegaPhiKappa(RotationSense::GroundToPhoto),
@@ -193,26 +197,6 @@ fn at_phi_of_ninety_degrees_only_the_report_in_angles_notices() {
         assert!(numbers.cofactors(found, &Matrix3::identity()).is_none());
         assert!(!numbers.is_singular([0.0, PI, 0.0]));
     }
-}
-
-/// A file of the golden data; None, visibly, where they are not at hand.
-fn golden(name: &str) -> Option<Value> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/network/");
-    match std::fs::read_to_string(format!("{path}{name}")) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
-        Err(error) => {
-            eprintln!("skipped: {path}{name}: {error}");
-            None
-        }
-    }
-}
-
-fn list(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
-}
-
-fn rows(value: &Value) -> Vec<Vec<f64>> {
-    value.as_array().unwrap().iter().map(list).collect()
 }
 
 fn matrix(value: &Value) -> Matrix3 {

@@ -2,10 +2,14 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
+mod golden;
+
 use num_complex::Complex64 as C;
 use photocore::geometry::{Bal, Camera, CameraModel, Unit, Vector3};
 use proptest::prelude::*;
 use serde_json::Value;
+
+use golden::{golden, list};
 
 /// A camera of the model, its parameters chosen by what they are measured in from numbers between -1 and 1.
 fn sample(name: &str, numbers: &[f64]) -> Camera {
@@ -114,10 +118,6 @@ fn a_lens_beyond_which_nothing_is_seen_says_so() {
     assert_eq!(barrel.direction([0.0, 0.0]), Some(-Vector3::z()));
 }
 
-fn list(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
-}
-
 /// Images to 1e-12 of their size, partials to 1e-10 of the largest of their row, and the way back.
 fn agrees(name: &str, model: &Value, ray: &str, axes: Vector3) {
     let camera = Camera::named(name, &list(&model["values"])).unwrap();
@@ -144,12 +144,7 @@ fn agrees(name: &str, model: &Value, ray: &str, axes: Vector3) {
 
 #[test]
 fn cameras_agree_with_the_golden_data() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/network/camera_models.json");
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(error) => return eprintln!("skipped: {path}: {error}"),
-    };
-    let data: Value = serde_json::from_str(&text).unwrap();
+    let Some(data) = golden("camera_models.json") else { return };
     agrees("bal", &data["bal"], "ray_photo_axes", Vector3::new(1.0, 1.0, 1.0));
     let vision = Vector3::new(1.0, -1.0, -1.0);
     agrees("radial", &data["forward"]["RADIAL"], "ray", vision);

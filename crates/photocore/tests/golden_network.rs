@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
+mod golden;
+
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
@@ -14,28 +16,10 @@ use photocore::network::{
 };
 use serde_json::Value;
 
+use golden::{golden, list, rows};
+
 const SENSE: RotationSense = RotationSense::GroundToPhoto;
 const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(SENSE);
-
-/// A file of the golden data; None, visibly, where they are not at hand.
-fn golden(name: &str) -> Option<Value> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/network/");
-    match std::fs::read_to_string(format!("{path}{name}")) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
-        Err(error) => {
-            eprintln!("skipped: {path}{name}: {error}");
-            None
-        }
-    }
-}
-
-fn list(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
-}
-
-fn rows(value: &Value) -> Vec<Vec<f64>> {
-    value.as_array().unwrap().iter().map(list).collect()
-}
 
 /// The network of a file, without its scale bars if so asked, and the index of every block by name.
 fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
