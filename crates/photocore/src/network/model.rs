@@ -400,8 +400,7 @@ impl Model for Bundle {
             return self.observe_tied_image(stations, self.start[self.locals] + tie, rows);
         };
         let point = |point: usize| (stations.points[point], stations.tied[point - self.locals]);
-        let photo =
-            |photo: usize| (&stations.photos[photo].orientation, self.first[photo + 1] - self.first[photo]);
+        let photo = |photo: usize| (&stations.photos[photo].orientation, self.of_block(photo).len());
         let model = TiedModel { space: self.space, origin: self.origin, point: &point, photo: &photo };
         self.observations[observation].write(&model, rows.constant, rows.coefficients);
     }

@@ -105,7 +105,7 @@ impl Network {
     }
 
     /// Whether a photo's attitude may step by a rotation vector: its angles are all free. Those that are weighted stay unknowns
-    /// themselves, so that their weights stand in the diagonal and keep them regular; a fixed one keeps its bits.
+    /// themselves, so that their weights stand in the diagonal; a fixed one keeps its bits.
     fn turns(&self, photo: usize) -> bool {
         let free = self.photos[photo].sd[3..].iter().all(|sd| sd.is_infinite());
         free && matches!(self.poses, PoseNumbers::Angles(_))
@@ -307,12 +307,14 @@ fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError>
     let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
     let images = &model.images[..groups];
     let photo_of = images.iter().map(|image| image.photo as u32).collect();
-    let layout = Layout::new(2, 3, &widths, model.start[..=model.locals].to_vec(), photo_of)?;
-    let (mut further_ptr, mut further) = (vec![0], Vec::new());
-    for image in images {
-        further.extend(model.camera_block[image.photo].map(|block| block as u32));
-        further_ptr.push(further.len());
+    let mut layout = Layout::new(2, 3, &widths, model.start[..=model.locals].to_vec(), photo_of)?;
+    if !model.shared.is_empty() {
+        let (mut further_ptr, mut further) = (vec![0], Vec::new());
+        for image in images {
+            further.extend(model.camera_block[image.photo].map(|block| block as u32));
+            further_ptr.push(further.len());
+        }
+        layout = layout.with_further(further_ptr, further)?;
     }
-    let layout = layout.with_further(further_ptr, further)?;
     Ok(layout.with_places(places)?.with_ties(model.ties())?)
 }
