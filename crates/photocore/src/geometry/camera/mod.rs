@@ -133,6 +133,8 @@ macro_rules! cameras {
     };
     (@kinds $d:tt $($name:ident)*) => {
         /// A camera of any kind.
+        // Behind a pointer the 48 numbers of the largest could not be copied as all others are.
+        #[allow(clippy::large_enum_variant)]
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum Camera {
             $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
