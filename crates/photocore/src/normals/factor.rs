@@ -286,6 +286,11 @@ impl<E: Equations> Formation<'_, E> {
             front.right[column] += self.prior.right[unknown];
             front.panel[column * (front.height + 1)] += weight + self.damping * front.diagonal[column];
             front.diagonal[column] *= 1.0 + self.damping;
+            let between = &self.prior.between;
+            let own = between.partition_point(|&(i, ..)| i < unknown);
+            for &(_, other, weight) in between[own..].iter().take_while(|&&(i, ..)| i == unknown) {
+                front.panel[(column - (unknown - other)) * front.height + column] += weight;
+            }
         }
     }
 }
