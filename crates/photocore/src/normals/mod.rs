@@ -38,6 +38,7 @@
 //! ```
 
 mod cofactors;
+mod deficiency;
 mod dense;
 mod dissection;
 mod equation_block;
@@ -67,8 +68,9 @@ mod watch;
 mod workspace;
 
 pub use cofactors::Cofactors;
+pub use deficiency::Deficiency;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
-pub use factor::{Deficiency, Factor};
+pub use factor::Factor;
 pub use graph::Graph;
 pub use invert::Inversion;
 pub use layout::{Layout, LayoutError, Tie};
