@@ -50,8 +50,10 @@ pub struct Bundle {
     pub turning: Vec<bool>,
     /// What else was observed.
     pub observations: Vec<TiedObservation>,
-    /// Whether the position of anything is weighted or fixed: then the datum is the user's.
+    /// Whether the position of anything is weighted, or of more than one photo fixed: then the datum is the user's.
     pub placed: bool,
+    /// The only photo whose position is fixed, where nothing else is placed: the user has chosen what to hold.
+    pub anchor: Option<usize>,
 }
 
 /// Photos and points at given values of the unknowns.
