@@ -94,6 +94,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
+        | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
         | Failure::Datum(_)
