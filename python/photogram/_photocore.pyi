@@ -16,6 +16,13 @@ _Indices = NDArray[np.int64]
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
+FailureRow = tuple[str, str, list[list[int]], list[int], list[list[int]]]
+"""Why a network cannot be adjusted, as in :class:`BlockError`."""
+
+CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
+"""Of an adjusted camera: k parameters, k x k cofactors row by row, k redundancy numbers, the diagonal of the
+normal equations (k), photos, images."""
+
 RefractionRow = tuple[str | None, str | None, float, float, float]
 """Model of the air (`giant`, `standard` or None), model of the water (`giant`, `snell` or None), water level
 (linear unit), refractive index of the water, metres in the linear unit."""
@@ -328,10 +335,10 @@ def refraction_shift(
 class BlockError(Exception):
     """A block that cannot be adjusted.
 
-    `args` is (kind, message, photos, points): kind is `undetermined points`, `undetermined photos`, `no
-    intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or
-    `input`; photos is a list of photo indices for each undetermined combination
-    of unknowns, points a list of point indices.
+    `args` is (kind, message, photos, points, cameras): kind is `undetermined points`, `undetermined photos`,
+    `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or `input`;
+    photos and cameras are lists of indices for each undetermined combination of unknowns, points a list of
+    point indices.
     """
 
 def adjust_block(
@@ -341,7 +348,8 @@ def adjust_block(
     photo_attitudes_observed: _Floats,
     photo_position_sd: _Floats,
     photo_attitude_sd: _Floats,
-    principal_distances: _Floats,
+    photo_cameras: _Indices,
+    cameras: list[tuple[str, list[float], list[float]]],
     point_positions: _Floats,
     point_sd: _Floats,
     image_photos: _Indices,
@@ -377,8 +385,10 @@ def adjust_block(
         (P, 3) observed values where weighted; angles may differ from initial ones by whole turns.
     photo_position_sd, photo_attitude_sd
         (P, 3) standard deviations of the observed values.
-    principal_distances
-        (P,) millimetres, signed.
+    photo_cameras
+        (P,) indices into the cameras; photos with the same one share its unknowns.
+    cameras
+        Model, parameters in its order and their standard deviations.
     point_positions, point_sd
         (n, 3) coordinates, NaN where unknown, and standard deviations, finite for held components.
     image_photos, image_points
@@ -493,7 +503,7 @@ class _NetworkSolution:
         """(m,) factor by which a loss has changed the weight; 1 without a loss."""
 
     @property
-    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
+    def undetermined(self) -> FailureRow | None:
         """Why there are no cofactors although they were asked for, as in :class:`BlockError`."""
 
     @property
@@ -568,6 +578,14 @@ class BlockSolution(_NetworkSolution):
 
         Empty where observations and weights give one.
         """
+
+    @property
+    def weak_cameras(self) -> list[tuple[int, int]]:
+        """The same for cameras that several photos share: cameras and their parameters."""
+
+    @property
+    def cameras(self) -> list[CameraRow]:
+        """The adjusted cameras, in the order in which they were given."""
 
     @property
     def dropped(self) -> list[tuple[int, str]]:

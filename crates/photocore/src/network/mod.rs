@@ -331,6 +331,11 @@ impl Network {
             if camera.sd.len() != camera.camera.parameter_names().len() {
                 return Err(NetworkError::CameraDeviations(index));
             }
+            let known = camera.camera.parameter_names();
+            let unknowns = known.len() - camera.camera.constants();
+            if let Some(free) = (unknowns..known.len()).find(|&k| camera.sd[k] != 0.0) {
+                return Err(NetworkError::CameraConstant { camera: index, parameter: known[free].0 });
+            }
         }
         for (index, observation) in self.observations.iter().enumerate() {
             let checked = observation.check(self.points.len(), self.photos.len());
