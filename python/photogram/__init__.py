@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
     from photogram.network.block import Block
+    from photogram.network.cameras import Camera
     from photogram.network.geometry import Spheroid
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
@@ -29,6 +30,7 @@ __all__ = [
     "AsPublished",
     "Attitudes",
     "Block",
+    "Camera",
     "InputError",
     "Iteration",
     "Message",
@@ -58,6 +60,7 @@ _HOMES = {
     "AsPublished": "adjustment.adjustment",
     "Attitudes": "network.attitudes",
     "Block": "network.block",
+    "Camera": "network.cameras",
     "InputError": "errors",
     "Iteration": "results.iteration",
     "Message": "messages",

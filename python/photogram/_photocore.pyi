@@ -95,6 +95,64 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     NaN for arguments that cannot be.
     """
 
+def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str]]]:
+    """Return the models of cameras, `CAMERAS`, by their names.
+
+    Returns
+    -------
+    Of each its formula, its parameters with the power of the unit of the image in which they are measured (0
+    for plain numbers), how many of these, the last ones, are constants that are never unknown, and its
+    direction: `forward`, lens terms are functions of ideal coordinates, or `backward`, of measured ones.
+    """
+
+def camera_images(model: str, parameters: _Floats, u: _Floats) -> _Floats:
+    """Images of directions.
+
+    Parameters
+    ----------
+    model
+        One of `CAMERAS`.
+    parameters
+        (k,) in the order of the model.
+    u
+        (n, 3) in the axes of the photo: x right, y up, z back towards the viewer; the camera looks along -z.
+
+    Returns
+    -------
+    (n, 2) in the unit of the camera; not finite where there are none.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, other shapes or numbers of parameters.
+    """
+
+def camera_rays(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
+    """Directions of image positions; arguments as in :func:`camera_images`.
+
+    Returns
+    -------
+    (n, 3) unit vectors in the axes of the photo, in front of it; NaN where no direction has the image.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, other shapes or numbers of parameters.
+    """
+
+def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
+    """Corrected image positions of a backward camera; arguments as in :func:`camera_images`.
+
+    Returns
+    -------
+    (n, 2) g, compared with c (u1, u2) / u3.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not or that is forward, other shapes or numbers of parameters.
+    """
+
 def attitudes_from_numbers(
     representation: str, numbers: _Floats, boresight: _Floats
 ) -> tuple[_Floats, _Floats]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
@@ -25,6 +26,11 @@ CameraRow = tuple[str, list[float], list[float]]
 
 _GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b"})
 """Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras."""
+
+
+@cache
+def _models() -> dict[str, tuple[str, list[tuple[str, int]], int, str]]:
+    return dict(_photocore.camera_models())
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +83,22 @@ class Camera:
     @property
     def names(self) -> tuple[str, ...]:
         """The k parameters of the model, in their order."""
-        return tuple(name for name, _ in _photocore.camera_model(self.model)[1])
+        return tuple(name for name, _ in self._facts[1])
 
     @property
     def constants(self) -> frozenset[str]:
         """Parameters that are never unknown."""
-        return frozenset(self.names) & {"r0"}
+        names, count = self.names, self._facts[2]
+        return frozenset(names[len(names) - count :])
+
+    @property
+    def direction(self) -> str:
+        """What lens terms are functions of: `forward` ideal coordinates, `backward` measured ones."""
+        return self._facts[3]
+
+    @property
+    def _facts(self) -> tuple[str, list[tuple[str, int]], int, str]:
+        return _models()[self.model]
 
     @property
     def values(self) -> Floats:
@@ -110,8 +126,8 @@ class Camera:
 
     def unit_of(self, name: str) -> str:
         """Return the unit of a parameter; nothing for a plain number."""
-        lengths = {name for name, in_image in _photocore.camera_model(self.model)[1] if in_image}
-        return str(self.unit) if name in lengths else ""
+        power = dict(self._facts[1])[name]
+        return "" if power == 0 else f"{self.unit}" if power == 1 else f"{self.unit}^{power}"
 
     @property
     def title(self) -> str:

@@ -1,9 +1,11 @@
 """The radial distortion of an adjusted camera, with what is known of it.
 
-A curve dr(r) of the radial terms k, its partials J = d(dr)/dk and the block Q of their cofactors give the band
-s(r) = sigma0 sqrt(J Q J'). What a user measures with includes the principal distance c: a change dc moves an
-image at r by (r / c) dc, so the band of the mapping is that of (J, r / c) with the block of k and c. Balanced, a
-part B r that c may take over is subtracted so that the curve vanishes at r0: J - r w with w = J(r0) / r0.
+A curve dr(r) of the radial terms k, its partials J = d(dr)/dk and the block Q of their cofactors give the
+band s(r) = sigma0 sqrt(J Q J'). What a user measures with includes the principal distance c. A forward camera
+maps a ray to r + dr, which moves by J dk + (r / c) dc; a backward one maps a measured position to the ray
+(r + dr) / c, which moves by (J dk - (r / c) dc) / c: so the band of the mapping is that of (J, r / c) or of
+(J, -r / c) with the block of k and c. Balanced, a part B r that c may take over is subtracted so that the
+curve vanishes at r0: J - r w with w = J(r0) / r0.
 """
 
 from __future__ import annotations
@@ -106,7 +108,7 @@ def distortion_curve(
     distance = next(k for k, name in enumerate(camera.names) if name in ("c", "f", "fx"))
     c = float(camera.values[distance])
     part = curve[-1] / r0
-    with_distance = np.column_stack([partials, both / c])
+    with_distance = np.column_stack([partials, -both / c if _is_backward(camera.camera) else both / c])
     balanced = partials - np.outer(both / r0, partials[-1])
     return DistortionCurve(
         direction="backward" if _is_backward(camera.camera) else "forward",
