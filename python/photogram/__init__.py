@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.first_values import FirstValues, first_values
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
@@ -29,6 +30,7 @@ __all__ = [
     "AsPublished",
     "Attitudes",
     "Block",
+    "FirstValues",
     "InputError",
     "Iteration",
     "Message",
@@ -46,6 +48,7 @@ __all__ = [
     "Spheroid",
     "__version__",
     "adjust",
+    "first_values",
     "orient",
     "plan",
     "predict",
@@ -58,6 +61,7 @@ _HOMES = {
     "AsPublished": "adjustment.adjustment",
     "Attitudes": "network.attitudes",
     "Block": "network.block",
+    "FirstValues": "adjustment.first_values",
     "InputError": "errors",
     "Iteration": "results.iteration",
     "Message": "messages",
@@ -75,6 +79,7 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "first_values": "adjustment.first_values",
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",
