@@ -126,6 +126,7 @@ def good(tmp_path_factory):
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},
             "first_values": {"block": block},
+            "hints": {"block": block},
             "orient": {"stations": stations},
             "plan": {"patterns": {"one": block}},
             "predict": {"block": block},

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
     from photogram.adjustment.first_values import FirstValues, first_values
+    from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
@@ -49,6 +50,7 @@ __all__ = [
     "__version__",
     "adjust",
     "first_values",
+    "hints",
     "orient",
     "plan",
     "predict",
@@ -80,6 +82,7 @@ _HOMES = {
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
     "first_values": "adjustment.first_values",
+    "hints": "adjustment.hints",
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",

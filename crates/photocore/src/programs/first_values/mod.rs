@@ -210,7 +210,7 @@ impl Search<'_> {
         if object.is_empty() && !object.is_anchored(self) && !apart.is_empty() {
             let largest = (0..apart.len()).rev().max_by_key(|&k| apart[k].count()).unwrap_or(0);
             object = apart.remove(largest);
-            frame = Frame::FirstPhoto(object.to_first_photo());
+            frame = Frame::FirstPhoto(object.count_from_first_photo());
         }
         self.finish(&mut object)?;
         Ok(self.found(object, &apart, frame))

@@ -151,7 +151,7 @@ impl Model {
     }
 
     /// Counts it from its first photo, in bases to the farthest one; that photo.
-    pub fn to_first_photo(&mut self) -> usize {
+    pub fn count_from_first_photo(&mut self) -> usize {
         let Some((first, (origin, _))) =
             self.poses.iter().enumerate().find_map(|(k, pose)| Some((k, (*pose)?)))
         else {
