@@ -399,6 +399,60 @@ class BlockError(Exception):
     point indices.
     """
 
+def find_first_values(
+    photo_positions: _Floats,
+    photo_attitudes: _Floats,
+    observed_positions: _Floats,
+    observed_attitudes: _Floats,
+    point_positions: _Floats,
+    point_sd: _Floats,
+    image_photos: _Indices,
+    image_points: _Indices,
+    directions: _Floats,
+    direction_sd: _Floats,
+    *,
+    threads: int,
+) -> tuple[
+    _Floats,
+    _Floats,
+    list[tuple[str, int, int]],
+    _Floats,
+    NDArray[np.bool_],
+    int | None,
+    float | None,
+]:
+    """Find poses of photos from what is known, in cartesian object space (`docs/first-values.md`).
+
+    Parameters
+    ----------
+    photo_positions, photo_attitudes
+        (P, 3) and (P, 3, 3), photo to object: given poses; NaN where none is.
+    observed_positions, observed_attitudes
+        The same as observed; NaN where they were not.
+    point_positions, point_sd
+        (n, 3) control in the linear unit, and its standard deviations; infinite where it is not held.
+    image_photos, image_points
+        (m,) indices into photos and points.
+    directions, direction_sd
+        (m, 3) unit directions in the axes of the photos, not finite where there is none, and (m,) their
+        standard deviations in radians.
+    threads
+        As for `adjust_block`.
+
+    Returns
+    -------
+    (P, 3) positions and (P, 3, 3) attitudes, NaN where none was found; for each photo (`given`, `resected`,
+    `observed` or `oriented`, 0, 0), or why it has none: (`points`, known points, 0), (`misfit`, known points,
+    0) or (`apart`, what its model has in common, photos of the model); (n, 3) positions of points; (m,)
+    whether an image was set aside; the photo that is the datum, if nothing else is; the median of the angles
+    between observed and computed directions, radians.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape or length, an index out of range; the message names it.
+    """
+
 def adjust_block(
     photo_positions: _Floats,
     photo_attitudes: _Floats,

@@ -13,7 +13,6 @@ from photogram.checks.findings import Check, Finding, Section
 from photogram.checks.gross import Suspects, disproved, gross, without
 from photogram.checks.heights import two_ray_heights
 from photogram.checks.orientation import orientation, spare_explained
-from photogram.checks.rays import Rays
 from photogram.checks.residuals import residuals
 from photogram.checks.stations import stations
 from photogram.checks.structure import structure_section
@@ -21,6 +20,7 @@ from photogram.giant.control import control, key_numbers
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
 from photogram.network.block import Block
+from photogram.network.rays import Rays
 
 if TYPE_CHECKING:
     from photogram.giant.project import Project

@@ -77,8 +77,10 @@ pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
+pub(crate) use precision::median;
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+pub(crate) use start::meet;
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]

@@ -2,6 +2,7 @@
 
 mod block;
 mod collection;
+mod first_values;
 mod solution;
 
 use numpy::PyReadonlyArrayDyn;
@@ -32,6 +33,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("CollectionError", module.py().get_type::<CollectionError>())?;
     block::register(module)?;
     collection::register(module)?;
+    first_values::register(module)?;
     solution::register(module)
 }
 
