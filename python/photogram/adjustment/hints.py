@@ -15,6 +15,7 @@ from photogram.adjustment.hypotheses import TURNS, Hypothesis, attitude_readings
 from photogram.adjustment.regression import (
     LEAST,
     MOST,
+    control_misfit,
     eligible,
     given_points,
     misfits,
@@ -135,9 +136,10 @@ def verdicts(block: Block) -> list[Verdict]:
     if not len(photos):
         return []
     seen = misfits(view(block, photos), photos)
-    suspect = photos[seen > SUSPICION]
-    if len(suspect) <= max(1, len(photos) // 4):
-        return list(_single(block, suspect[:MOST]))
+    if np.median(seen) <= SUSPICION:
+        worst = photos[np.argsort(-seen)][:MOST]
+        single = list(_single(block, np.sort(worst[np.sort(-seen)[:MOST] < -SUSPICION])))
+        return single or _of_control(view(block, spread(photos, MOST)), spread(photos, MOST))
     chosen = spread(photos, MOST)
     looked = view(block, chosen)
     passing = _passing(looked, chosen)
@@ -147,15 +149,32 @@ def verdicts(block: Block) -> list[Verdict]:
 def _passing(looked: Block, photos: Indices) -> list[tuple[float, Hypothesis]]:
     """Return hypotheses under which photos fit, with the misfit that is left."""
     seen = regressions(looked, photos)
-    passing = []
+    passing: dict[str, tuple[float, Hypothesis]] = {}
     for hypothesis in hypotheses(looked, seen):
         left = misfits(hypothesis.block, photos)
         ratio, median = left / seen.misfit, float(np.median(left))
         limit = PASSES_ROUGH if median > ROUGH else PASSES
         each = (ratio < EACH) | (np.maximum(left, seen.misfit) < SUSPICION)
         if np.median(ratio) < limit and each.all() and median < SUSPICION:
-            passing.append((median, hypothesis))
-    return passing
+            found = (median, hypothesis)
+            passing[hypothesis.name] = min(
+                passing.get(hypothesis.name, found), found, key=lambda each: each[0]
+            )
+    return list(passing.values())
+
+
+def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
+    """Try what makes given points fit, where rays meet well but not there."""
+    given = control_misfit(looked)
+    if not given_points(looked)[looked.image_points].any() or given <= SUSPICION:
+        return []
+    passing = []
+    for hypothesis in hypotheses(looked):
+        left = control_misfit(hypothesis.block)
+        fits = left < given * (PASSES_ROUGH if left > ROUGH else PASSES) and left < SUSPICION
+        if fits and np.median(misfits(hypothesis.block, photos)) < SUSPICION:
+            passing.append((left, hypothesis))
+    return [Verdict(passing, given, "")] if passing else []
 
 
 def _single(block: Block, photos: Indices) -> Iterator[Verdict]:

@@ -47,6 +47,13 @@ _SCALED, _SHIFTED = 0.15, 0.25
 """A scale further from 1, a shift of a larger part of half of the format are no matter of rough poses."""
 _ALIKE = 0.05
 """Scatter of the scale over photos, relative, and of the shift, in halves of the format, at the most."""
+_CORNER = 0.5
+"""The middle of all images is further from the origin than this part of half of their extent."""
+_WIDEST, _FINEST = 4.0, 10.0
+"""Half of the extent of images, in principal distances, beyond which they are wider than a camera's, and what
+its inverse may be at the most,"""
+_SCALES = 60
+"""with so many steps in between."""
 _EXPLAINED = 0.2
 """e, what a regression leaves, at the most."""
 
@@ -70,12 +77,14 @@ class Hypothesis:
     block: Block
 
 
-def hypotheses(block: Block, seen: Regression) -> Iterator[Hypothesis]:
-    """Propose mistakes for a block of which `seen` says how images and predictions differ."""
+def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
+    """Propose mistakes for a block; `seen` says how its images and their predictions differ."""
     yield from _turned(block)
-    composed = image_hypothesis(block, seen)
+    composed = None if seen is None else image_hypothesis(block, seen)
     if composed is not None:
         yield composed
+    else:
+        yield from _of_format(block)
     yield from _attitudes(block)
     yield from _positions(block)
 
@@ -130,6 +139,29 @@ def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
             names.append(name)
             parts.append(text)
     return Hypothesis(", ".join(names), "; ".join(parts), block.replace(image_xy=meant))
+
+
+def _of_format(block: Block) -> Iterator[Hypothesis]:
+    """Propose a corner for the origin, and pixels, from how far images reach: where few points are given."""
+    lowest, highest = block.image_xy.min(axis=0), block.image_xy.max(axis=0)
+    middle, half = (lowest + highest) / 2, float((highest - lowest).max() / 2)
+    distance = float(np.abs(block.principal_distances).max())
+    corner, pixels = bool(np.abs(middle).min() > _CORNER * half), half > _WIDEST * distance
+    if not (corner or pixels):
+        return
+    scales = np.ones(1)
+    if pixels:
+        scales = np.geomspace(half / (_WIDEST * distance), _FINEST * half / distance, _SCALES)
+    shift = middle if corner else np.zeros(2)
+    for turn, sense in (([1.0, 1.0], ""), ([1.0, -1.0], ", and y is counted down, not up")):
+        meant = (block.image_xy - shift) * turn
+        names = ["unit"] * pixels + ["origin"] * corner + ["y down"] * bool(sense)
+        where = "a corner and not the middle of the format"
+        for scale in scales.tolist():
+            unit = f"images are pixels (of about {1 / scale:.2g} mm)" if pixels else "images are"
+            counted = f"{', ' if pixels else ' '}counted from {where}" if corner else ""
+            text = unit + counted + sense
+            yield Hypothesis(", ".join(names), text, block.replace(image_xy=meant / scale))
 
 
 def attitude_readings(block: Block) -> dict[str, tuple[str, Floats]]:

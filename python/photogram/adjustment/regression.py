@@ -18,6 +18,7 @@ __all__ = [
     "LEAST",
     "MOST",
     "Regression",
+    "control_misfit",
     "eligible",
     "given_points",
     "misfits",
@@ -112,12 +113,20 @@ def misfits(block: Block, photos: Indices) -> Floats:
     return np.array([_misfit(block, predicted, photo) for photo in photos])
 
 
+def control_misfit(block: Block) -> float:
+    """M of all images of given points together; very large where there are too few."""
+    rows = np.flatnonzero(given_points(block)[block.image_points])
+    if len(rows) < LEAST:
+        return _UNKNOWN
+    found = _relative(block.image_xy[rows] - predictions(block)[rows], block.image_xy[rows])
+    return found if np.isfinite(found) else _UNKNOWN
+
+
 def _misfit(block: Block, predicted: Floats, photo: int) -> float:
     rows = _rows(block, predicted, photo)
     if len(rows) < LEAST:
         return _UNKNOWN
-    observed = block.image_xy[rows]
-    found = _rms(observed - predicted[rows]) / _rms(observed - observed.mean(axis=0))
+    found = _relative(block.image_xy[rows] - predicted[rows], block.image_xy[rows])
     return found if np.isfinite(found) else _UNKNOWN
 
 
@@ -126,8 +135,9 @@ def _rows(block: Block, predicted: Floats, photo: int) -> Indices:
     return found
 
 
-def _rms(values: Floats) -> float:
-    return float(np.sqrt((values**2).sum(axis=1).mean()))
+def _relative(residuals: Floats, observed: Floats) -> float:
+    """Rms of residuals in that of the observed about their mean; not finite where these are one."""
+    return float(np.sqrt((residuals**2).sum() / ((observed - observed.mean(axis=0)) ** 2).sum()))
 
 
 def regressions(block: Block, photos: Indices) -> Regression:
@@ -153,7 +163,7 @@ def _regressed(observed: Floats, predicted: Floats) -> tuple[float, Floats, Floa
     solved = np.linalg.lstsq(design, observed, rcond=None)[0]
     linear = solved[:2].T
     left, _, right = np.linalg.svd(linear)
-    rest = _rms(observed - design @ solved) / _rms(observed - observed.mean(axis=0))
+    rest = _relative(observed - design @ solved, observed)
     return float(np.sqrt(abs(np.linalg.det(linear)))), left @ right, solved[2], rest
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram.adjustment.hints import hints
 from photogram.checks.editing import HOPELESS, Edited, blunder_section, edit
 from photogram.checks.findings import Check, Finding, Section
 from photogram.checks.gross import Suspects, disproved, gross, without
@@ -65,6 +66,8 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
 
 def _checked(project: Project, block: Block, limits: Limits | None, threads: int | None) -> Check:
     upright, oriented = orientation(block)
+    if oriented is block:
+        upright.findings += [Finding("convention", "grave", str(hint)) for hint in hints(block)]
     errors, suspects = gross(oriented)
     if suspects.photos.any():
         spare_explained(upright, oriented, suspects.photos)
