@@ -28,7 +28,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, OutOfMemoryError
 from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
-from photogram.network.directions import image_directions
+from photogram.network.directions import image_directions, without_lenses
 from photogram.network.geometry import rotation_matrix
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
@@ -106,7 +106,7 @@ def hints(block: Block) -> list[Message]:
     >>> print(hints(down)[0])  # doctest: +ELLIPSIS
     probably y of the images has the wrong sign: it is counted down, not up: images would miss ...
     """
-    checked(block)
+    block = without_lenses(checked(block))
     with np.errstate(all="ignore"):
         found = [Message(verdict.text) for verdict in verdicts(block)]
         return [*found, *_latitudes(block), *(_readings(block) if not found else []), *_bars(block)]

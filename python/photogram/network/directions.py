@@ -8,7 +8,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
 
-__all__ = ["direction_deviations", "image_directions"]
+__all__ = ["direction_deviations", "image_directions", "without_lenses"]
 
 
 def image_directions(block: Block) -> Floats:
@@ -30,3 +30,25 @@ def direction_deviations(block: Block) -> Floats:
     """(m,) standard deviations of these directions, radians: those of images over the principal distance."""
     deviations = np.sqrt((block.image_sd**2).mean(axis=1)) / block.camera_scales()[block.image_photos]
     return np.asarray(deviations)
+
+
+def without_lenses(block: Block) -> Block:
+    """Return a block as cameras without distortion would have seen it, each with its given parameters.
+
+    Images that no direction has, at these parameters, are left out.
+    """
+    if not block.cameras:
+        return block
+    directions, scales = image_directions(block), block.camera_scales()
+    seen = np.isfinite(directions).all(axis=1)
+    photos = block.image_photos[seen]
+    ideal = directions[seen, :2] / -directions[seen, 2:]
+    return block.replace(
+        cameras=(),
+        photo_cameras=None,
+        principal_distances=-scales,
+        image_photos=photos,
+        image_points=block.image_points[seen],
+        image_xy=ideal * scales[photos, np.newaxis],
+        image_sd=block.image_sd[seen],
+    )
