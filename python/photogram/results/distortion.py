@@ -5,7 +5,8 @@ band s(r) = sigma0 sqrt(J Q J'). What a user measures with includes the principa
 maps a ray to r + dr, which moves by J dk + (r / c) dc; a backward one maps a measured position to the ray
 (r + dr) / c, which moves by (J dk - (r / c) dc) / c: so the band of the mapping is that of (J, r / c) or of
 (J, -r / c) with the block of k and c. Balanced, a part B r that c may take over is subtracted so that the
-curve vanishes at r0: J - r w with w = J(r0) / r0.
+curve vanishes at r0: J - r w with w = J(r0) / r0; the principal distance is then c / (1 + B), c (1 + B) where
+the lens is forward.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ def distortion_curve(
         balanced=(curve - part * both)[:-1],
         sd_balanced=_deviations(camera, terms, balanced)[:-1],
         balanced_at=r0,
-        balanced_distance=c * (1.0 - part),
+        balanced_distance=c / (1.0 + part) if _is_backward(camera.camera) else c * (1.0 + part),
         observed=observed,
     )
 
