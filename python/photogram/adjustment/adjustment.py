@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.ends import behind, datum, rounded, steep, too_coarse, undetermined
+from photogram.adjustment.ends import behind, datum, rounded, too_coarse, undetermined
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
@@ -289,7 +289,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     lost = [each.name for each in block.observations if not each.OF_PHOTOS and dropped.intersection(each.of)]
     if lost:
         messages.append(Message(f"left out with their points: {listed(lost)}"))
-    messages = datum(block, solution) + messages + steep(block)
+    messages = datum(block, solution) + messages
     return messages + remarks(block, solution.photo_positions)
 
 

@@ -62,6 +62,7 @@ mod problem;
 mod screening;
 mod solution;
 mod start;
+mod weighted_angles;
 
 use std::ops::ControlFlow;
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::observations::{TiedModel, TiedObservation};
 use super::{Image, Point};
-use crate::adjustment::{Model, Motions};
+use crate::adjustment::{Model, Motions, Weighted};
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
     self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
@@ -46,7 +46,7 @@ pub struct Bundle {
     pub order: Vec<usize>,
     /// How many images each photo has.
     pub images_on: Vec<usize>,
-    /// Which photos step by a rotation vector about their own axes: those with free angles.
+    /// Which photos step by a rotation vector about their own axes: those without a fixed angle.
     pub turning: Vec<bool>,
     /// What else was observed.
     pub observations: Vec<TiedObservation>,
@@ -400,6 +400,10 @@ impl Model for Bundle {
         let turned: Vec<(usize, [f64; 3])> = (0..self.cameras.len()).filter_map(turn).collect();
         unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
         turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
+    }
+
+    fn weighted(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Weighted> {
+        self.weighted_angles(values, prior, sd)
     }
 
     /// Intersects the points anew.

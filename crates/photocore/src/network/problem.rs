@@ -104,11 +104,10 @@ impl Network {
         std::array::from_fn(|k| if turning(k) { near[k] } else { photo.observed[k] })
     }
 
-    /// Whether a photo's attitude may step by a rotation vector: its angles are all free. Those that are weighted stay unknowns
-    /// themselves, so that their weights stand in the diagonal; a fixed one keeps its bits.
+    /// Whether a photo's attitude steps by a rotation vector: a fixed angle keeps its bits.
     fn turns(&self, photo: usize) -> bool {
-        let free = self.photos[photo].sd[3..].iter().all(|sd| sd.is_infinite());
-        free && matches!(self.poses, PoseNumbers::Angles(_))
+        let fixed = self.photos[photo].sd[3..].contains(&0.0);
+        !fixed && matches!(self.poses, PoseNumbers::Angles(_))
     }
 
     /// The problem of the points that take part, from the initial values on or from those reached.
