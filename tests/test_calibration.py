@@ -10,6 +10,7 @@ from example_scripts import load
 from photogram import Block, Camera, adjust
 from photogram.results.calibration import calibrations
 from photogram.results.distortion import distortion_curve
+from photogram.results.lens_field import lens_field
 
 FREE = np.inf
 NAMES = ("c", "xp", "yp", "K1", "K2", "K3", "P1", "P2")
@@ -198,6 +199,27 @@ def test_what_comes_from_a_prior_is_said(example):
     assert any(line.startswith("c is from its prior") for line in said)
     assert any("c has moved by" in line for line in said)
     assert not any(line.startswith("K2 is from its prior") for line in said)
+
+
+def test_other_terms_have_a_field_of_vectors(example, result, tmp_path):
+    from photogram.results.calibration_picture import draw_lens_field
+
+    camera = result.cameras[0]
+    field = lens_field(result, camera)
+    assert field.names == ("P1", "P2")
+    x, y = (field.positions - [camera.value("xp"), camera.value("yp")]).T
+    r2 = x**2 + y**2
+    partials = np.array([[r2 + 2 * x**2, 2 * x * y], [2 * x * y, r2 + 2 * y**2]]).transpose(2, 0, 1)
+    p = [camera.names.index(name) for name in field.names]
+    np.testing.assert_allclose(field.vectors, partials @ camera.values[p], rtol=1e-8, atol=1e-14)
+    covariances = partials @ camera.covariance[np.ix_(p, p)] @ partials.transpose(0, 2, 1)
+    np.testing.assert_allclose(field.covariances, covariances, rtol=1e-6, atol=1e-16)
+    draw_lens_field(result, camera, tmp_path / "field.png")
+    assert (tmp_path / "field.png").read_bytes().startswith(b"\x89PNG")
+    bare = adjust(example.measured().replace(cameras=[example.START.replace(sd={"c": FREE, "K1": FREE})]))
+    assert lens_field(bare, bare.cameras[0]) is None
+    with pytest.raises(ValueError, match="no terms beside the radial ones"):
+        draw_lens_field(bare, bare.cameras[0], tmp_path / "none.png")
 
 
 def test_report_document_and_picture(example, result, tmp_path, capsys):

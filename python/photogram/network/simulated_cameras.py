@@ -59,9 +59,7 @@ def photographed(
     }
     return (
         truth.replace(**changes, cameras=true, image_xy=images),
-        block.replace(
-            **changes, cameras=start, image_xy=images + larger * (block.image_xy - truth.image_xy)
-        ),
+        block.replace(**changes, cameras=start, image_xy=images + larger * (block.image_xy - truth.image_xy)),
     )
 
 
