@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
     from photogram.network.block import Block
+    from photogram.network.cameras import Camera
     from photogram.network.geometry import Spheroid
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
@@ -31,6 +32,7 @@ __all__ = [
     "AsPublished",
     "Attitudes",
     "Block",
+    "Camera",
     "FirstValues",
     "InputError",
     "Iteration",
@@ -63,6 +65,7 @@ _HOMES = {
     "AsPublished": "adjustment.adjustment",
     "Attitudes": "network.attitudes",
     "Block": "network.block",
+    "Camera": "network.cameras",
     "FirstValues": "adjustment.first_values",
     "InputError": "errors",
     "Iteration": "results.iteration",

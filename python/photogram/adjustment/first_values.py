@@ -82,18 +82,18 @@ class FirstValues:
         images = kept[block.image_photos] & ~self.set_aside
         places = np.cumsum(kept) - 1
         of_photos = {
-            name: getattr(block, name)[kept]
+            name: None if getattr(block, name) is None else getattr(block, name)[kept]
             for name in (
                 "photo_positions",
                 "photo_attitudes",
                 "principal_distances",
+                "photo_cameras",
                 "photo_position_sd",
                 "photo_attitude_sd",
+                "photo_positions_observed",
+                "photo_attitudes_observed",
             )
         }
-        for name in ("photo_positions_observed", "photo_attitudes_observed"):
-            observed = getattr(block, name)
-            of_photos[name] = None if observed is None else observed[kept]
         return block.replace(
             photo_ids=[photo for photo in block.photo_ids if photo in self.sources],
             image_photos=places[block.image_photos[images]],

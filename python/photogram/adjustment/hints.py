@@ -28,6 +28,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, OutOfMemoryError
 from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
+from photogram.network.directions import image_directions
 from photogram.network.geometry import rotation_matrix
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
@@ -244,12 +245,15 @@ def _resected(block: Block, photo: int) -> Floats | None:
     rows = np.flatnonzero((block.image_photos == photo) & given_points(block)[block.image_points])
     points = block.image_points[rows]
     count = len(rows)
+    # As a camera without distortion would have them.
+    distance = -float(block.camera_scales()[photo])
+    directions = image_directions(block)[rows]
     observed = Observed(
         block.point_positions[points],
         np.zeros((count, 3)),
-        block.image_xy[rows],
+        distance * directions[:, :2] / directions[:, 2:],
         block.image_sd[rows],
-        float(block.principal_distances[photo]),
+        distance,
         [block.point_ids[point] for point in points],
     )
     try:

@@ -16,12 +16,17 @@ def image_directions(block: Block) -> Floats:
 
     x to the right, y up, z back: the camera looks along -z. Refraction is left out.
     """
-    distances = block.principal_distances[block.image_photos]
-    return _photocore.image_directions("perspective", distances[:, np.newaxis], block.image_xy)
+    cameras, photo_cameras = block.core_cameras()
+    of_images = photo_cameras[block.image_photos]
+    order = np.argsort(of_images, kind="stable")
+    ends = np.searchsorted(of_images[order], np.arange(len(cameras)), side="right")
+    directions = np.full((len(order), 3), np.nan)
+    for (model, parameters, _), own in zip(cameras, np.split(order, ends[:-1]), strict=True):
+        directions[own] = _photocore.camera_rays(model, np.array(parameters), block.image_xy[own])
+    return directions
 
 
 def direction_deviations(block: Block) -> Floats:
     """(m,) standard deviations of these directions, radians: those of images over the principal distance."""
-    distances = np.abs(block.principal_distances[block.image_photos])
-    deviations: Floats = np.sqrt((block.image_sd**2).mean(axis=1)) / distances
-    return deviations
+    deviations = np.sqrt((block.image_sd**2).mean(axis=1)) / block.camera_scales()[block.image_photos]
+    return np.asarray(deviations)

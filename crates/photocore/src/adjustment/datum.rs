@@ -111,7 +111,7 @@ pub fn in_datum<M: Model>(
 
     let inverted = problem.system.invert(pool, factor, &equations, &prior, between);
     let Inversion { mut cofactors, .. } = unless_stopped(inverted)?;
-    problem.finish_cofactors(&mut cofactors, held);
+    problem.finish_cofactors(&mut cofactors, held, &unknowns);
     Transformation { t: &basis.t, w: &w, common: &common }.apply(problem.layout(), &mut cofactors);
     Ok(InDatum { unknowns, cofactors })
 }

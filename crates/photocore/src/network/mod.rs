@@ -62,6 +62,7 @@ mod problem;
 mod screening;
 mod solution;
 mod start;
+mod weighted_angles;
 
 use std::ops::ControlFlow;
 
@@ -331,6 +332,11 @@ impl Network {
         for (index, camera) in self.cameras.iter().enumerate() {
             if camera.sd.len() != camera.camera.parameter_names().len() {
                 return Err(NetworkError::CameraDeviations(index));
+            }
+            let known = camera.camera.parameter_names();
+            let unknowns = known.len() - camera.camera.constants();
+            if let Some(free) = (unknowns..known.len()).find(|&k| camera.sd[k] != 0.0) {
+                return Err(NetworkError::CameraConstant { camera: index, parameter: known[free].0 });
             }
         }
         for (index, observation) in self.observations.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! First values of photos and points; their documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
-use photocore::geometry::{Camera, Matrix3, Pose, Vector3};
+use photocore::geometry::{Matrix3, Pose, Vector3};
 use photocore::programs::first_values::{
     FirstValues, FirstValuesError, Found, Frame, KnownPhoto, KnownPoint, Missing, Sighting, Source,
 };
@@ -9,33 +9,13 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{
-    InputError, check_lengths, from_rows, indices, matrices, numbers, row_major, rows, slices, squares, table,
+    InputError, check_lengths, from_rows, indices, matrices, numbers, row_major, rows, squares, table,
 };
-use crate::options::unknown;
 use crate::work::{Workers, watched};
 
 /// Adds the functions to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(image_directions, module)?)?;
     module.add_function(wrap_pyfunction!(find_first_values, module)?)
-}
-
-#[pyfunction]
-fn image_directions<'py>(
-    py: Python<'py>,
-    camera: &str,
-    parameters: PyReadonlyArrayDyn<'py, f64>,
-    image_xy: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (_, names) = Camera::model(camera).ok_or_else(|| unknown("camera", camera))?;
-    let parameters = slices("parameters", &parameters, names.len())?;
-    let image_xy = rows::<2>("image_xy", &image_xy)?;
-    check_lengths(("image_xy", image_xy.len()), &[("parameters", parameters.len())])?;
-    let direction = |(own, xy): (&Vec<f64>, &[f64; 2])| -> [f64; 3] {
-        let found = Camera::named(camera, own).and_then(|camera| camera.direction(*xy));
-        found.map_or([f64::NAN; 3], Into::into)
-    };
-    table(py, parameters.iter().zip(&image_xy).map(direction).collect())
 }
 
 /// Positions, attitudes, sources and what is missing of photos; positions of points; images set aside; the frame; the misfit.

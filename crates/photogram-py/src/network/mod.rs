@@ -18,13 +18,13 @@ create_exception!(
     _photocore,
     BlockError,
     PyException,
-    "The block cannot be adjusted: (kind, message, photos, points)."
+    "The block cannot be adjusted: (kind, message, photos, points, cameras)."
 );
 create_exception!(
     _photocore,
     CollectionError,
     PyException,
-    "The collection cannot be adjusted: (kind, message, photos, points)."
+    "The collection cannot be adjusted: (kind, message, photos, points, cameras)."
 );
 
 /// Adds the functions and classes to the extension module.
@@ -75,16 +75,18 @@ fn adjusted(
     watched(py, workers, progress, |pool, watch| network.adjust(options, pool, watch))
 }
 
-/// Kind, message, and the photos and points concerned.
-type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>);
+/// Kind, message, and the photos, points and cameras concerned; photos and cameras combination by combination.
+type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>, Vec<Vec<usize>>);
 
 /// A failure as Python sees it.
 fn failure(error: &Failure, what: &str) -> FailureRow {
+    let mut cameras = vec![];
     let (kind, photos, points) = match error {
         Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
         Failure::Undetermined(combinations) => {
             let photos = combinations.iter().map(|combination| combination.photos.clone()).collect();
+            cameras = combinations.iter().map(|combination| combination.cameras.clone()).collect();
             ("undetermined photos", photos, vec![])
         }
         Failure::Coarse(Coarse { photos, points }) => ("coarse", vec![photos.clone()], points.clone()),
@@ -94,13 +96,14 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
+        | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
         | Failure::Datum(_)
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
     };
-    (kind, said(error, what), photos, points)
+    (kind, said(error, what), photos, points, cameras)
 }
 
 /// What went wrong, in terms of what was given: a block or a collection.
