@@ -1,7 +1,7 @@
 //! Models joined by a similarity: on common points, control, and observed projection centres.
 
 use super::model::Model;
-use super::{FirstValuesError, Search};
+use super::{FirstValuesError, Search, Source};
 use crate::geometry::Vector3;
 use crate::network::median;
 use crate::programs::sampling::Samples;
@@ -22,15 +22,32 @@ const LINE: f64 = 0.02;
 impl Search<'_> {
     /// Joins what can be joined to the object, and resects what that makes known.
     pub fn join_all(&mut self, object: &mut Model, apart: &mut Vec<Model>) -> Result<(), FirstValuesError> {
-        while let Some((index, similarity)) = apart
-            .iter()
-            .enumerate()
-            .find_map(|(index, model)| Some((index, self.onto(&self.common(object, model))?)))
-        {
+        while let Some((index, similarity)) = self.next_join(object, apart) {
             let carried = apart.remove(index).carried(&similarity);
             self.take_in(object, &carried)?;
         }
         Ok(())
+    }
+
+    /// A model that can be joined, and how. One that agrees with what was known beforehand, but not with a smaller object, takes the
+    /// place of what was resected: four points of which one is wrong may give a pose.
+    fn next_join(&self, object: &mut Model, apart: &[Model]) -> Option<(usize, Similarity)> {
+        let join = |object: &Model| {
+            let similarity = |(index, model)| Some((index, self.onto(&self.common(object, model))?));
+            apart.iter().enumerate().find_map(similarity)
+        };
+        join(object).or_else(|| {
+            let mut beforehand = object.clone();
+            for pose in &mut beforehand.poses {
+                *pose = pose.filter(|(_, source)| matches!(source, Source::Given | Source::Observed));
+            }
+            beforehand.intersect(self);
+            let found = object.object.then(|| join(&beforehand)).flatten();
+            let larger = |&(index, _): &(usize, Similarity)| apart[index].count() > object.count();
+            let found = found.filter(larger)?;
+            *object = beforehand;
+            Some(found)
+        })
     }
 
     /// Joins models that are not the object's among each other.
