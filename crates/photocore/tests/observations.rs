@@ -12,7 +12,7 @@ use photocore::geometry::{
     rotation,
 };
 use photocore::network::observations::{
-    Attitude, Control, Difference, Distance, EqualHeight, Fault, Position, Relative,
+    Attitude, Control, Difference, Distance, EqualHeight, Fault, Position, Quantity, Relative,
 };
 use photocore::network::{
     Camera, Image, Network, NetworkError, Observation, Options, Photo, Point, Precision, Solution,
@@ -94,6 +94,8 @@ fn images_alone() -> Network {
         points: (0..POINTS).map(|_| Point { coordinates: [f64::NAN; 3], sd: FREE }).collect(),
         images,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 
@@ -103,7 +105,7 @@ fn difference(a: usize, b: usize) -> Vector3 {
 
 fn distance(a: usize, b: usize) -> Observation {
     let length = difference(a, b).norm() + 1e-3 * noise(a);
-    Distance { points: [a, b], length, sd: 1e-3 }.into()
+    Distance { points: [a, b], length, sd: 1e-3, instrument: None }.into()
 }
 
 /// Every kind at once.
@@ -119,12 +121,13 @@ fn network() -> Network {
     let gnss = |photo: usize, precision: Precision| {
         let antenna = position(&pose(photo)) + attitude(&pose(photo)) * lever_arm;
         let coordinates = std::array::from_fn(|k| antenna[k] + 0.01 * noise(80 + photo + k));
-        Position { photo, coordinates, lever_arm, precision }.into()
+        Position::new(photo, coordinates, lever_arm, precision).into()
     };
     let imu = |photo: usize, precision: Precision| {
         let boresight = rotation([1.5, 0.1, -0.4]);
         let error = rotation([0, 1, 2].map(|k| 1e-3 * noise(90 + 3 * photo + k)));
-        Attitude { photo, attitude: attitude(&pose(photo)) * boresight * error, boresight, precision }.into()
+        let attitude = attitude(&pose(photo)) * boresight * error;
+        Attitude { photo, attitude, boresight: Quantity::Known(boresight), precision }.into()
     };
     let relative = |i: usize, j: usize| {
         let (a, b) = (pose(i), pose(j));
@@ -477,7 +480,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn scaled(length: f64) -> Network {
     let mut network = images_alone();
     network.photos[0].sd = [0.0; 6];
-    network.observations = vec![Distance { points: [3, 4], length, sd: 1e-3 }.into()];
+    network.observations = vec![Distance { points: [3, 4], length, sd: 1e-3, instrument: None }.into()];
     network
 }
 
@@ -569,7 +572,7 @@ fn what_cannot_be_is_refused_by_its_index() {
         let expected = move |fault| NetworkError::Observation { index, kind, fault };
         (adjust_with(&network, &Options::default(), 1).expect_err("refused"), expected)
     };
-    let length = |points, length, sd| Distance { points, length, sd }.into();
+    let length = |points, length, sd| Distance { points, length, sd, instrument: None }.into();
     let (found, expected) = refused(4, length([3, POINTS], 1.0, 0.1));
     assert_eq!(found, expected(Fault::NoPoint(POINTS)));
     assert_eq!(found.to_string(), "observation 4, of kind distance, names point 14, which is not there");
