@@ -52,6 +52,8 @@ fn network() -> Network {
         points: vec![Point { coordinates: [f64::NAN; 3], sd: [f64::INFINITY; 3] }; 16],
         images,
         observations: vec![Distance { points: [0, 1], length: BAR.0, sd: BAR.1, instrument: None }.into()],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 

@@ -5,6 +5,7 @@
 mod golden;
 
 use num_complex::Complex64 as C;
+use photocore::geometry::camera::ModelFacts;
 use photocore::geometry::{Bal, Camera, CameraModel, Unit, Vector3};
 use proptest::prelude::*;
 use serde_json::Value;
@@ -13,10 +14,12 @@ use golden::{golden, list};
 
 /// A camera of the model, its parameters chosen by what they are measured in from numbers between -1 and 1.
 fn sample(name: &str, numbers: &[f64]) -> Camera {
-    let (_, parameters) = Camera::model(name).unwrap();
-    let value = |(&(_, unit), number): (&(&str, Unit), &f64)| match unit {
-        Unit::Image => 900.0 + 600.0 * number,
-        Unit::One => 0.1 * number,
+    let parameters = Camera::model(name).unwrap().parameters;
+    let value = |(&(parameter, unit), number): (&(&str, Unit), &f64)| match (parameter, unit) {
+        ("cx" | "cy" | "xp" | "yp" | "r0", _) => 100.0 * number,
+        (_, Unit::Image) => 900.0 + 600.0 * number,
+        (_, Unit::PerImage(power)) => 0.1 * number / 1500f64.powi(power.into()),
+        (_, Unit::One) => 0.1 * number,
     };
     let values: Vec<f64> = parameters.iter().zip(numbers.iter().cycle()).map(value).collect();
     Camera::named(name, &values).unwrap()
@@ -54,6 +57,9 @@ proptest! {
             let camera = sample(name, &numbers);
             let image = camera.linearize(&u);
             prop_assert_eq!(image.xy, camera.image(&u));
+            let (residual, compared) = camera.compare(&u, image.xy);
+            prop_assert!(residual.iter().all(|v| v.abs() < 1e-9), "{name}: {residual:?}");
+            prop_assert!((0..2).all(|row| compared.by_u[row].dot(&u).abs() < 1e-9));
             let values: Vec<f64> = u.iter().copied().chain(camera.parameters()).collect();
             for row in 0..2 {
                 let by_u = image.by_u[row];
@@ -61,9 +67,12 @@ proptest! {
                 let found: Vec<f64> = by_u.iter().chain(&image.by_parameters[row]).copied().collect();
                 prop_assert_eq!(found.len(), values.len());
                 let scale = by_u.norm().max(1.0);
-                for (k, partial) in found.iter().enumerate() {
-                    let (expected, near) = partial_of(name, &values, k, row);
-                    prop_assert!((partial - expected).abs() < near * scale, "{name} {k}: {partial} {expected}");
+                // Constants are known.
+                for (k, partial) in found[..found.len() - camera.constants()].iter().enumerate() {
+                    let size = size_of(&camera, k);
+                    let (expected, near) = partial_of(name, &values, k, size, row);
+                    let apart = (size * (partial - expected)).abs();
+                    prop_assert!(apart < near * scale, "{name} {k}: {partial} {expected}");
                 }
             }
             let direction = camera.direction(image.xy);
@@ -75,15 +84,23 @@ proptest! {
     }
 }
 
+/// What an argument of a camera (u, then the parameters) is about as large as: it is what a unit of an image is at a thousand of these.
+fn size_of(camera: &Camera, k: usize) -> f64 {
+    match k.checked_sub(3).map(|parameter| camera.parameter_names()[parameter].1) {
+        Some(Unit::PerImage(power)) => 1000f64.powi(-i32::from(power)),
+        _ => 1.0,
+    }
+}
+
 /// A partial by a complex step where the model is written out, else by a central difference; and how near it is.
-fn partial_of(name: &str, values: &[f64], k: usize, row: usize) -> (f64, f64) {
+fn partial_of(name: &str, values: &[f64], k: usize, size: f64, row: usize) -> (f64, f64) {
     const STEP: f64 = 1e-100;
     let mut stepped: Vec<C> = values.iter().map(|&value| C::new(value, 0.0)).collect();
     stepped[k].im = STEP;
     if let Some(image) = written_out(name, &stepped) {
         return (image[row].im / STEP, 1e-10);
     }
-    let step = 1e-6 * values[k].abs().max(1.0);
+    let step = 1e-6 * values[k].abs().max(size);
     let at = |step: f64| {
         let mut moved = values.to_vec();
         moved[k] += step;
@@ -98,12 +115,13 @@ fn a_camera_has_a_name_and_as_many_parameters_as_its_model() {
     assert_eq!(Camera::named("nothing", &[]), None);
     assert_eq!(Camera::model("nothing"), None);
     for name in Camera::NAMES {
-        let (formula, parameters) = Camera::model(name).unwrap();
+        let ModelFacts { formula, parameters, constants, .. } = Camera::model(name).unwrap();
         assert!(formula.contains("image = "), "{name}");
         assert!(Camera::named(name, &vec![1.0; parameters.len() + 1]).is_none());
         let camera = Camera::named(name, &vec![1.0; parameters.len()]).unwrap();
         assert_eq!(camera.parameter_names(), parameters);
         assert_eq!(camera.with_parameters(&[]), None);
+        assert_eq!(camera.constants(), constants);
     }
 }
 

@@ -113,6 +113,8 @@ fn network() -> Network {
         points: (0..POINTS).map(point).collect(),
         images,
         observations: [[20, 21], [4, 30]].map(length).into(),
+        commons: vec![],
+        mounts: vec![],
     }
 }
 
@@ -250,6 +252,7 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
     assert_eq!(solution.adjustment.status, Status::Converged);
     let (x, q) = dense.adjust();
     let (_, sd) = dense.observed();
+    let (design, _) = dense.equations(&x);
     for (i, photo) in solution.photos.iter().enumerate() {
         let mut unknowns: Vec<usize> = (6 * i..6 * i + 6).collect();
         let mut values = photo.pose.to_vec();
@@ -267,6 +270,9 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
             let weighted = sd[u] > 0.0 && sd[u] < FREE;
             let expected = if weighted { 1.0 - q[(u, u)] / sd[u].powi(2) } else { 0.0 };
             assert!((camera.redundancy[k] - expected).abs() < 1e-8, "camera {i}, parameter {k}");
+            let sum: f64 = (0..design.nrows()).map(|row| design[(row, u)].powi(2)).sum();
+            let expected = if sd[u] == 0.0 { 0.0 } else { sum };
+            assert!((camera.information[k] - expected).abs() <= 1e-8 * sum, "camera {i}, parameter {k}");
         }
         let of_camera = |image: &&Image| CAMERA_OF[image.photo] == i;
         let photos = CAMERA_OF.iter().filter(|&&camera| camera == i).count();

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,11 +31,12 @@ def undetermined(
     messages = []
     if error is not None:
         messages.append(Message(f"there are no covariances: {error}"))
-    if solution.weak:
+    weak = _unknowns(block, solution.weak, solution.weak_cameras, solution.weak_unknowns)
+    if weak:
         messages.append(
             Message(
                 "the sum of squares stands still, but the observations hardly determine a combination of"
-                f" unknowns that moves {_unknowns(block, solution.weak)}: other values along it fit as well"
+                f" unknowns that moves {weak}: other values along it fit as well"
             )
         )
     return messages
@@ -71,14 +73,31 @@ def steep(block: Block) -> list[Message]:
     ]
 
 
-def _unknowns(block: Block, unknowns: list[tuple[int, int]]) -> str:
-    """Name photos and their unknowns (0 to 5)."""
+def _unknowns(
+    block: Block,
+    of_photos: list[tuple[int, int]],
+    of_cameras: Sequence[tuple[int, int]] = (),
+    of_others: Sequence[tuple[int, int]] = (),
+) -> str:
+    """Name photos and their unknowns (0 to 5, then those of a camera of their own), cameras, common ones."""
     names = [*position_columns(block), *ATTITUDE_COLUMNS]
-    return "; ".join(
+    parts = [
         f"{names[unknown].removesuffix('_deg')} of"
-        f" {listed([block.photo_ids[photo] for photo, other in unknowns if other == unknown])}"
-        for unknown in sorted({unknown for _, unknown in unknowns})
-    )
+        f" {listed([block.photo_ids[photo] for photo, other in of_photos if other == unknown])}"
+        for unknown in sorted({unknown for _, unknown in of_photos if unknown < len(names)})
+    ]
+    if block.photo_cameras is not None:
+        cameras = block.photo_cameras.tolist()
+        own = [
+            (cameras[photo], unknown - len(names)) for photo, unknown in of_photos if unknown >= len(names)
+        ]
+        parts += [
+            f"{block.cameras[camera].names[k]} of {block.camera_names[camera]}"
+            for camera, k in [*own, *of_cameras]
+        ]
+    common = block.unknowns if of_others else []
+    parts += [f"{common[row].components[k]} of {common[row].title}" for row, k in of_others]
+    return "; ".join(parts)
 
 
 def rounded(excess: float | None) -> list[Message]:

@@ -49,11 +49,12 @@ def block_files(
         common.semi_major, common.semi_minor = round(block.spheroid.a, 2), round(block.spheroid.b, 2)
         if (common.semi_major, common.semi_minor) != (block.spheroid.a, block.spheroid.b):
             messages.append(Message("the axes of the spheroid are rounded to the two decimals of COMMON"))
-    distances = dict.fromkeys(block.principal_distances.tolist())
+    of_photos = block.known_distances("GIANT files").tolist()
+    distances = dict.fromkeys(of_photos)
     names = {distance: f"CAMERA{number}" for number, distance in enumerate(distances, 1)}
     cameras = [Camera(name, distance) for distance, name in names.items()]
     frames = _frames(block, stations)
-    images = _images(block, [names[distance] for distance in block.principal_distances.tolist()])
+    images = _images(block, [names[distance] for distance in of_photos])
     return common, cameras, frames, images, _ground(block), messages
 
 

@@ -2,9 +2,9 @@
 
 use thiserror::Error;
 
+use super::model::Owner;
 use super::observations::Fault;
 use super::precision::Coarse;
-use super::model::Owner;
 use super::problem::Assembled;
 use crate::adjustment::{AdjustError, DatumError, gib};
 use crate::normals::LayoutError;
@@ -25,8 +25,20 @@ pub enum NetworkError {
     #[error("common unknown {0} has not as many standard deviations as unknowns")]
     CommonDeviations(usize),
     /// A photo that is mounted twice, on itself, on a photo that is mounted, or names a photo or sensor that is not there.
-    #[error("mount {0} names a photo or sensor that is not there, or a photo that is mounted twice or has others mounted on it")]
+    #[error(
+        "mount {0} names a photo or sensor that is not there, or a photo that is mounted twice or has others mounted on it"
+    )]
     Mount(usize),
+    /// A constant of a camera has a standard deviation.
+    #[error(
+        "{parameter} of camera {camera} is a constant and cannot be free or weighted: its standard deviation is 0"
+    )]
+    CameraConstant {
+        /// The camera.
+        camera: usize,
+        /// What the constant is called.
+        parameter: &'static str,
+    },
     /// An observation that contradicts itself or the network.
     #[error("observation {index}, of kind {kind}, {fault}")]
     Observation {

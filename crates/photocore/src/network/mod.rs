@@ -340,6 +340,11 @@ impl Network {
             if camera.sd.len() != camera.camera.parameter_names().len() {
                 return Err(NetworkError::CameraDeviations(index));
             }
+            let known = camera.camera.parameter_names();
+            let unknowns = known.len() - camera.camera.constants();
+            if let Some(free) = (unknowns..known.len()).find(|&k| camera.sd[k] != 0.0) {
+                return Err(NetworkError::CameraConstant { camera: index, parameter: known[free].0 });
+            }
         }
         for (index, common) in self.commons.iter().enumerate() {
             if common.sd.len() != common.kind.unknowns().len() {

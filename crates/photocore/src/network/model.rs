@@ -63,8 +63,10 @@ pub struct Bundle {
     pub turning: Vec<bool>,
     /// What else was observed.
     pub observations: Vec<TiedObservation>,
-    /// Whether the position of anything is weighted or fixed: then the datum is the user's.
+    /// Whether the position of anything is weighted, or of more than one photo fixed: then the datum is the user's.
     pub placed: bool,
+    /// The only photo whose position is fixed, where nothing else is placed: the user has chosen what to hold.
+    pub anchor: Option<usize>,
 }
 
 /// Photos and points at given values of the unknowns.
@@ -145,7 +147,7 @@ impl Bent {
             Some(refracted) => refracted.lifted(stations, image, local),
         };
         let write = |rows: &mut GroupRows<'_>| {
-            each_camera!(camera, camera => write(&orientation, camera, &point, image, rows));
+            each_camera!(camera, camera => write_in_its_place(&orientation, camera, &point, image, rows));
         };
         match self.mounted.get(image.photo).and_then(Option::as_ref) {
             None => write(rows),
@@ -175,6 +177,33 @@ impl Mounted {
     }
 }
 
+/// [`write`], in line or called: what is compiled at every place should be small.
+#[inline(always)]
+fn write_in_its_place<C: CameraModel>(
+    orientation: &Orientation,
+    camera: &C,
+    point: &geometry::Point,
+    image: &Image,
+    rows: &mut GroupRows<'_>,
+) {
+    if C::IN_LINE {
+        write(orientation, camera, point, image, rows);
+    } else {
+        write_apart(orientation, camera, point, image, rows);
+    }
+}
+
+#[inline(never)]
+fn write_apart<C: CameraModel>(
+    orientation: &Orientation,
+    camera: &C,
+    point: &geometry::Point,
+    image: &Image,
+    rows: &mut GroupRows<'_>,
+) {
+    write(orientation, camera, point, image, rows);
+}
+
 /// The two equations of an image: observed minus computed, and the partials of the computed.
 #[inline(always)]
 fn write<C: CameraModel>(
@@ -185,10 +214,11 @@ fn write<C: CameraModel>(
     rows: &mut GroupRows<'_>,
 ) {
     let u = orientation.sight(point);
-    let projection = orientation.projection(&u, &camera.linearize(&u), point);
+    let (residual, computed) = camera.compare(&u, image.xy);
+    let projection = orientation.projection(&u, &computed, point);
     let (width, shared) = (rows.kept.len() / 2, rows.common.len() / 2);
     for row in 0..2 {
-        rows.constant[row] = image.xy[row] - projection.xy[row];
+        rows.constant[row] = residual[row];
         rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
         rows.kept[width * row..][..6].copy_from_slice(&projection.photo[row]);
         if width > 6 {
@@ -542,7 +572,7 @@ impl Model for Bundle {
             None => {
                 let Station { orientation, camera } = &stations.photos[image.photo];
                 let point = &stations.points[local];
-                each_camera!(camera, camera => write(orientation, camera, point, image, rows));
+                each_camera!(camera, camera => write_in_its_place(orientation, camera, point, image, rows));
             }
             Some(bent) => bent.write(stations, image, local, rows),
         }

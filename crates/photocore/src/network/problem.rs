@@ -8,7 +8,7 @@ use super::model::{Bundle, Station};
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
-use super::{Camera, Image, Network, NetworkError, Options, Photo, Point, Start};
+use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start};
 use crate::adjustment::{Method, Model, Problem};
 use crate::geometry::{
     Matrix3, ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, local_vertical, nearest_turns,
@@ -81,7 +81,8 @@ impl Network {
         for &camera in &model.shared {
             all.extend(self.cameras[camera].sd.iter().map(|&sd| if used[camera] { sd } else { 0.0 }));
         }
-        for (common, own) in self.commons.iter().enumerate().filter(|&(i, _)| model.common_block[i].is_some()) {
+        for (common, own) in self.commons.iter().enumerate().filter(|&(i, _)| model.common_block[i].is_some())
+        {
             let is_used = model.uses_of_commons[common] > 0;
             all.extend(own.sd.iter().map(|&sd| if is_used { sd } else { 0.0 }));
         }
@@ -243,22 +244,22 @@ impl Network {
             first.push(first[first.len() - 1] + common.sd.len());
         }
         let mut squares = vec![0];
-        first.windows(2).for_each(|ends| squares.push(squares[squares.len() - 1] + (ends[1] - ends[0]).pow(2)));
+        first
+            .windows(2)
+            .for_each(|ends| squares.push(squares[squares.len() - 1] + (ends[1] - ends[0]).pow(2)));
         let vertical = self.vertical();
         let place = |common| PlacedCommon::new(common, self.space, origin, &vertical);
         let block = |photo: &Photo| Some(self.photos.len() + shared.binary_search(&photo.camera).ok()?);
         let mounts = self.mounts_by_photo();
         let mut uses_of_commons = vec![0; self.commons.len()];
-        for image in screened.images.order.iter().filter_map(|&i| mounts.get(self.images[i].photo)?.as_ref()) {
+        for image in screened.images.order.iter().filter_map(|&i| mounts.get(self.images[i].photo)?.as_ref())
+        {
             uses_of_commons[image.sensor] += 1;
         }
         let commons_of = |&observation: &usize| self.observations[observation].touches().commons;
         let touched = screened.observations.iter().flat_map(commons_of);
         touched.for_each(|(common, _)| uses_of_commons[common] += 1);
-        // Angles alone leave position and scale open.
-        let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
-        let placed = screened.points.iter().any(|&point| self.points[point].held() != [false; 3])
-            || self.photos.iter().any(|photo| photo.sd[..positions].iter().any(|sd| sd.is_finite()));
+        let (placed, anchor) = self.placed(screened, &mounts);
         let images: Vec<Image> = screened.images.order.iter().map(|&image| self.images[image]).collect();
         let mut bundle = Bundle {
             space: self.space,
@@ -286,6 +287,7 @@ impl Network {
             images_on,
             observations: vec![],
             placed,
+            anchor,
         };
         bundle.observations = self.tied_observations(screened, &bundle)?;
         Ok(bundle)
@@ -293,12 +295,27 @@ impl Network {
 
     /// The axes amid the photos, as rows, that shifts and drifts are told in: X, Y, Z or, in geographic space, east, north and up.
     fn vertical(&self) -> Matrix3 {
-        let middle = |k: usize| {
-            median(self.photos.iter().map(|photo| photo.pose[k]).collect()).unwrap_or_default()
-        };
+        let middle =
+            |k: usize| median(self.photos.iter().map(|photo| photo.pose[k]).collect()).unwrap_or_default();
         match self.space {
             ObjectSpace::Rectangular => Matrix3::identity(),
             ObjectSpace::Geographic(_) => local_vertical(middle(0), middle(1)),
+        }
+    }
+
+    /// Whether the datum is the user's; and the photo to hold where it is not, but the position of a single one is fixed.
+    fn placed(&self, screened: &Screened, mounts: &[Option<Mount>]) -> (bool, Option<usize>) {
+        // Angles alone leave position and scale open.
+        let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
+        let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
+        let mounted = |index: usize| mounts.get(index).is_some_and(Option::is_some);
+        let mut photos = (0..self.photos.len()).filter(|&index| !mounted(index) && own(&self.photos[index]));
+        let fixed = |index: usize| self.photos[index].sd[..positions].iter().all(|&sd| sd == 0.0);
+        match (photos.next(), photos.next()) {
+            _ if screened.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),
+            (None, _) => (false, None),
+            (first, None) if first.is_some_and(fixed) => (false, first),
+            _ => (true, None),
         }
     }
 

@@ -7,8 +7,8 @@ use nalgebra::DMatrix;
 use super::model::{Owner, Placed};
 use super::problem::Assembled;
 use super::{
-    AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options, Point,
-    UnitVariance,
+    AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
+    Point, UnitVariance,
 };
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
 use crate::geometry::{AttitudeNumbers, Matrix3, Orientation, PoseNumbers};

@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, Vector3 as Column};
 
 use super::Common;
+use crate::adjustment::Adjustment;
 use crate::geometry::Matrix3;
 use crate::network::Network;
 use crate::network::problem::Assembled;
-use crate::adjustment::Adjustment;
 
 /// An adjusted common unknown.
 #[derive(Debug, Clone, PartialEq)]

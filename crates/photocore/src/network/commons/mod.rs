@@ -204,7 +204,8 @@ impl PlacedCommon {
         } else {
             state.vector().into()
         };
-        let counted = |k: usize| if self.kind.is_place() { position[k] + self.origin[k] } else { position[k] };
+        let counted =
+            |k: usize| if self.kind.is_place() { position[k] + self.origin[k] } else { position[k] };
         (std::array::from_fn(counted), self.axes * state.attitude)
     }
 

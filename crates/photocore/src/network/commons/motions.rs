@@ -101,7 +101,8 @@ impl Bundle {
         for (pair, antennas) in self.antennas(placed) {
             let displaced = antennas.iter().map(|&(place, time)| ((motion.displacement)(&place), time));
             for (common, moved) in pair.into_iter().zip(line(displaced, pair.map(|own| own.is_some()))) {
-                let Some((common, block)) = common.and_then(|own| Some((own, self.common_block[own]?))) else {
+                let Some((common, block)) = common.and_then(|own| Some((own, self.common_block[own]?)))
+                else {
                     continue;
                 };
                 let own = placed.commons[common].attitude().tr_mul(&moved);

@@ -16,8 +16,8 @@ use crate::geometry::Matrix3;
 
 pub use adjusted::{AdjustedObservation, KindSums};
 pub use precision::Precision;
-pub use rows::{Rows, Sites};
 pub(super) use rows::{CommonSite, PhotoSite, PointSite};
+pub use rows::{Rows, Sites};
 pub(super) use tied::{TiedModel, TiedObservation};
 
 /// A kind of observation of points, photos and unknowns that observations have in common.

@@ -51,14 +51,11 @@ fn width(common: &PlacedCommon) -> usize {
 fn commons(space: ObjectSpace, [x, y, z]: [f64; 3]) -> Vec<PlacedCommon> {
     let kinds = CommonKind::ALL.iter().chain(&[CommonKind::Sensor]);
     let common = |(k, &kind): (usize, &CommonKind)| {
-        let place = matches!(
-            kind,
-            CommonKind::Level | CommonKind::PlumbLine | CommonKind::Line | CommonKind::Plane
-        );
+        let place =
+            matches!(kind, CommonKind::Level | CommonKind::PlumbLine | CommonKind::Line | CommonKind::Plane);
         let turns = kind.unknowns().iter().any(|&(_, component, _)| component > 2);
         let position = if place { [x, y, z + 0.3] } else { [0.4, 0.2 * k as f64, -0.7] };
-        let attitude =
-            if turns { rotation([0.2 * k as f64, -0.4, 0.9]) } else { Matrix3::identity() };
+        let attitude = if turns { rotation([0.2 * k as f64, -0.4, 0.9]) } else { Matrix3::identity() };
         Common { kind, position, attitude, sd: vec![1.0; kind.unknowns().len()] }
     };
     let vertical = match space {
@@ -211,12 +208,11 @@ pub fn stays(observation: &Observation) -> bool {
 
 #[test]
 fn what_contradicts_itself_is_refused() {
-    let distance =
-        |points, sd| {
-            Observation::from(super::Distance { points, length: 1.0, sd, instrument: None })
-                .check(3, 2, &[])
-                .err()
-        };
+    let distance = |points, sd| {
+        Observation::from(super::Distance { points, length: 1.0, sd, instrument: None })
+            .check(3, 2, &[])
+            .err()
+    };
     assert_eq!(distance([0, 2], 0.1), None);
     assert_eq!(distance([0, 3], 0.1), Some(Fault::NoPoint(3)));
     assert_eq!(distance([1, 1], 0.1), Some(Fault::Twice));
@@ -224,7 +220,9 @@ fn what_contradicts_itself_is_refused() {
         assert_eq!(distance([0, 1], sd), Some(Fault::Deviation));
     }
     let control = |precision| {
-        Observation::from(super::Control { point: 0, coordinates: [0.0; 3], precision }).check(1, 0, &[]).err()
+        Observation::from(super::Control { point: 0, coordinates: [0.0; 3], precision })
+            .check(1, 0, &[])
+            .err()
     };
     assert_eq!(
         control(Precision::Deviations(vec![1.0; 2])),
@@ -240,8 +238,12 @@ fn what_contradicts_itself_is_refused() {
     assert_eq!(covariance(1.5, 1.5), Some(Fault::Covariance));
     let attitude = |matrix: Matrix3| {
         let precision = Precision::Deviations(vec![0.1; 3]);
-        let attitude =
-            super::Attitude { photo: 1, attitude: matrix, boresight: Quantity::Known(Matrix3::identity()), precision };
+        let attitude = super::Attitude {
+            photo: 1,
+            attitude: matrix,
+            boresight: Quantity::Known(Matrix3::identity()),
+            precision,
+        };
         Observation::from(attitude).check(0, 2, &[]).err()
     };
     assert_eq!(attitude(Matrix3::identity()), None);
@@ -255,10 +257,7 @@ fn common_unknowns_of_other_types_are_refused() {
     let level = |level| super::OnLevel { point: 0, level, difference: 0.0, sd: 1.0 };
     let check = |own: Observation| own.check(1, 0, &commons).err();
     assert_eq!(check(level(0).into()), None);
-    assert_eq!(
-        check(level(1).into()),
-        Some(Fault::OtherCommon { common: 1, needed: CommonKind::Level })
-    );
+    assert_eq!(check(level(1).into()), Some(Fault::OtherCommon { common: 1, needed: CommonKind::Level }));
     assert_eq!(check(level(2).into()), Some(Fault::NoCommon(2)));
     let prior = |components: usize| {
         let precision = Precision::Deviations(vec![1.0; components]);

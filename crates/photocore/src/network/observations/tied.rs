@@ -49,7 +49,8 @@ impl TiedObservation {
         };
         let columns: Vec<(usize, usize)> = self.blocks.iter().map(column).collect();
         coefficients.fill(0.0);
-        let mut rows = Rows { sites: &sites, columns: &columns, width, constant: &mut *constant, coefficients };
+        let mut rows =
+            Rows { sites: &sites, columns: &columns, width, constant: &mut *constant, coefficients };
         self.observation.write(&sites, &mut rows);
         self.whiten(constant, 1);
         self.whiten(coefficients, width);
