@@ -66,6 +66,8 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
         points: vec![],
         images: vec![],
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     };
     for (photo, (position, attitude)) in true_photos.iter().enumerate() {
         let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();
@@ -174,7 +176,7 @@ impl Phases {
         for (point, weight) in block.points.iter().zip(weight.as_chunks_mut::<3>().0) {
             *weight = point.sd.map(|sd| (sd * sd).recip());
         }
-        let prior = Prior { right: vec![0.0; weight.len()], weight };
+        let prior = Prior { right: vec![0.0; weight.len()], weight, between: vec![] };
         let equations = Linear::new(block);
         Self { pool: pool(), system: System::new(layout, Ordering::Auto), equations, prior }
     }

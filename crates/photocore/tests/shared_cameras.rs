@@ -141,7 +141,7 @@ fn network() -> Network {
     let length = |points: [usize; 2]| {
         let [p, q] = points.map(place);
         let length = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
-        Distance { points, length: length + 0.0005, sd: 0.001 }.into()
+        Distance { points, length: length + 0.0005, sd: 0.001, instrument: None }.into()
     };
     Network {
         space: ObjectSpace::Rectangular,
@@ -152,6 +152,8 @@ fn network() -> Network {
         points: (0..POINTS).map(point).collect(),
         images,
         observations: [[20, 21], [4, 30]].map(length).into(),
+        commons: vec![],
+        mounts: vec![],
     }
 }
 
@@ -289,6 +291,7 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
     assert_eq!(solution.adjustment.status, Status::Converged);
     let (x, q) = dense.adjust();
     let (_, sd) = dense.observed();
+    let (design, _) = dense.equations(&x);
     for (i, photo) in solution.photos.iter().enumerate() {
         let mut unknowns: Vec<usize> = (6 * i..6 * i + 6).collect();
         let mut values = photo.pose.to_vec();
@@ -306,6 +309,9 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
             let weighted = sd[u] > 0.0 && sd[u] < FREE;
             let expected = if weighted { 1.0 - q[(u, u)] / sd[u].powi(2) } else { 0.0 };
             assert!((camera.redundancy[k] - expected).abs() < 1e-8, "camera {i}, parameter {k}");
+            let sum: f64 = (0..design.nrows()).map(|row| design[(row, u)].powi(2)).sum();
+            let expected = if sd[u] == 0.0 { 0.0 } else { sum };
+            assert!((camera.information[k] - expected).abs() <= 1e-8 * sum, "camera {i}, parameter {k}");
         }
         let of_camera = |image: &&Image| CAMERA_OF[image.photo] == i;
         let photos = CAMERA_OF.iter().filter(|&&camera| camera == i).count();
@@ -367,6 +373,8 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
         points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
         images: vec![],
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     };
     for (photo, [x, y]) in stations.into_iter().enumerate() {
         let pose = [0.0, 0.0, 0.0, x, y, -10.0];
@@ -376,7 +384,7 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
             network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
         }
     }
-    let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1] };
+    let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1], ..Combination::default() };
     assert_eq!(adjust(&network, TIGHT).unwrap_err(), NetworkError::Undetermined(vec![combination]));
     // A weight is enough.
     network.cameras[1].sd = vec![0.1];

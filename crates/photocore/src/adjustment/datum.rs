@@ -111,7 +111,7 @@ pub fn in_datum<M: Model>(
 
     let inverted = problem.system.invert(pool, factor, &equations, &prior, between);
     let Inversion { mut cofactors, .. } = unless_stopped(inverted)?;
-    problem.finish_cofactors(&mut cofactors, held);
+    problem.finish_cofactors(&mut cofactors, held, &unknowns);
     Transformation { t: &basis.t, w: &w, common: &common }.apply(problem.layout(), &mut cofactors);
     Ok(InDatum { unknowns, cofactors })
 }
@@ -228,6 +228,12 @@ impl Transformation<'_> {
         let l = layout.local_dim();
         for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
             self.block(layout.local_range(local), layout.local_range(local), block);
+        }
+        for &pair in layout.pairs() {
+            let [rows, columns] = pair.map(|block| layout.kept_range(block as usize));
+            if let Some(range) = layout.pair(pair) {
+                self.block(rows, columns, &mut cofactors.pairs[range]);
+            }
         }
         let border = layout.border_range();
         let (mut own, mut tied) = (&mut cofactors.kept[..], &mut cofactors.kept_border[..]);
