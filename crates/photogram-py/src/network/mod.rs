@@ -92,6 +92,12 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
+        | Failure::NoPhoto(_)
+        | Failure::NoPoint(_)
+        | Failure::CameraIndex(_)
+        | Failure::LeftOut(_)
+        | Failure::Partials { .. }
+        | Failure::State
         | Failure::Observation { .. }
         | Failure::Vectors
         | Failure::Datum(_)
