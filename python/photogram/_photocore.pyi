@@ -16,6 +16,13 @@ _Indices = NDArray[np.int64]
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
+FailureRow = tuple[str, str, list[list[int]], list[int], list[list[int]]]
+"""Why a network cannot be adjusted, as in :class:`BlockError`."""
+
+CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
+"""Of an adjusted camera: k parameters, k x k cofactors row by row, k redundancy numbers, the diagonal of the
+normal equations (k), photos, images."""
+
 RefractionRow = tuple[str | None, str | None, float, float, float]
 """Model of the air (`giant`, `standard` or None), model of the water (`giant`, `snell` or None), water level
 (linear unit), refractive index of the water, metres in the linear unit."""
@@ -86,6 +93,64 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     Returns
     -------
     NaN for arguments that cannot be.
+    """
+
+def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str]]]:
+    """Return the models of cameras, `CAMERAS`, by their names.
+
+    Returns
+    -------
+    Of each its formula, its parameters with the power of the unit of the image in which they are measured (0
+    for plain numbers), how many of these, the last ones, are constants that are never unknown, and its
+    direction: `forward`, lens terms are functions of ideal coordinates, or `backward`, of measured ones.
+    """
+
+def camera_images(model: str, parameters: _Floats, u: _Floats) -> _Floats:
+    """Images of directions.
+
+    Parameters
+    ----------
+    model
+        One of `CAMERAS`.
+    parameters
+        (k,) in the order of the model.
+    u
+        (n, 3) in the axes of the photo: x right, y up, z back towards the viewer; the camera looks along -z.
+
+    Returns
+    -------
+    (n, 2) in the unit of the camera; not finite where there are none.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, other shapes or numbers of parameters.
+    """
+
+def camera_rays(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
+    """Directions of image positions; arguments as in :func:`camera_images`.
+
+    Returns
+    -------
+    (n, 3) unit vectors in the axes of the photo, in front of it; NaN where no direction has the image.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, other shapes or numbers of parameters.
+    """
+
+def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
+    """Corrected image positions of a backward camera; arguments as in :func:`camera_images`.
+
+    Returns
+    -------
+    (n, 2) g, compared with c (u1, u2) / u3.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not or that is forward, other shapes or numbers of parameters.
     """
 
 def attitudes_from_numbers(
@@ -328,10 +393,64 @@ def refraction_shift(
 class BlockError(Exception):
     """A block that cannot be adjusted.
 
-    `args` is (kind, message, photos, points): kind is `undetermined points`, `undetermined photos`, `no
-    intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or
-    `input`; photos is a list of photo indices for each undetermined combination
-    of unknowns, points a list of point indices.
+    `args` is (kind, message, photos, points, cameras): kind is `undetermined points`, `undetermined photos`,
+    `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or `input`;
+    photos and cameras are lists of indices for each undetermined combination of unknowns, points a list of
+    point indices.
+    """
+
+def find_first_values(
+    photo_positions: _Floats,
+    photo_attitudes: _Floats,
+    observed_positions: _Floats,
+    observed_attitudes: _Floats,
+    point_positions: _Floats,
+    point_sd: _Floats,
+    image_photos: _Indices,
+    image_points: _Indices,
+    directions: _Floats,
+    direction_sd: _Floats,
+    *,
+    threads: int,
+) -> tuple[
+    _Floats,
+    _Floats,
+    list[tuple[str, int, int]],
+    _Floats,
+    NDArray[np.bool_],
+    int | None,
+    float | None,
+]:
+    """Find poses of photos from what is known, in cartesian object space (`docs/first-values.md`).
+
+    Parameters
+    ----------
+    photo_positions, photo_attitudes
+        (P, 3) and (P, 3, 3), photo to object: given poses; NaN where none is.
+    observed_positions, observed_attitudes
+        The same as observed; NaN where they were not.
+    point_positions, point_sd
+        (n, 3) control in the linear unit, and its standard deviations; infinite where it is not held.
+    image_photos, image_points
+        (m,) indices into photos and points.
+    directions, direction_sd
+        (m, 3) unit directions in the axes of the photos, not finite where there is none, and (m,) their
+        standard deviations in radians.
+    threads
+        As for `adjust_block`.
+
+    Returns
+    -------
+    (P, 3) positions and (P, 3, 3) attitudes, NaN where none was found; for each photo (`given`, `resected`,
+    `observed` or `oriented`, 0, 0), or why it has none: (`points`, known points, 0), (`misfit`, known points,
+    0) or (`apart`, what its model has in common, photos of the model); (n, 3) positions of points; (m,)
+    whether an image was set aside; the photo that is the datum, if nothing else is; the median of the angles
+    between observed and computed directions, radians.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape or length, an index out of range; the message names it.
     """
 
 def adjust_block(
@@ -341,7 +460,8 @@ def adjust_block(
     photo_attitudes_observed: _Floats,
     photo_position_sd: _Floats,
     photo_attitude_sd: _Floats,
-    principal_distances: _Floats,
+    photo_cameras: _Indices,
+    cameras: list[tuple[str, list[float], list[float]]],
     point_positions: _Floats,
     point_sd: _Floats,
     image_photos: _Indices,
@@ -377,8 +497,10 @@ def adjust_block(
         (P, 3) observed values where weighted; angles may differ from initial ones by whole turns.
     photo_position_sd, photo_attitude_sd
         (P, 3) standard deviations of the observed values.
-    principal_distances
-        (P,) millimetres, signed.
+    photo_cameras
+        (P,) indices into the cameras; photos with the same one share its unknowns.
+    cameras
+        Model, parameters in its order and their standard deviations.
     point_positions, point_sd
         (n, 3) coordinates, NaN where unknown, and standard deviations, finite for held components.
     image_photos, image_points
@@ -493,7 +615,7 @@ class _NetworkSolution:
         """(m,) factor by which a loss has changed the weight; 1 without a loss."""
 
     @property
-    def undetermined(self) -> tuple[str, str, list[list[int]], list[int]] | None:
+    def undetermined(self) -> FailureRow | None:
         """Why there are no cofactors although they were asked for, as in :class:`BlockError`."""
 
     @property
@@ -568,6 +690,14 @@ class BlockSolution(_NetworkSolution):
 
         Empty where observations and weights give one.
         """
+
+    @property
+    def weak_cameras(self) -> list[tuple[int, int]]:
+        """The same for cameras that several photos share: cameras and their parameters."""
+
+    @property
+    def cameras(self) -> list[CameraRow]:
+        """The adjusted cameras, in the order in which they were given."""
 
     @property
     def dropped(self) -> list[tuple[int, str]]:

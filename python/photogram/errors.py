@@ -51,9 +51,14 @@ class RankError(AdjustmentError):
         What is undetermined, in a sentence.
     photos, points
         Identifiers of the photos and points concerned.
+    cameras
+        Names of the cameras concerned.
     """
 
-    def __init__(self, message: str, photos: list[str], points: list[str]) -> None:
+    def __init__(
+        self, message: str, photos: list[str], points: list[str], cameras: list[str] | None = None
+    ) -> None:
         super().__init__(message)
         self.photos = photos
         self.points = points
+        self.cameras = cameras or []

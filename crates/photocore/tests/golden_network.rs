@@ -9,7 +9,9 @@ use std::ops::ControlFlow;
 
 use nalgebra::Matrix6;
 use photocore::adjustment::{self, Method, Stop};
-use photocore::geometry::{AttitudeNumbers, Matrix3, ObjectSpace, Perspective, PoseNumbers, RotationSense};
+use photocore::geometry::{
+    self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, PoseNumbers, RotationSense,
+};
 use photocore::network::observations::{Distance, Observation};
 use photocore::network::{
     AdjustedPhoto, Camera, Image, InnerConstraints, Network, Options, Photo, Point, Solution,
@@ -23,7 +25,8 @@ const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(SENSE);
 
 /// The network of a file, without its scale bars if so asked, and the index of every block by name.
 fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
-    let (mut index, mut photos, mut points) = (HashMap::new(), vec![], vec![]);
+    let (mut photos, mut points) = (vec![], vec![]);
+    let mut index = HashMap::from([("camera".to_owned(), 0)]);
     let blocks = file["inputs"]["initial"].as_object().unwrap();
     let named = |kind: &'static str| {
         (1..).map_while(move |k| Some((format!("{kind}{k}"), blocks.get(&format!("{kind}{k}"))?)))
@@ -40,6 +43,10 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
         points.push(Point { coordinates: list(&block["value"]).try_into().unwrap(), sd: [f64::INFINITY; 3] });
     }
     let observed = &file["inputs"]["observations"];
+    let deviations = |kind: &str| -> Vec<f64> {
+        let covariance = rows(&observed[kind]["covariance"]["all"]);
+        (0..covariance.len()).map(|k| covariance[k][k].sqrt()).collect()
+    };
     let between = |kind: &str| -> Vec<Vec<usize>> {
         let names = observed[kind]["between"].as_array().unwrap();
         names
@@ -47,7 +54,7 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
             .map(|names| names.as_array().unwrap().iter().map(|name| index[name.as_str().unwrap()]).collect())
             .collect()
     };
-    let sd = |kind: &str| observed[kind]["covariance"]["all"][0][0].as_f64().unwrap().sqrt();
+    let sd = |kind: &str| deviations(kind)[0];
     let image = |(ends, xy): (Vec<usize>, Vec<f64>)| Image {
         photo: ends[0],
         point: ends[1],
@@ -62,16 +69,33 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
             sd: sd("scale bar"),
         })
     };
-    let lengths = between("scale bar").into_iter().zip(rows(&observed["scale bar"]["observed"]));
+    let lengths = || between("scale bar").into_iter().zip(rows(&observed["scale bar"]["observed"]));
+    if observed.get("control").is_some() {
+        let control = between("control").into_iter().zip(rows(&observed["control"]["observed"]));
+        for (own, given) in control {
+            let sd = deviations("control").try_into().unwrap();
+            points[own[0]] = Point { coordinates: given.try_into().unwrap(), sd };
+        }
+    }
+    let camera = match blocks.get("camera") {
+        None => Camera::held(Perspective { principal_distance: -35.0 }.into()),
+        Some(_) => {
+            // c, xp, yp, K1, K2, K3, P1, P2 with priors; b1, b2, r0 are none.
+            let known = [0.0; 3];
+            let given = [&list(&observed["camera prior"]["observed"][0])[..], &known].concat();
+            let sd = [&deviations("camera prior")[..], &known].concat();
+            Camera { camera: geometry::Camera::named("brown", &given).unwrap(), sd }
+        }
+    };
     let network = Network {
         space: ObjectSpace::Rectangular,
         poses: PoseNumbers::Angles(SENSE),
         refraction: None,
-        cameras: vec![Camera::held(Perspective { principal_distance: -35.0 }.into())],
+        cameras: vec![camera],
         photos,
         points,
         images,
-        observations: if bars { lengths.map(bar).collect() } else { vec![] },
+        observations: if bars { lengths().map(bar).collect() } else { vec![] },
     };
     (network, index)
 }
@@ -96,12 +120,16 @@ fn assert_cofactors(own: &[f64], golden: &Value, what: &str) {
     }
 }
 
-fn adjust(network: &Network, datum: &InnerConstraints) -> Solution {
+fn adjust(network: &Network, datum: Option<&InnerConstraints>) -> Solution {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let method = Method::Damped(Stop::Fraction(1e-9));
     let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
     let options = Options { adjustment, ..Options::default() };
-    network.adjust_in_datum(&options, datum, &pool, &mut |_| ControlFlow::Continue(())).unwrap()
+    let watch = &mut |_| ControlFlow::Continue(());
+    match datum {
+        Some(datum) => network.adjust_in_datum(&options, datum, &pool, watch).unwrap(),
+        None => network.adjust(&options, &pool, watch).unwrap(),
+    }
 }
 
 /// Unknowns to a millionth of their standard deviations, figures of the whole and of every kind of observation.
@@ -117,12 +145,14 @@ fn assert_solution(solution: &Solution, golden: &Value, index: &HashMap<String, 
             let attitude = NUMBERS.attitude([omega, phi, kappa]);
             let expected = Matrix3::from_row_slice(&rows(&block["matrix_photo_to_object"]).concat());
             assert!((attitude - expected).amax() < 1e-9, "{what} {name}: {}", (attitude - expected).amax());
-            (list(&block["position"]), list(&block["sd_position"]), [x, y, z])
+            (list(&block["position"]), list(&block["sd_position"]), vec![x, y, z])
+        } else if name == "camera" {
+            (list(&block["value"]), list(&block["sd"]), solution.cameras[0].parameters.clone())
         } else {
             let point = solution.points[index[name]].as_ref().unwrap();
-            (list(&block["value"]), list(&block["sd"]), point.coordinates)
+            (list(&block["value"]), list(&block["sd"]), point.coordinates.to_vec())
         };
-        for k in 0..3 {
+        for k in 0..position.len() {
             assert!((own[k] - position[k]).abs() < 1e-6 * sd[k], "{what} {name}: {} {}", own[k], position[k]);
         }
     }
@@ -142,6 +172,13 @@ fn assert_solution(solution: &Solution, golden: &Value, index: &HashMap<String, 
     for (name, cofactors) in golden["cofactors"].as_object().unwrap() {
         if name.starts_with("photo") {
             assert_cofactors(by_step(&solution.photos[index[name]]).as_slice(), cofactors, name);
+        } else if name == "camera" {
+            let count = rows(cofactors).len();
+            let all = &solution.cameras[0].cofactors;
+            let width = solution.cameras[0].parameters.len();
+            let own: Vec<f64> =
+                all.chunks(width).take(count).flat_map(|row| &row[..count]).copied().collect();
+            assert_cofactors(&own, cofactors, name);
         } else {
             let own = solution.points[index[name]].as_ref().unwrap().cofactors;
             assert_cofactors(own.as_flattened(), cofactors, name);
@@ -163,6 +200,30 @@ fn a_free_network_with_and_without_scale_bars_in_four_datums() {
             photos: photos.iter().map(|&name| index[name]).collect(),
             scale: golden["with_scale"].as_bool().unwrap(),
         };
-        assert_solution(&adjust(&network, &datum), golden, &index, name);
+        assert_solution(&adjust(&network, Some(&datum)), golden, &index, name);
+    }
+}
+
+#[test]
+fn a_block_that_calibrates_its_camera_with_priors() {
+    let Some(file) = golden("selfcal.json") else { return };
+    let (network, index) = network(&file, false);
+    let (solution, golden) = (adjust(&network, None), &file["solution"]);
+    assert_solution(&solution, golden, &index, "selfcal");
+    let camera = &solution.cameras[0];
+    let redundancy = rows(&golden["kinds"]["camera prior"]["redundancy"]).remove(0);
+    for (k, expected) in redundancy.iter().enumerate() {
+        assert!((camera.redundancy[k] - expected).abs() < 1e-8, "{:?}", camera.redundancy);
+    }
+    let residuals = rows(&golden["kinds"]["image"]["residuals"]);
+    for (own, expected) in solution.images.iter().zip(residuals) {
+        let apart = (0..2).map(|k| (own.unwrap().residual[k] - expected[k]).abs());
+        // A millionth of the standard deviation of an image.
+        assert!(apart.fold(0.0, f64::max) < 1e-9);
+    }
+    let sum = |kind: &str| golden["kinds"][kind]["sum_of_squares"].as_f64().unwrap();
+    let sums = solution.sums_of_squares;
+    for (own, kind) in [(sums.plates, "image"), (sums.camera, "camera prior"), (sums.ground, "control")] {
+        assert!((own / sum(kind) - 1.0).abs() < 1e-9, "{kind}: {own}");
     }
 }

@@ -89,7 +89,7 @@ impl Dense {
         let right = (0..equations).map(|_| number()).collect();
         let weight: Vec<f64> = (0..layout.unknowns()).map(|_| 0.5 + 0.4 * number()).collect();
         let prior_right = weight.iter().map(|w| w * number()).collect();
-        Self { layout, matrix, right, prior: Prior { weight, right: prior_right } }
+        Self { layout, matrix, right, prior: Prior { weight, right: prior_right, between: vec![] } }
     }
 
     fn normal_matrix(&self) -> Mat<f64> {

@@ -16,17 +16,20 @@ use photocore::network::{
 use rayon::ThreadPoolBuilder;
 
 const FREE: f64 = f64::INFINITY;
-const PHOTOS: usize = 11;
+const PHOTOS: usize = 14;
 const POINTS: usize = 40;
 const IMAGE_SD: f64 = 0.5;
 const TIGHT: Method = Method::Damped(Stop::Fraction(1e-9));
-/// Two that several photos share, one of one photo, one that is held, and one with a principal distance alone.
-const CAMERA_OF: [usize; PHOTOS] = [0, 1, 0, 1, 0, 1, 0, 2, 3, 4, 4];
+/// Two that several photos share, one of one photo, one that is held, one with a principal distance alone, and a backward one.
+const CAMERA_OF: [usize; PHOTOS] = [0, 1, 0, 1, 0, 1, 0, 2, 3, 4, 4, 5, 5, 5];
 
 /// A number between -1 and 1 for each index, the same on every machine.
 fn noise(index: usize) -> f64 {
     ((index as f64 * 12.9898).sin() * 43758.5453).fract()
 }
+
+/// c, xp, yp, K1, K2, K3, P1, P2, b1, b2 and the radius where it is balanced.
+const BROWN: [f64; 11] = [-1000.0, 3.0, -5.0, -5e-8, 2e-13, 0.0, 1e-6, -2e-6, 3e-4, -2e-4, 300.0];
 
 fn cameras() -> Vec<Camera> {
     let bal = |focal_length, radial| geometry::Camera::from(Bal { focal_length, radial });
@@ -37,6 +40,10 @@ fn cameras() -> Vec<Camera> {
         Camera { camera: bal(900.0, [-0.04, 0.02]), sd: vec![FREE, 0.004, 0.01] },
         Camera::held(bal(950.0, [0.0, 0.02])),
         Camera { camera: Perspective { principal_distance: -1050.0 }.into(), sd: vec![FREE] },
+        Camera {
+            camera: geometry::Camera::named("brown", &BROWN).unwrap(),
+            sd: vec![FREE, FREE, 0.5, FREE, FREE, 0.0, FREE, 1e-6, FREE, FREE, 0.0],
+        },
     ]
 }
 
@@ -51,6 +58,38 @@ fn turned(w: &[C], v: [C; 3]) -> [C; 3] {
         sum = std::array::from_fn(|k| sum[k] + term[k]);
     }
     sum
+}
+
+/// A measured position as the backward camera corrects it.
+fn corrected(camera: &[C], measured: [f64; 2]) -> [C; 2] {
+    let [xp, yp, k1, k2, k3, p1, p2, b1, b2] = std::array::from_fn(|k| camera[1 + k]);
+    let (dx, y) = (measured[0] - xp, measured[1] - yp);
+    let x = dx * (1.0 + b1) + y * b2;
+    let (q, q0) = (x * x + y * y, camera[10] * camera[10]);
+    let r = k1 * (q - q0) + k2 * (q * q - q0 * q0) + k3 * (q * q * q - q0 * q0 * q0);
+    [
+        x + x * r + p1 * (q + 2.0 * x * x) + 2.0 * p2 * x * y,
+        y + y * r + p2 * (q + 2.0 * y * y) + 2.0 * p1 * x * y,
+    ]
+}
+
+/// Observed minus computed.
+fn misclosure(pose: &[C], camera: &[C], point: &[C], measured: [f64; 2]) -> [C; 2] {
+    let (computed, observed) = match camera.len() {
+        11 => (image(pose, &camera[..1], point), corrected(camera, measured)),
+        _ => (image(pose, camera, point), measured.map(C::from)),
+    };
+    [0, 1].map(|k| observed[k] - computed[k])
+}
+
+/// The position whose misclosure is nothing, by steps that shrink with the distortion.
+fn exact(pose: &[C], camera: &[C], point: &[C]) -> [f64; 2] {
+    let mut measured = [0.0; 2];
+    for _ in 0..30 {
+        let left = misclosure(pose, camera, point, measured);
+        measured = [0, 1].map(|k| measured[k] - left[k].re);
+    }
+    measured
 }
 
 /// The image of a point: f or -c, and radial terms or none.
@@ -85,9 +124,9 @@ fn network() -> Network {
     for point in 0..POINTS {
         for photo in (0..PHOTOS).filter(|photo| (photo + point) % 3 > 0) {
             let parameters: Vec<f64> = cameras[CAMERA_OF[photo]].camera.parameters();
-            let exact = image(&complex(&pose(photo)), &complex(&parameters), &complex(&place(point)));
+            let exact = exact(&complex(&pose(photo)), &complex(&parameters), &complex(&place(point)));
             let n = 2 * images.len();
-            let xy = [0, 1].map(|k| exact[k].re + IMAGE_SD * noise(n + k + 7000));
+            let xy = [0, 1].map(|k| exact[k] + IMAGE_SD * noise(n + k + 7000));
             images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
         }
     }
@@ -180,12 +219,12 @@ impl<'a> Dense<'a> {
                 values[k].im = STEP;
                 let (pose, rest) = values.split_at(6);
                 let (camera, point) = rest.split_at(camera.len());
-                let xy = image(pose, camera, point);
+                let misclosure = misclosure(pose, camera, point, each.xy);
                 for row in 0..2 {
                     // What is fixed has its own equation alone.
-                    let partial = if sd[column] == 0.0 { 0.0 } else { xy[row].im / STEP };
+                    let partial = if sd[column] == 0.0 { 0.0 } else { -misclosure[row].im / STEP };
                     a[(2 * i + row, column)] = partial / IMAGE_SD;
-                    left[(2 * i + row, 0)] = (each.xy[row] - xy[row].re) / IMAGE_SD;
+                    left[(2 * i + row, 0)] = misclosure[row].re / IMAGE_SD;
                 }
             }
         }
@@ -253,6 +292,7 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
     assert_eq!(solution.adjustment.status, Status::Converged);
     let (x, q) = dense.adjust();
     let (_, sd) = dense.observed();
+    let (design, _) = dense.equations(&x);
     for (i, photo) in solution.photos.iter().enumerate() {
         let mut unknowns: Vec<usize> = (6 * i..6 * i + 6).collect();
         let mut values = photo.pose.to_vec();
@@ -270,6 +310,9 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
             let weighted = sd[u] > 0.0 && sd[u] < FREE;
             let expected = if weighted { 1.0 - q[(u, u)] / sd[u].powi(2) } else { 0.0 };
             assert!((camera.redundancy[k] - expected).abs() < 1e-8, "camera {i}, parameter {k}");
+            let sum: f64 = (0..design.nrows()).map(|row| design[(row, u)].powi(2)).sum();
+            let expected = if sd[u] == 0.0 { 0.0 } else { sum };
+            assert!((camera.information[k] - expected).abs() <= 1e-8 * sum, "camera {i}, parameter {k}");
         }
         let of_camera = |image: &&Image| CAMERA_OF[image.photo] == i;
         let photos = CAMERA_OF.iter().filter(|&&camera| camera == i).count();
@@ -391,8 +434,8 @@ fn redundancy_numbers_of_a_free_network_add_up() {
     network.observations.clear();
     let solution = adjust(&network, Method::TrustRegion(Stop::Decrease(1e-10))).unwrap();
     assert_eq!(solution.datum.len(), 7);
-    let parameters = 3 + 2 + 3 + 1;
-    let weighted = 1 + 2;
+    let parameters = 3 + 2 + 3 + 1 + 9;
+    let weighted = 1 + 2 + 2;
     let unknowns = (6 * PHOTOS + parameters + 3 * POINTS - 7) as i64;
     let expected = (2 * network.images.len() + weighted) as i64 - unknowns;
     assert_eq!(solution.degrees_of_freedom, expected);

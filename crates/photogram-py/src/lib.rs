@@ -2,6 +2,7 @@
 
 mod arrays;
 mod attitude;
+mod camera;
 mod comparator;
 mod distributions;
 mod geometry;
@@ -28,6 +29,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     distributions::register(module)?;
     attitude::register(module)?;
     geometry::register(module)?;
+    camera::register(module)?;
     network::register(module)?;
     comparator::register(module)?;
     resection::register(module)?;

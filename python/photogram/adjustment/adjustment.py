@@ -11,7 +11,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.ends import behind, datum, rounded, steep, too_coarse, undetermined
+from photogram.adjustment.ends import behind, datum, rounded, too_coarse, undetermined
+from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
@@ -166,6 +167,7 @@ def adjust(
             photo_attitudes_observed=None,
         )
     groups = observation_rows(block.observations, block.point_ids, block.photo_ids)
+    cameras, photo_cameras = block.core_cameras()
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
 
     try:
@@ -176,7 +178,8 @@ def adjust(
             block.photo_attitudes if attitudes is None else attitudes,
             block.photo_position_sd,
             block.photo_attitude_sd,
-            block.principal_distances,
+            photo_cameras,
+            cameras,
             block.point_positions,
             block.point_sd,
             block.image_photos,
@@ -199,9 +202,9 @@ def adjust(
             progress=None if progress is None else teller(progress),
         )
     except _photocore.BlockError as error:
-        raise _named(block, *error.args) from None
+        raise hinted(_named(block, *error.args), block) from None
     with turned("the adjusted block"):
-        return _result(block, solution, unit_variance, row, as_published)
+        return with_hints(_result(block, solution, unit_variance, row, as_published))
 
 
 def _fits_anywhere(block: Block) -> bool:
@@ -287,7 +290,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     lost = [each.name for each in block.observations if not each.OF_PHOTOS and dropped.intersection(each.of)]
     if lost:
         messages.append(Message(f"left out with their points: {listed(lost)}"))
-    messages = datum(block, solution) + messages + steep(block)
+    messages = datum(block, solution) + messages
     return messages + remarks(block, solution.photo_positions)
 
 
@@ -306,7 +309,12 @@ def _rises(iterations: list[Iteration]) -> list[Message]:
 
 
 def _named(
-    block: Block, kind: str, message: str, photos: list[list[int]], points: list[int]
+    block: Block,
+    kind: str,
+    message: str,
+    photos: list[list[int]],
+    points: list[int],
+    cameras: list[list[int]],
 ) -> AdjustmentError:
     """Put names to the indices of a failure of the core."""
     point_names = [block.point_ids[i] for i in points]
@@ -316,7 +324,7 @@ def _named(
         text = f"the rays on photos {listed(photo_names)} do not determine the points {listed(point_names)}"
         return RankError(text, photo_names, point_names)
     if kind == "undetermined photos":
-        return _undetermined_photos(block, photos)
+        return _undetermined_photos(block, photos, cameras)
     if kind == "no intersection":
         return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
     if kind == "coarse":
@@ -326,22 +334,17 @@ def _named(
     return AdjustmentError(message)
 
 
-def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankError:
-    concerned = sorted({photo for combination in combinations for photo in combination})
+def _undetermined_photos(block: Block, photos: list[list[int]], cameras: list[list[int]]) -> RankError:
+    combinations = [(tuple(of), tuple(by)) for of, by in zip(photos, cameras, strict=True)]
+    concerned = sorted({photo for of, _ in combinations for photo in of})
     names = [block.photo_ids[photo] for photo in concerned]
+    camera_names = [block.camera_names[row] for row in sorted({row for _, by in combinations for row in by})]
     points = np.unique(block.image_points[np.isin(block.image_photos, concerned)])
     point_names = [block.point_ids[point] for point in points]
     lines = [f"the observations leave {len(combinations)} combinations of unknowns undetermined:"]
-    for each in sorted(set(map(tuple, combinations))):
-        count = sum(tuple(combination) == each for combination in combinations)
-        on = np.unique(block.image_points[np.isin(block.image_photos, each)])
-        moved = (
-            f"all {len(each)} photos together"
-            if len(each) == len(block.photo_ids) > 1
-            else f"photos {listed([block.photo_ids[photo] for photo in each])}"
-        )
-        held = f"hold the points {listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
-        lines.append(f"  {count} moving {moved}, which {held}")
+    lines += [
+        f"  {combinations.count(each)} moving {_moved(block, *each)}" for each in sorted(set(combinations))
+    ]
     if not np.isfinite(block.point_sd).any():
         weighted = np.isfinite(block.photo_position_sd).any()
         remedy = (
@@ -350,4 +353,21 @@ def _undetermined_photos(block: Block, combinations: list[list[int]]) -> RankErr
             else "standard deviations for the positions and attitudes of photos would give a datum"
         )
         lines.append(f"  there is no control; {remedy}")
-    return RankError("\n".join(lines), names, point_names)
+    return RankError("\n".join(lines), names, point_names, camera_names)
+
+
+def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...]) -> str:
+    """Say what a combination of unknowns moves."""
+    of_cameras = listed([block.camera_names[camera] for camera in cameras])
+    if not photos:
+        return f"the parameters of {of_cameras}"
+    on = np.unique(block.image_points[np.isin(block.image_photos, photos)])
+    moved = (
+        f"all {len(photos)} photos together"
+        if len(photos) == len(block.photo_ids) > 1
+        else f"photos {listed([block.photo_ids[photo] for photo in photos])}"
+    )
+    if cameras:
+        moved += f" with the parameters of {of_cameras}"
+    held = f"hold the points {listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
+    return f"{moved}, which {held}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,13 +14,10 @@ from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["behind", "datum", "hidden", "rounded", "steep", "too_coarse", "undetermined"]
+__all__ = ["behind", "datum", "hidden", "rounded", "too_coarse", "undetermined"]
 
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
-
-STEEP = math.radians(5.0)
-"""Angles of photos whose phi is as near to 90 degrees have weights that say little."""
 
 
 def undetermined(
@@ -30,11 +27,12 @@ def undetermined(
     messages = []
     if error is not None:
         messages.append(Message(f"there are no covariances: {error}"))
-    if solution.weak:
+    weak = _unknowns(block, solution.weak, solution.weak_cameras)
+    if weak:
         messages.append(
             Message(
                 "the sum of squares stands still, but the observations hardly determine a combination of"
-                f" unknowns that moves {_unknowns(block, solution.weak)}: other values along it fit as well"
+                f" unknowns that moves {weak}: other values along it fit as well"
             )
         )
     return messages
@@ -55,30 +53,26 @@ def datum(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     return [Message("there is no control: the datum of the block rests on the weights of its photos")]
 
 
-def steep(block: Block) -> list[Message]:
-    """Remark on weighted angles near where two of them turn about one axis."""
-    weighted = ((block.photo_attitude_sd > 0) & np.isfinite(block.photo_attitude_sd)).any(axis=1)
-    near = np.abs(np.cos(block.photo_attitudes[:, 1])) < math.sin(STEEP)
-    names = [block.photo_ids[photo] for photo in np.flatnonzero(weighted & near)]
-    if not names:
-        return []
-    return [
-        Message(
-            f"phi is within {math.degrees(STEEP):.0f} degrees of 90 on {listed(names)}: omega and kappa turn"
-            " about nearly the same axis there, and their weights say little; leave the angles free and give"
-            " an observed attitude (docs/observations.md)"
-        )
-    ]
-
-
-def _unknowns(block: Block, unknowns: list[tuple[int, int]]) -> str:
-    """Name photos and their unknowns (0 to 5)."""
+def _unknowns(
+    block: Block, of_photos: list[tuple[int, int]], of_cameras: Sequence[tuple[int, int]] = ()
+) -> str:
+    """Name photos and their unknowns (0 to 5, then those of a camera of their own), cameras and theirs."""
     names = [*position_columns(block), *ATTITUDE_COLUMNS]
-    return "; ".join(
+    parts = [
         f"{names[unknown].removesuffix('_deg')} of"
-        f" {listed([block.photo_ids[photo] for photo, other in unknowns if other == unknown])}"
-        for unknown in sorted({unknown for _, unknown in unknowns})
-    )
+        f" {listed([block.photo_ids[photo] for photo, other in of_photos if other == unknown])}"
+        for unknown in sorted({unknown for _, unknown in of_photos if unknown < len(names)})
+    ]
+    if block.photo_cameras is not None:
+        cameras = block.photo_cameras.tolist()
+        own = [
+            (cameras[photo], unknown - len(names)) for photo, unknown in of_photos if unknown >= len(names)
+        ]
+        parts += [
+            f"{block.cameras[camera].names[k]} of {block.camera_names[camera]}"
+            for camera, k in [*own, *of_cameras]
+        ]
+    return "; ".join(parts)
 
 
 def rounded(excess: float | None) -> list[Message]:

@@ -18,9 +18,10 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.network import geometry
 from photogram.network.block import Block, checked, of_images_alone
+from photogram.network.cameras import images_of
 from photogram.results.result import Result
 
-__all__ = ["at_adjusted", "image_depths", "predict"]
+__all__ = ["at_adjusted", "computed_images", "image_depths", "predict"]
 
 
 def predict(
@@ -60,19 +61,10 @@ def predict(
         There is nothing to adjust, or rays are so nearly parallel that their points cannot be found.
     """
     _check_positions(of_images_alone(checked(block), "predict"))
-    images = block.image_photos, block.image_points
-    computed = geometry.project(
-        block.point_positions[images[1]],
-        block.photo_positions[images[0]],
-        block.photo_attitudes[images[0]],
-        block.principal_distances[images[0]],
-        spheroid=block.spheroid,
-        photo_to_ground=block.photo_to_ground,
-        refraction=block.refraction,
-        linear_unit=block.linear_unit,
-    )
     result = adjust(
-        block.replace(image_xy=computed, photo_positions_observed=None, photo_attitudes_observed=None),
+        block.replace(
+            image_xy=computed_images(block), photo_positions_observed=None, photo_attitudes_observed=None
+        ),
         unit_variance="unity",
         ordering=ordering,
         threads=threads,
@@ -82,6 +74,27 @@ def predict(
         raise AdjustmentError(f"the adjustment of computed image coordinates has {result.status}")
     remark = Message("predicted: image coordinates are computed, not observed; residuals mean nothing")
     return replace(result, messages=[remark, *result.messages])
+
+
+def computed_images(block: Block) -> Floats:
+    """Return (m, 2) the image coordinates that the given positions, attitudes and cameras of a block have."""
+    photos, points = block.image_photos, block.image_points
+    distances = block.principal_distances
+    ideal = geometry.project(
+        block.point_positions[points],
+        block.photo_positions[photos],
+        block.photo_attitudes[photos],
+        np.full(len(photos), -1.0) if distances is None else distances[photos],
+        spheroid=block.spheroid,
+        photo_to_ground=block.photo_to_ground,
+        refraction=block.refraction,
+        linear_unit=block.linear_unit,
+    )
+    if block.photo_cameras is None:
+        return ideal
+    # With a principal distance of -1 an image is the direction (u1, u2) / -u3 of what lies in front.
+    directions = np.column_stack([ideal, np.full(len(ideal), -1.0)])
+    return images_of(block.cameras, block.photo_cameras[photos], directions)
 
 
 def at_adjusted(result: Result) -> Block:
@@ -102,6 +115,7 @@ def at_adjusted(result: Result) -> Block:
         photo_attitudes=result.photo_attitudes,
         photo_positions_observed=None,
         photo_attitudes_observed=None,
+        cameras=[each.camera for each in result.cameras],
         point_positions=np.where(
             result.used_points[:, np.newaxis], result.point_positions, block.point_positions
         ),

@@ -23,10 +23,10 @@ from photogram.checks.predictions import (
     freed,
     tests_of_predictions,
 )
-from photogram.checks.rays import Rays
 from photogram.checks.robust import critical, mad_sd
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
+from photogram.network.rays import Rays
 from photogram.results.result import Result
 
 __all__ = ["Edited", "edit"]
@@ -256,11 +256,12 @@ def without_photos(block: Block, photos: Bools) -> Block:
         "principal_distances",
         "photo_position_sd",
         "photo_attitude_sd",
+        "photo_cameras",
     )
     return fewer.replace(
         photo_ids=[name for name, gone in zip(block.photo_ids, photos.tolist(), strict=True) if not gone],
         image_photos=number[fewer.image_photos],
-        **{name: getattr(block, name)[~photos] for name in names},
+        **{name: values[~photos] for name in names if (values := getattr(block, name)) is not None},
     )
 
 

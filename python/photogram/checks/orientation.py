@@ -11,8 +11,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.checks.findings import Finding, Section
-from photogram.checks.rays import Intersection, Rays, frame_radius, meet
 from photogram.network.block import Block
+from photogram.network.rays import Intersection, Rays, frame_radius, meet
 
 __all__ = ["orientation", "spare_explained"]
 
@@ -187,8 +187,9 @@ def _turned(block: Block, photos: Bools, angle: float) -> Block:
 
 
 def _sign_changed(block: Block, photos: Bools) -> Block:
-    distances = np.where(photos, -block.principal_distances, block.principal_distances)
-    return block.replace(principal_distances=distances)
+    distances = block.known_distances("checks")
+    changed = np.where(photos, -distances, distances)
+    return block.replace(principal_distances=changed, cameras=(), photo_cameras=None)
 
 
 def _mirrored(block: Block, photos: Bools, mirror: Floats) -> Block:
@@ -229,9 +230,10 @@ class _Trial:
 def _trials(block: Block) -> list[_Trial]:
     """Explanations to try; of equally good ones the first counts, and the sign is the most probable."""
     groups = {"all photos": np.ones(len(block.photo_ids), dtype=bool)}
-    distances = np.unique(block.principal_distances).tolist()
+    of_photos = block.known_distances("checks")
+    distances = np.unique(of_photos).tolist()
     for value in distances if len(distances) > 1 else []:
-        groups[f"the photos of principal distance {value:g} mm"] = block.principal_distances == value
+        groups[f"the photos of principal distance {value:g} mm"] = of_photos == value
     trials = []
     for name, photos in groups.items():
         names = [photo for photo, of in zip(block.photo_ids, photos.tolist(), strict=True) if of]

@@ -157,7 +157,9 @@ def _numbers(which: NDArray[np.bool_]) -> str:
     return listed([str(index) for index in np.flatnonzero(which)])
 
 
-def _named(kind: str, message: str, photos: list[list[int]], points: list[int]) -> AdjustmentError:
+def _named(
+    kind: str, message: str, photos: list[list[int]], points: list[int], _cameras: list[list[int]]
+) -> AdjustmentError:
     """Put a failure of the core into words; photos and points have no names but their numbers, from 0."""
     if kind == "undetermined points":
         names = [str(point) for point in points]

@@ -19,7 +19,7 @@ from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
 from photogram.giant.images import ImageFrame
 from photogram.messages import Message
-from photogram.network.block import Block, of_images_alone
+from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.refraction import Refraction, metres_per_unit
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def block_files(
     block: Block, common: Common | None
 ) -> tuple[Common, list[Camera], list[Frame], list[ImageFrame], list[GroundPoint], list[Message]]:
     """Return the content of the five files for a block; see :meth:`Project.from_block`."""
-    of_images_alone(block, "GIANT files")
+    of_images_alone(checked(block), "GIANT files")
     common = dataclasses.replace(
         common or Common(error_propagation=True),
         title=block.title[:80],
@@ -49,11 +49,12 @@ def block_files(
         common.semi_major, common.semi_minor = round(block.spheroid.a, 2), round(block.spheroid.b, 2)
         if (common.semi_major, common.semi_minor) != (block.spheroid.a, block.spheroid.b):
             messages.append(Message("the axes of the spheroid are rounded to the two decimals of COMMON"))
-    distances = dict.fromkeys(block.principal_distances.tolist())
+    of_photos = block.known_distances("GIANT files").tolist()
+    distances = dict.fromkeys(of_photos)
     names = {distance: f"CAMERA{number}" for number, distance in enumerate(distances, 1)}
     cameras = [Camera(name, distance) for distance, name in names.items()]
     frames = _frames(block, stations)
-    images = _images(block, [names[distance] for distance in block.principal_distances.tolist()])
+    images = _images(block, [names[distance] for distance in of_photos])
     return common, cameras, frames, images, _ground(block), messages
 
 

@@ -82,7 +82,7 @@ def _map_projection(block: Block) -> list[Message]:
         return []
     known = block.point_positions[:, 2]
     ground = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
-    distances = block.principal_distances[block.image_photos]
+    distances = block.known_distances("GIANT files")[block.image_photos]
     radii = np.hypot(block.image_xy[:, 0], block.image_xy[:, 1])
     shifts = abs(height - ground) * radii**3 / (2 * EARTH_RADIUS * distances**2)
     shift = float(np.quantile(shifts, 0.95))

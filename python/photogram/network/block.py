@@ -10,9 +10,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.arrays import indices, length, names, shaped, shown, text, truth_value
+from photogram.arguments.arrays import frozen, indices, length, names, shaped, shown, text, truth_value
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.messages import listed
+from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_cameras, photo_indices
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation, observation_rows
 from photogram.network.refraction import Refraction, metres_per_unit
@@ -28,7 +30,7 @@ _ANGLES = 1e6
 """Radians: larger angles have lost the digits that an attitude needs."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Block:
     """A block of photographs with its measurements and everything known beforehand.
 
@@ -45,9 +47,12 @@ class Block:
         P names, all different: strings that print, or whole numbers.
     photo_positions, photo_attitudes
         (P, 3) initial positions, and omega, phi, kappa in radians: M = M_kappa M_phi M_omega (GIANT guide,
-        section 5). Components whose standard deviation is 0 stay at these values.
+        section 5). Components whose standard deviation is 0 stay at these values. NaN where unknown:
+        :func:`photogram.first_values` finds them.
     principal_distances
-        (P,) in millimetres; negative for the positive (diapositive) plane, positive for the negative plane.
+        (P,) in millimetres; negative for the positive (diapositive) plane, positive for the negative plane:
+        cameras that are known and free of distortion, image coordinates counted from the principal point.
+        None where there are `cameras`.
     point_ids
         n names, all different.
     point_positions
@@ -56,7 +61,8 @@ class Block:
         (m,) indices into photos and points. A photo has one image of a point: repeated pointings are averaged
         before.
     image_xy, image_sd
-        (m, 2) image coordinates and their standard deviations in millimetres; `image_sd` may be a number.
+        (m, 2) image coordinates and their standard deviations in millimetres, or in the unit of the cameras;
+        `image_sd` may be a number.
     photo_position_sd, photo_attitude_sd
         (P, 3) standard deviations of the observed values, in their units: infinite (free, the default), 0
         (fixed) or between (weighted).
@@ -80,19 +86,26 @@ class Block:
     observations
         What else was observed: distances, differences of coordinates, heights, positions and attitudes of
         photos, relative poses, control with full covariance (:mod:`photogram.network.observations`).
+    cameras
+        Cameras with distortion, or with unknown parameters, all of one image unit; in place of
+        `principal_distances`.
+    photo_cameras
+        (P,) which camera each photo has: an index, or its name; photos with the same one share its unknowns.
+        One for all photos; None where there is one camera, or one for each photo.
 
     Raises
     ------
     InputError
         Arrays of the wrong shape or type, values that are not finite or masked, indices out of range, names
         that repeat, are empty or are no names, a point with two images on a photo; refraction in a linear
-        unit whose length is not known; observations of points or photos that are not there.
+        unit whose length is not known; observations of points or photos that are not there; both
+        principal distances and cameras, or neither.
     """
 
     photo_ids: list[str]
     photo_positions: Floats
     photo_attitudes: Floats
-    principal_distances: Floats
+    principal_distances: Floats | None = None
     point_ids: list[str]
     point_positions: Floats
     image_photos: Indices
@@ -110,13 +123,15 @@ class Block:
     photo_positions_observed: Floats | None = None
     photo_attitudes_observed: Floats | None = None
     observations: Sequence[Observation] = ()
+    cameras: Sequence[Camera] = ()
+    photo_cameras: Indices | None = None
 
     def __post_init__(self) -> None:
         for name in ("photo_ids", "point_ids"):
             self._set(name, _different(name, getattr(self, name)))
         photos, points = len(self.photo_ids), len(self.point_ids)
         images = length("image_photos", self.image_photos)
-        shapes = {
+        shapes: dict[str, tuple[int, ...]] = {
             "photo_positions": (photos, 3),
             "photo_attitudes": (photos, 3),
             "principal_distances": (photos,),
@@ -127,8 +142,12 @@ class Block:
             "photo_attitude_sd": (photos, 3),
             "point_sd": (points, 3),
         }
+        self._check_cameras(photos)
         for name, shape in shapes.items():
-            self._set(name, shaped(name, getattr(self, name), shape, missing=name == "point_positions"))
+            if name == "principal_distances" and self.cameras:
+                continue
+            missing = name in ("point_positions", "photo_positions", "photo_attitudes")
+            self._set(name, shaped(name, getattr(self, name), shape, missing=missing))
         for name in ("photo_positions_observed", "photo_attitudes_observed"):
             if getattr(self, name) is not None:
                 self._set(name, shaped(name, getattr(self, name), (photos, 3), missing=True))
@@ -143,14 +162,28 @@ class Block:
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
 
+    def _check_cameras(self, photos: int) -> None:
+        self._set("cameras", checked_cameras(self.cameras))
+        if not self.cameras:
+            if self.photo_cameras is not None:
+                raise InputError("photo_cameras is given, but no cameras")
+            return
+        if self.principal_distances is not None:
+            raise InputError("principal_distances and cameras are both given: the cameras have them")
+        self._set("photo_cameras", frozen(photo_indices(self.photo_cameras, self.cameras, photos)))
+
     def _check_values(self) -> None:
         owners = {"photo": self.photo_ids, "princ": self.photo_ids, "point": self.point_ids}
-        for name in ("photo_positions", "photo_attitudes", "principal_distances", "image_xy"):
+        for name in ("photo_positions", "photo_attitudes"):
+            self._refuse(name, np.isinf(getattr(self, name)), "is not a finite number", self.photo_ids)
+        given = ("principal_distances",) if self.principal_distances is not None else ()
+        for name in (*given, "image_xy"):
             bad = ~np.isfinite(getattr(self, name))
             self._refuse(name, bad, "is not a finite number", owners.get(name[:5]))
         beyond = np.abs(self.photo_attitudes) > _ANGLES
         self._refuse("photo_attitudes", beyond, f"is beyond {_ANGLES:g} radians", self.photo_ids)
-        self._refuse("principal_distances", self.principal_distances == 0, "is zero", self.photo_ids)
+        if self.principal_distances is not None:
+            self._refuse("principal_distances", self.principal_distances == 0, "is zero", self.photo_ids)
         self._refuse("point_positions", np.isinf(self.point_positions), "is infinite", self.point_ids)
         for name in ("photo_position_sd", "photo_attitude_sd", "point_sd"):
             self._refuse(name, ~(getattr(self, name) >= 0), "is not a standard deviation", owners[name[:5]])
@@ -168,6 +201,9 @@ class Block:
         ):
             observed = getattr(self, name)
             if observed is None:
+                unknown = np.isnan(initial) & np.isfinite(sd)
+                why = "is unknown but weighted or fixed (its sd is finite)"
+                self._refuse(name.removesuffix("_observed"), unknown, why, self.photo_ids)
                 continue
             self._refuse(name, np.isinf(observed), "is infinite", self.photo_ids)
             if initial is self.photo_attitudes:
@@ -228,6 +264,50 @@ class Block:
         """Whether positions are longitude, latitude and height."""
         return self.spheroid is not None
 
+    @property
+    def image_unit(self) -> str:
+        """What image coordinates are measured in, `mm` or `px`."""
+        return str(self.cameras[0].unit) if self.cameras else "mm"
+
+    @property
+    def camera_names(self) -> list[str]:
+        """What reports call the cameras: their names, numbers for those without."""
+        return [each.name or f"camera {row}" for row, each in enumerate(self.cameras, 1)]
+
+    def camera_scales(self) -> Floats:
+        """Return (P,) principal distances without sign, in the unit of image coordinates."""
+        if self.principal_distances is not None:
+            return np.abs(self.principal_distances)
+        return np.array([each.scale for each in self.cameras])[self.photo_cameras]
+
+    def core_cameras(self) -> tuple[list[CameraRow], Indices]:
+        """Return the different cameras as the core takes them, and (P,) which one each photo has."""
+        if self.photo_cameras is not None:
+            return camera_rows(self.cameras), self.photo_cameras
+        distances = self.known_distances("the adjustment").tolist()
+        places = {distance: row for row, distance in enumerate(dict.fromkeys(distances))}
+        rows: list[CameraRow] = [("perspective", [distance], [0.0]) for distance in places]
+        return rows, np.array([places[distance] for distance in distances], dtype=np.int64)
+
+    def known_distances(self, what: str) -> Floats:
+        """Return (P,) principal distances of cameras that are known and free of distortion, millimetres.
+
+        Raises
+        ------
+        InputError
+            There are others, which `what` does not take.
+        """
+        if self.principal_distances is not None:
+            return self.principal_distances
+        for name, each in zip(self.camera_names, self.cameras, strict=True):
+            if each.model != "perspective" or not each.is_held or each.unit != "mm":
+                raise InputError(
+                    f"{what}: {name} has the model {each.model} or unknown parameters; only cameras that are"
+                    " known and free of distortion, in mm, are taken there"
+                )
+        distances = np.array([each.values[0] for each in self.cameras])
+        return np.asarray(distances[self.photo_cameras])
+
     @classmethod
     def from_tables(
         cls,
@@ -236,7 +316,8 @@ class Block:
         points: Mapping[str, Any] | None = None,
         *,
         principal_distance: float | None = None,
-        image_sd: float = 0.010,
+        cameras: Sequence[Camera] = (),
+        image_sd: float | None = None,
         spheroid: Spheroid | None = None,
         photo_to_ground: bool = False,
         title: str = "",
@@ -249,18 +330,22 @@ class Block:
         ----------
         photos
             `photo`; `X`, `Y`, `Z` (or `longitude_deg`, `latitude_deg`, `height` when a spheroid is given);
-            `omega_deg`, `phi_deg`, `kappa_deg`. Optional: `principal_distance_mm`, and before any of the six
-            names `sd_` (same units) and `observed_`, the observed value where it is not the initial one.
+            `omega_deg`, `phi_deg`, `kappa_deg`. Optional: `principal_distance_mm` or, with cameras, `camera`
+            (index or name), and before any of the six names `sd_` (same units) and `observed_`, the observed
+            value where it is not the initial one.
         images
-            `photo`, `point`, `x_mm`, `y_mm`. Optional: `sd_x_mm`, `sd_y_mm`.
+            `photo`, `point`, `x_mm`, `y_mm`. Optional: `sd_x_mm`, `sd_y_mm`. With cameras in pixels all four
+            end in `_px`.
         points
             Control and check points: `point` and the three coordinates as for photos; NaN where unknown.
             Optional: `sd_` columns; without them, or where they are infinite or NaN, components are not held.
             Image points without a row here are pass points.
         principal_distance
             Millimetres, signed, for all photos, when the column is not there.
+        cameras
+            As in the class, in place of principal distances.
         image_sd
-            Millimetres, for image coordinates without a column of their own.
+            For image coordinates without a column of their own: 0.010 mm when None, which pixels are not.
         spheroid, photo_to_ground, title, linear_unit, refraction
             As in the class.
 
@@ -282,21 +367,22 @@ class Block:
             positions[: len(control_ids)] = _columns(points, "points", axes)
             sd[: len(control_ids)] = _columns(points, "points", [f"sd_{axis}" for axis in axes], np.inf)
             sd[np.isnan(sd) | np.isnan(positions)] = np.inf
-        if "principal_distance_mm" not in photos and principal_distance is None:
-            raise InputError("photos has no column principal_distance_mm and no principal_distance was given")
+        unit = str(cameras[0].unit) if cameras else "mm"
+        if image_sd is None and unit == "mm":
+            image_sd = 0.010
         return cls(
             photo_ids=photo_ids,
             photo_positions=_columns(photos, "photos", axes),
             photo_attitudes=_columns(photos, "photos", ATTITUDE_COLUMNS),
-            principal_distances=_columns(photos, "photos", ["principal_distance_mm"], principal_distance)[
-                :, 0
-            ],
+            principal_distances=_distances(photos, principal_distance, cameras),
+            cameras=cameras,
+            photo_cameras=_camera_column(photos, cameras),
             point_ids=point_ids,
             point_positions=positions,
             image_photos=_lookup("photo", photo_ids, _name_column(images, "images", "photo")),
             image_points=_lookup("point", point_ids, image_point_names),
-            image_xy=_columns(images, "images", ["x_mm", "y_mm"]),
-            image_sd=_columns(images, "images", ["sd_x_mm", "sd_y_mm"], image_sd),
+            image_xy=_columns(images, "images", [f"x_{unit}", f"y_{unit}"]),
+            image_sd=_columns(images, "images", [f"sd_x_{unit}", f"sd_y_{unit}"], image_sd),
             photo_position_sd=_columns(photos, "photos", [f"sd_{axis}" for axis in axes], np.inf),
             photo_attitude_sd=_columns(photos, "photos", [f"sd_{axis}" for axis in ATTITUDE_COLUMNS], np.inf),
             point_sd=sd,
@@ -344,15 +430,22 @@ def of_images_alone(block: Block, what: str) -> Block:
 
 
 def checked(block: Block) -> Block:
-    """Return a block; refuse what is none.
+    """Return a block whose photos have positions and attitudes; refuse all else.
 
     Raises
     ------
     InputError
-        Anything else.
+        What is no block, or photos without a pose, named.
     """
     if not isinstance(block, Block):
         raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    unknown = np.isnan(block.photo_positions).any(axis=1) | np.isnan(block.photo_attitudes).any(axis=1)
+    if unknown.any():
+        photos = listed([block.photo_ids[row] for row in np.flatnonzero(unknown)])
+        raise InputError(
+            f"positions or attitudes of the photos {photos} are not known: photogram.first_values finds"
+            " initial values"
+        )
     return block
 
 
@@ -401,6 +494,26 @@ def _columns(
         column = shaped(f"{table_name}, column {name}", values, (rows,), missing=True)
         stacked.append(np.radians(column) if name.endswith("_deg") else column)
     return np.stack(stacked, axis=1)
+
+
+def _distances(
+    photos: Mapping[str, Any], principal_distance: float | None, cameras: Sequence[Camera]
+) -> Floats | None:
+    name = "principal_distance_mm"
+    if cameras:
+        if name in photos or principal_distance is not None:
+            raise InputError("principal distances and cameras are both given: the cameras have them")
+        return None
+    if name not in photos and principal_distance is None:
+        raise InputError(f"photos has no column {name} and no principal_distance was given")
+    return _columns(photos, "photos", [name], principal_distance)[:, 0]
+
+
+def _camera_column(photos: Mapping[str, Any], cameras: Sequence[Camera]) -> Indices | None:
+    """Return (P,) indices of the cameras that photos name; None where they name none."""
+    if not cameras or "camera" not in photos:
+        return None
+    return photo_indices(list(_column(photos, "photos", "camera")), cameras, len(photos["photo"]))
 
 
 def _observed(photos: Mapping[str, Any], columns: Sequence[str]) -> Floats | None:

@@ -125,7 +125,7 @@ class Pattern:
     def _scales(self) -> Floats:
         photos = self.block.image_photos[self.result.used_images]
         depths = image_depths(self.block)[self.result.used_images]
-        scales: Floats = depths / np.abs(self.block.principal_distances[photos])
+        scales: Floats = depths / self.block.camera_scales()[photos]
         return scales
 
     def _plan(self, positions: Floats) -> Floats:

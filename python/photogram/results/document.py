@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.io import json
+from photogram.results.calibration_report import calibration_members
 from photogram.results.report import problems_of
 from photogram.results.result import Result
 from photogram.show.ways import document_of
@@ -69,6 +70,11 @@ def _document(result: Result) -> dict[str, Any]:
         "global_test": _global_test(result),
         "covariance_scale": result.covariance_scale,
         "photos": _photos(result),
+        **(
+            {"cameras": _cameras(result), "calibrations": calibration_members(result)}
+            if result.cameras
+            else {}
+        ),
         "points": _points(result),
         "observations": _observations(result),
         "observations_beside_images": _beside_images(result),
@@ -85,7 +91,7 @@ def _document(result: Result) -> dict[str, Any]:
 
 def _units(result: Result) -> dict[str, str]:
     linear = result.block.linear_unit
-    geographic = result.block.geographic
+    geographic, unit = result.block.geographic, result.block.image_unit
     return {
         "position": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
         "water_level": linear,
@@ -95,7 +101,7 @@ def _units(result: Result) -> dict[str, str]:
         "attitude": "rad",
         "attitude_covariance": "rad^2",
         "covariance": "products of the units of position_covariance and rad",
-        "residual_mm": "mm",
+        f"residual_{unit}": unit,
         "position_residual": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
         "position_sd": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
         "attitude_residual_rad": "rad",
@@ -136,6 +142,33 @@ def _photos(result: Result) -> list[dict[str, Any]]:
     ]
 
 
+def _cameras(result: Result) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": each.name,
+            "model": each.camera.model,
+            "image_unit": each.camera.unit,
+            "photos": each.photos,
+            "images": each.images,
+            "parameters": [
+                {"name": name, "unit": each.camera.unit_of(name), "value": value, "sd": sd, "given": given}
+                | {"sd_given": sd_given, "redundancy": redundancy}
+                for name, value, sd, given, sd_given, redundancy in zip(
+                    each.names,
+                    each.values.tolist(),
+                    each.sd.tolist(),
+                    each.given.values.tolist(),
+                    each.given.deviations.tolist(),
+                    each.redundancy.tolist(),
+                    strict=True,
+                )
+            ],
+            "covariance": each.covariance.tolist(),
+        }
+        for each in result.cameras
+    ]
+
+
 def _points(result: Result) -> list[dict[str, Any]]:
     columns = zip(
         result.block.point_ids,
@@ -167,7 +200,7 @@ def _observations(result: Result) -> list[dict[str, Any]]:
         {
             "photo": block.photo_ids[photo],
             "point": block.point_ids[point],
-            "residual_mm": residual,
+            f"residual_{block.image_unit}": residual,
             "redundancy": redundancy,
             "standardized": standardized,
             **({"weight_factor": weight} if result.loss else {}),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.structuring import structure
+from photogram.results.calibration_report import calibration_sections
 from photogram.results.kinds import kind_lines, tested_kind
 from photogram.results.observed import image_lines, observed_lines, tested
 from photogram.results.result import Result
@@ -59,6 +60,8 @@ def report(result: Result) -> str:
             "Observations beside images: observed minus adjusted, redundancy, standardized residual",
             kind_lines(result.kinds),
         ),
+        *calibration_sections(result),
+        ("Cameras that are held", _held_cameras(result)),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
         ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
@@ -127,6 +130,7 @@ def _adjustment(result: Result) -> list[str]:
         ),
         ("weighted sum of squares, total", f"{sums.total:.6f}"),
         ("photos", f"{len(block.photo_ids)}"),
+        *([("cameras", f"{len(block.cameras)}")] if block.cameras else []),
         ("points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
         ("held components of control", components),
         ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
@@ -143,9 +147,11 @@ def _adjustment(result: Result) -> list[str]:
 
 def _residuals(result: Result) -> list[str]:
     used = result.used_images
+    unit, factor = image_unit(result)
+    rms = [_rms(result.residuals[used][:, axis]) * factor for axis in (0, 1)]
     lines = [
-        f"rms of image residuals              {_rms(result.residuals[used][:, axis]) * 1000:.3f} um in {name}"
-        for axis, name in enumerate("xy")
+        f"rms of image residuals              {value:.3f} {unit} in {name}"
+        for value, name in zip(rms, "xy", strict=True)
     ]
     redundancy = result.redundancy[used]
     if np.isfinite(redundancy).all() and redundancy.size:
@@ -182,12 +188,14 @@ def _suspects(result: Result) -> list[str]:
     if not images.size:
         return ["none"]
     order = np.argsort(-size[images, axes], kind="stable")[:_SUSPECTS]
-    block = result.block
-    lines = [f"{'photo':<10} {'point':<10}   {'residual um':>12} {'redundancy':>11} {'standardized':>13}"]
+    block, (unit, factor) = result.block, image_unit(result)
+    lines = [
+        f"{'photo':<10} {'point':<10}   {f'residual {unit}':>12} {'redundancy':>11} {'standardized':>13}"
+    ]
     lines += [
         f"{block.photo_ids[block.image_photos[i]]:<10} {block.point_ids[block.image_points[i]]:<10} "
         f"{'xy'[axis]}"
-        f" {result.residuals[i, axis] * 1000:>12.2f} {result.redundancy[i, axis]:>11.3f}"
+        f" {result.residuals[i, axis] * factor:>12.2f} {result.redundancy[i, axis]:>11.3f}"
         f" {result.standardized[i, axis]:>13.2f}"
         for i, axis in zip(images[order], axes[order], strict=True)
     ]
@@ -243,7 +251,7 @@ def _stations(result: Result) -> list[str]:
 
 def _images(result: Result) -> list[str]:
     block = result.block
-    return image_lines(result, block.image_photos, block.photo_ids, block.point_ids, "um", 1000.0)
+    return image_lines(result, block.image_photos, block.photo_ids, block.point_ids, *image_unit(result))
 
 
 def _photos(result: Result) -> list[str]:
@@ -263,6 +271,15 @@ def _photos(result: Result) -> list[str]:
         lines.append(f"{name:<10}{position(values)}" + "".join(f"{angle:>15.7f}" for angle in angles))
         lines.append(f"{'':<10}{sd_position(sd[:3])}" + "".join(f"{each / ARCSEC:>15.3f}" for each in sd[3:]))
     return lines
+
+
+def _held_cameras(result: Result) -> list[str]:
+    return [
+        f"{each.name:<16}{each.camera.model}, {each.photos} photos: "
+        + ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0)
+        for each in result.cameras
+        if each.given.is_held
+    ]
 
 
 def _points(result: Result) -> list[str]:
@@ -311,6 +328,11 @@ def bandwidths(result: Result) -> list[str]:
 
 def _rms(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
+
+
+def image_unit(result: Result) -> tuple[str, float]:
+    """Return the unit in which image residuals are written, and what leads to it."""
+    return ("um", 1000.0) if result.block.image_unit == "mm" else ("px", 1.0)
 
 
 def _outward(result: Result) -> Floats:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.results.cameras import AdjustedCamera, adjusted_cameras
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.limits import GlobalTest, global_test
@@ -32,7 +33,7 @@ class SumsOfSquares:
     Attributes
     ----------
     camera
-        Of the weighted positions and attitudes of the photos.
+        Of the weighted positions and attitudes of the photos, and of weighted parameters of cameras.
     ground
         Of the held components of control.
     plates
@@ -62,7 +63,7 @@ class Result(AdjustedNetwork):
     """An adjusted block; the arrays that every network has are those of `AdjustedNetwork`, with k = 6.
 
     The unknowns of a photo are its position and omega, phi, kappa. Positions are X, Y, Z or longitude (rad),
-    latitude (rad), height; angles are radians, image coordinates millimetres.
+    latitude (rad), height; angles are radians, image coordinates millimetres or the unit of the cameras.
 
     Attributes
     ----------
@@ -83,6 +84,8 @@ class Result(AdjustedNetwork):
         (n, 3) corrections in the last iteration.
     kinds
         Observations beside images: arrays for each kind, by its name.
+    cameras
+        The adjusted cameras of the block, in its order; none where it has principal distances.
     dropped
         Points left out, with the reason.
     """
@@ -96,6 +99,7 @@ class Result(AdjustedNetwork):
     photo_order: Indices
     point_last_corrections: Floats
     kinds: Mapping[str, ObservedKind]
+    cameras: tuple[AdjustedCamera, ...]
     dropped: Mapping[str, str]
 
     @classmethod
@@ -108,6 +112,7 @@ class Result(AdjustedNetwork):
         messages: list[Message],
     ) -> Self:
         """Take over what the core found."""
+        variance = solution.variance_of_unit_weight
         return cls.taken_over(
             solution,
             block=block.kept(),
@@ -116,6 +121,7 @@ class Result(AdjustedNetwork):
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
             unit_variance=unit_variance,
             kinds=observed_kinds(block, solution),
+            cameras=adjusted_cameras(block, solution, 1.0 if variance is None else variance),
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
         )
 
@@ -193,6 +199,10 @@ class Result(AdjustedNetwork):
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""
         return self._table("check")
+
+    def camera_table(self) -> pd.DataFrame:
+        """Return adjusted cameras as a data frame: a row for each parameter, with its unit."""
+        return self._table("camera")
 
     def observation_table(self) -> pd.DataFrame:
         """Return observations beside images as a data frame, a row for each component, with its unit."""

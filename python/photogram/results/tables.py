@@ -22,7 +22,7 @@ __all__ = ["images", "named", "observed", "table"]
 
 @columns_of.register(Result)
 def table(result: Result, what: str) -> dict[str, Any]:
-    """Return the columns of photos, points, images, check points, control, stations or other observations."""
+    """Return the columns of one kind of thing: `_TABLES` lists them."""
     return _TABLES[what](result)
 
 
@@ -47,12 +47,12 @@ def _points(result: Result) -> dict[str, Any]:
 
 
 def _images(result: Result) -> dict[str, Any]:
-    """Residuals in millimetres, redundancy numbers, standardized residuals."""
+    """Residuals in the unit of image coordinates, redundancy numbers, standardized residuals."""
     block, used = result.block, result.used_images
     return {
         "photo": _ids(block.photo_ids)[block.image_photos[used]],
         "point": _ids(block.point_ids)[block.image_points[used]],
-        **images(result, "mm"),
+        **images(result, block.image_unit),
     }
 
 
@@ -91,6 +91,25 @@ def _beside_images(result: Result) -> dict[str, Any]:
     return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
+def _cameras(result: Result) -> dict[str, Any]:
+    """Name what there is of each parameter: `sd_given` is infinite for free ones and 0 for those held."""
+    rows = [
+        (each.name, each.camera.model, name, each.camera.unit_of(name), *numbers)
+        for each in result.cameras
+        for name, *numbers in zip(
+            each.names,
+            each.given.values,
+            each.given.deviations,
+            each.values,
+            each.sd,
+            each.redundancy,
+            strict=True,
+        )
+    ]
+    names = ("camera", "model", "parameter", "unit", "given", "sd_given", "value", "sd", "redundancy")
+    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+
+
 _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "photo": _photos,
     "point": _points,
@@ -99,6 +118,7 @@ _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "control": _control,
     "station": _stations,
     "observation": _beside_images,
+    "camera": _cameras,
 }
 
 

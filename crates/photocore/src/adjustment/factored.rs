@@ -143,7 +143,7 @@ impl Factored {
         let equations = linearized(problem, self.loss, &self.values, &self.held, pool);
         let found = problem.system.invert(pool, self.factor, &equations, &self.prior, between);
         let Inversion { mut cofactors, .. } = unless_stopped(found)?;
-        let prior_redundancy = problem.finish_cofactors(&mut cofactors, &self.held);
+        let prior_redundancy = problem.finish_cofactors(&mut cofactors, &self.held, &self.values);
         let lost = self.transformation.map(|to| to.apply(problem.layout(), &mut cofactors));
         Ok(Inverted { cofactors, prior_redundancy, lost })
     }

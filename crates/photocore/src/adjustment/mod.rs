@@ -81,7 +81,7 @@ pub use loss::Loss;
 pub use method::{Method, Published, Stop};
 pub use normal_equations::NormalEquations;
 pub use options::{Event, Iteration, Options, Phase, Status};
-pub use problem::{Model, Motions, Problem};
+pub use problem::{Model, Motions, Problem, Weighted};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
 pub use run::{Watch, adjust, on_all_processors};

@@ -204,7 +204,17 @@ impl<M: Model> Problem<M> {
                 candidates.add_row(&mut sums, layout.tie_columns(tie).zip(row.iter().copied()));
             }
         });
-        for unknown in (0..values.len()).filter(|&unknown| self.is_weighted(unknown)) {
+        let together = self.weighted(values);
+        for own in &together {
+            for row in own.coefficients.row_iter() {
+                candidates.add_row(&mut sums, own.unknowns().zip(row.iter().copied()));
+            }
+        }
+        let apart = |unknown: &usize| {
+            let before = together.partition_point(|own| own.unknowns().end <= *unknown);
+            together.get(before).is_none_or(|own| own.first > *unknown)
+        };
+        for unknown in (0..values.len()).filter(|&i| self.is_weighted(i)).filter(apart) {
             let (weight, moved) = (self.sd[unknown].powi(2).recip(), candidates.of(unknown));
             add_square(&mut sums.together, weight, moved);
             let apart = moved.as_flattened().iter().zip(sums.apart.as_flattened_mut());

@@ -47,7 +47,7 @@ pub mod space;
 
 pub use angle_axis::{angle_axis_rotation, angle_axis_with_jacobian};
 pub use attitude::{AttitudeNumbers, RotationSense};
-pub use camera::{Bal, Camera, CameraModel, Image, Perspective, Unit};
+pub use camera::{Bal, Brown, Camera, CameraModel, Image, Perspective, Unit};
 pub use ellipsoid::{Ellipsoid, local_vertical};
 pub use lens::{Displacement, Distortion, Undistorted};
 pub use orientation::{Orientation, PoseNumbers};

@@ -6,7 +6,8 @@ use super::model::Bundle;
 use super::precision::median;
 use super::problem::Assembled;
 use super::{AdjustedPhoto, Network};
-use crate::adjustment::Adjustment;
+use crate::adjustment::{Adjustment, Model};
+use crate::normals::GroupRows;
 
 /// An adjusted camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +18,9 @@ pub struct AdjustedCamera {
     pub cofactors: Vec<f64>,
     /// Redundancy numbers of the parameters as observations of themselves; zero unless weighted, NaN where there are no cofactors.
     pub redundancy: Vec<f64>,
+    /// Their diagonal of the normal equations, weights counted: the reciprocal cofactor that each would have if all other unknowns were
+    /// known; zero for those that are held, NaN where there are no cofactors.
+    pub information: Vec<f64>,
     /// How many photos it has.
     pub photos: usize,
     /// How many images on these took part.
@@ -49,11 +53,15 @@ impl Network {
                 parameters,
                 cofactors: vec![missing; count * count],
                 redundancy: vec![missing; count],
+                information: vec![missing; count],
                 photos: 0,
                 images: 0,
             }
         };
         let mut cameras: Vec<AdjustedCamera> = self.cameras.iter().map(given).collect();
+        if adjustment.cofactors.is_some() && self.cameras.iter().any(|camera| !camera.is_held()) {
+            self.inform(&mut cameras, model, adjustment, unknowns);
+        }
         for (index, (given, photo)) in self.photos.iter().zip(photos).enumerate() {
             let camera = &mut cameras[given.camera];
             camera.photos += 1;
@@ -70,6 +78,55 @@ impl Network {
             start += count;
         }
         cameras
+    }
+
+    /// Adds up the squares of the partials of all images by the parameters of their cameras, and the weights of these.
+    fn inform(
+        &self,
+        cameras: &mut [AdjustedCamera],
+        model: &Bundle,
+        adjustment: &Adjustment,
+        unknowns: &[f64],
+    ) {
+        for (camera, given) in cameras.iter_mut().zip(&self.cameras).filter(|(_, given)| !given.is_held()) {
+            let weight = |&sd: &f64| if sd > 0.0 { sd.powi(2).recip() } else { 0.0 };
+            camera.information = given.sd.iter().map(weight).collect();
+        }
+        let stations = model.prepare(unknowns);
+        let (mut constant, mut local) = ([0.0; 2], [0.0; 6]);
+        let (mut kept, mut common) = (Vec::new(), Vec::new());
+        for point in 0..model.points.len() {
+            for index in model.start[point]..model.start[point + 1] {
+                let image = &model.images[index];
+                let camera = self.photos[image.photo].camera;
+                let given = &self.cameras[camera];
+                if given.is_held() {
+                    continue;
+                }
+                let own = model.of_block(image.photo).len();
+                kept.resize(2 * own, 0.0);
+                common.resize(if own > 6 { 0 } else { 2 * given.sd.len() }, 0.0);
+                let (kept, common) = (kept.as_mut_slice(), common.as_mut_slice());
+                let mut rows = GroupRows {
+                    constant: &mut constant,
+                    local: &mut local,
+                    kept: &mut *kept,
+                    common: &mut *common,
+                };
+                model.observe(&stations, point, index, &mut rows);
+                let weight = adjustment.weights.as_ref().map_or(1.0, |weights| weights[index]);
+                for row in 0..2 {
+                    let partials = if own > 6 {
+                        &kept[row * own + 6..(row + 1) * own]
+                    } else {
+                        &common[row * given.sd.len()..(row + 1) * given.sd.len()]
+                    };
+                    for (k, partial) in partials.iter().enumerate().filter(|&(k, _)| given.sd[k] > 0.0) {
+                        cameras[camera].information[k] += weight * (partial / image.sd[row]).powi(2);
+                    }
+                }
+            }
+        }
     }
 }
 

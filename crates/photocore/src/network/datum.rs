@@ -38,7 +38,8 @@ fn displacement(k: usize, from: &Vector3) -> Vector3 {
 }
 
 impl Bundle {
-    /// The photo with most images among those of the largest part, photos hanging together by their points; None without images.
+    /// The photo that the user has placed or, where there is none, that with most images among those of the largest part, photos hanging
+    /// together by their points; and its part. None without images.
     fn central_photo(&self) -> Option<(usize, Vec<usize>)> {
         let mut part: Vec<usize> = (0..self.images_on.len()).collect();
         fn root(part: &mut [usize], mut photo: usize) -> usize {
@@ -60,6 +61,10 @@ impl Bundle {
         }
         let first_longest =
             |best: Vec<usize>, next: Vec<usize>| if next.len() > best.len() { next } else { best };
+        if let Some(anchor) = self.anchor {
+            let part = photos.into_iter().find(|part| part.contains(&anchor))?;
+            return Some((anchor, part));
+        }
         let largest = photos.into_iter().reduce(first_longest)?;
         let central = largest
             .iter()

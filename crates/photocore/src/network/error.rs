@@ -43,6 +43,16 @@ pub enum NetworkError {
     /// A camera has more or fewer standard deviations than parameters.
     #[error("camera {0} has not as many standard deviations as parameters")]
     CameraDeviations(usize),
+    /// A constant of a camera has a standard deviation.
+    #[error(
+        "{parameter} of camera {camera} is a constant and cannot be free or weighted: its standard deviation is 0"
+    )]
+    CameraConstant {
+        /// The camera.
+        camera: usize,
+        /// What the constant is called.
+        parameter: &'static str,
+    },
     /// An observation that contradicts itself or the network.
     #[error("observation {index}, of kind {kind}, {fault}")]
     Observation {

@@ -63,6 +63,7 @@ mod problem;
 mod screening;
 mod solution;
 mod start;
+mod weighted_angles;
 
 use std::ops::ControlFlow;
 
@@ -78,8 +79,10 @@ pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
+pub(crate) use precision::median;
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+pub(crate) use start::meet;
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
@@ -337,6 +340,11 @@ impl Network {
         for (index, camera) in self.cameras.iter().enumerate() {
             if camera.sd.len() != camera.camera.parameter_names().len() {
                 return Err(NetworkError::CameraDeviations(index));
+            }
+            let known = camera.camera.parameter_names();
+            let unknowns = known.len() - camera.camera.constants();
+            if let Some(free) = (unknowns..known.len()).find(|&k| camera.sd[k] != 0.0) {
+                return Err(NetworkError::CameraConstant { camera: index, parameter: known[free].0 });
             }
         }
         for (index, observation) in self.observations.iter().enumerate() {

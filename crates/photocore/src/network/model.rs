@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::observations::{TiedModel, TiedObservation};
 use super::{Image, Point};
-use crate::adjustment::{Model, Motions};
+use crate::adjustment::{Model, Motions, Weighted};
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
     self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
@@ -46,12 +46,14 @@ pub struct Bundle {
     pub order: Vec<usize>,
     /// How many images each photo has.
     pub images_on: Vec<usize>,
-    /// Which photos step by a rotation vector about their own axes: those with free angles.
+    /// Which photos step by a rotation vector about their own axes: those without a fixed angle.
     pub turning: Vec<bool>,
     /// What else was observed.
     pub observations: Vec<TiedObservation>,
-    /// Whether the position of anything is weighted or fixed: then the datum is the user's.
+    /// Whether the position of anything is weighted, or of more than one photo fixed: then the datum is the user's.
     pub placed: bool,
+    /// The only photo whose position is fixed, where nothing else is placed: the user has chosen what to hold.
+    pub anchor: Option<usize>,
 }
 
 /// Photos and points at given values of the unknowns.
@@ -95,8 +97,35 @@ impl Refracted {
         let point = &stations.points[local];
         let lift = self.refraction.lift(orientation, from, point, to);
         let (lifted, point) = (orientation.under(&lift), point.lifted(&lift));
-        each_camera!(camera, camera => write(&lifted, camera, &point, image, rows));
+        each_camera!(camera, camera => write_in_its_place(&lifted, camera, &point, image, rows));
     }
+}
+
+/// [`write`], in line or called: what is compiled at every place should be small.
+#[inline(always)]
+fn write_in_its_place<C: CameraModel>(
+    orientation: &Orientation,
+    camera: &C,
+    point: &geometry::Point,
+    image: &Image,
+    rows: &mut GroupRows<'_>,
+) {
+    if C::IN_LINE {
+        write(orientation, camera, point, image, rows);
+    } else {
+        write_apart(orientation, camera, point, image, rows);
+    }
+}
+
+#[inline(never)]
+fn write_apart<C: CameraModel>(
+    orientation: &Orientation,
+    camera: &C,
+    point: &geometry::Point,
+    image: &Image,
+    rows: &mut GroupRows<'_>,
+) {
+    write(orientation, camera, point, image, rows);
 }
 
 /// The two equations of an image: observed minus computed, and the partials of the computed.
@@ -109,10 +138,11 @@ fn write<C: CameraModel>(
     rows: &mut GroupRows<'_>,
 ) {
     let u = orientation.sight(point);
-    let projection = orientation.projection(&u, &camera.linearize(&u), point);
+    let (residual, computed) = camera.compare(&u, image.xy);
+    let projection = orientation.projection(&u, &computed, point);
     let (width, shared) = (rows.kept.len() / 2, rows.common.len() / 2);
     for row in 0..2 {
-        rows.constant[row] = image.xy[row] - projection.xy[row];
+        rows.constant[row] = residual[row];
         rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
         rows.kept[width * row..][..6].copy_from_slice(&projection.photo[row]);
         if width > 6 {
@@ -372,6 +402,10 @@ impl Model for Bundle {
         turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
     }
 
+    fn weighted(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Weighted> {
+        self.weighted_angles(values, prior, sd)
+    }
+
     /// Intersects the points anew.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
         let photos = self.of_stations();
@@ -389,7 +423,7 @@ impl Model for Bundle {
             None => {
                 let Station { orientation, camera } = &stations.photos[image.photo];
                 let point = &stations.points[local];
-                each_camera!(camera, camera => write(orientation, camera, point, image, rows));
+                each_camera!(camera, camera => write_in_its_place(orientation, camera, point, image, rows));
             }
             Some(refracted) => refracted.write(stations, image, local, rows),
         }

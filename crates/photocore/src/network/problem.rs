@@ -114,11 +114,10 @@ impl Network {
         std::array::from_fn(|k| if turning(k) { near[k] } else { photo.observed[k] })
     }
 
-    /// Whether a photo's attitude may step by a rotation vector: its angles are all free. Those that are weighted stay unknowns
-    /// themselves, so that their weights stand in the diagonal; a fixed one keeps its bits.
+    /// Whether a photo's attitude steps by a rotation vector: a fixed angle keeps its bits.
     fn turns(&self, photo: usize) -> bool {
-        let free = self.photos[photo].sd[3..].iter().all(|sd| sd.is_infinite());
-        free && matches!(self.poses, PoseNumbers::Angles(_))
+        let fixed = self.photos[photo].sd[3..].contains(&0.0);
+        !fixed && matches!(self.poses, PoseNumbers::Angles(_))
     }
 
     /// The problem of the points that take part, from the initial values on or from those reached.
@@ -234,10 +233,7 @@ impl Network {
         }
         let block = |photo: &Photo| Some(self.photos.len() + shared.binary_search(&photo.camera).ok()?);
         let observations = self.tied_observations(screened)?;
-        // Angles alone leave position and scale open.
-        let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
-        let placed = screened.points.iter().any(|&point| self.points[point].held() != [false; 3])
-            || self.photos.iter().any(|photo| photo.sd[..positions].iter().any(|sd| sd.is_finite()));
+        let (placed, anchor) = self.placed(screened);
         let images: Vec<Image> = screened.images.order.iter().map(|&image| self.images[image]).collect();
         Ok(Bundle {
             space: self.space,
@@ -260,7 +256,23 @@ impl Network {
             images_on,
             observations,
             placed,
+            anchor,
         })
+    }
+
+    /// Whether the datum is the user's; and the photo to hold where it is not, but the position of a single one is fixed.
+    fn placed(&self, screened: &Screened) -> (bool, Option<usize>) {
+        // Angles alone leave position and scale open.
+        let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
+        let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
+        let mut photos = (0..self.photos.len()).filter(|&index| own(&self.photos[index]));
+        let fixed = |index: usize| self.photos[index].sd[..positions].iter().all(|&sd| sd == 0.0);
+        match (photos.next(), photos.next()) {
+            _ if screened.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),
+            (None, _) => (false, None),
+            (first, None) if first.is_some_and(fixed) => (false, first),
+            _ => (true, None),
+        }
     }
 
     /// The observations that take part.

@@ -358,7 +358,7 @@ fn sums_of_squares(
     observations: &[Option<AdjustedObservation>],
 ) -> SumsOfSquares {
     let stations = problem.model.of_stations();
-    let squares = |range: Range<usize>| range.map(|i| problem.prior_square(i, unknowns[i])).sum::<f64>();
+    let squares = |range: Range<usize>| problem.prior_sum_of_squares(unknowns, range);
     let rows = problem.layout().rows();
     let of_images = &problem.observation_sd[..rows * problem.model.images.len()];
     SumsOfSquares {

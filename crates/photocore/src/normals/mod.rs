@@ -28,7 +28,7 @@
 //! // Three local and two kept unknowns; the first local one is held at zero by an equation of its own.
 //! let layout = Layout::new(1, 1, &[1, 1], vec![0, 2, 4, 6], vec![0, 1, 0, 1, 0, 1])?;
 //! let system = System::new(layout, Ordering::Auto);
-//! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5] };
+//! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5], between: vec![] };
 //! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
 //! let mut go_on = |_| ControlFlow::Continue(());
 //! let factor = system.factor(&pool, &Differences, &prior, 0.0, &mut go_on).continue_value().expect("not stopped");
@@ -38,6 +38,7 @@
 //! ```
 
 mod cofactors;
+mod deficiency;
 mod dense;
 mod dissection;
 mod equation_block;
@@ -69,8 +70,9 @@ mod watch;
 mod workspace;
 
 pub use cofactors::Cofactors;
+pub use deficiency::Deficiency;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
-pub use factor::{Deficiency, Factor};
+pub use factor::Factor;
 pub use functions::{Function, Functions};
 pub use graph::Graph;
 pub use invert::Inversion;

@@ -1,14 +1,15 @@
-//! What an adjustment of a block is given: photos whose cameras are known, poses in angles.
+//! What an adjustment of a block is given: photos with their cameras, poses in angles.
 
 use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
-use photocore::geometry::{Perspective, PoseNumbers};
+use photocore::geometry::PoseNumbers;
 use photocore::network::{Camera, Network, Options, Photo, Start, UnitVariance};
 use pyo3::prelude::*;
 
 use super::solution::BlockSolution;
 use super::{BlockError, adjusted, failure, images, points};
-use crate::arrays::{check_lengths, numbers, rows};
+use crate::arrays::{check_lengths, indices, rows};
+use crate::camera::named;
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
 use crate::observations::{Group, observations};
 use crate::options::{named_loss, named_ordering, unknown};
@@ -18,10 +19,17 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(adjust_block, module)?)
 }
 
+/// Model, parameters and their standard deviations of a camera.
+type CameraRow = (String, Vec<f64>, Vec<f64>);
+
+fn camera((model, parameters, sd): CameraRow) -> PyResult<Camera> {
+    Ok(Camera { camera: named(&model, &parameters)?, sd })
+}
+
 #[pyfunction]
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
-    principal_distances, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
+    photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
     covariance, loss, ordering, unit_variance, threads, memory, progress
 ))]
 fn adjust_block(
@@ -32,7 +40,8 @@ fn adjust_block(
     photo_attitudes_observed: PyReadonlyArrayDyn<'_, f64>,
     photo_position_sd: PyReadonlyArrayDyn<'_, f64>,
     photo_attitude_sd: PyReadonlyArrayDyn<'_, f64>,
-    principal_distances: PyReadonlyArrayDyn<'_, f64>,
+    photo_cameras: PyReadonlyArrayDyn<'_, i64>,
+    cameras: Vec<CameraRow>,
     point_positions: PyReadonlyArrayDyn<'_, f64>,
     point_sd: PyReadonlyArrayDyn<'_, f64>,
     image_photos: PyReadonlyArrayDyn<'_, i64>,
@@ -60,7 +69,7 @@ fn adjust_block(
     let attitudes_observed = rows("photo_attitudes_observed", &photo_attitudes_observed)?;
     let position_sd = rows("photo_position_sd", &photo_position_sd)?;
     let attitude_sd = rows("photo_attitude_sd", &photo_attitude_sd)?;
-    let distances = numbers("principal_distances", &principal_distances)?;
+    let camera_of = indices("photo_cameras", &photo_cameras)?;
     check_lengths(
         ("photo_positions", positions.len()),
         &[
@@ -69,28 +78,21 @@ fn adjust_block(
             ("photo_attitudes_observed", attitudes_observed.len()),
             ("photo_position_sd", position_sd.len()),
             ("photo_attitude_sd", attitude_sd.len()),
-            ("principal_distances", distances.len()),
+            ("photo_cameras", camera_of.len()),
         ],
     )?;
-    let mut cameras: Vec<f64> = Vec::new();
-    let photo = |i: usize| {
-        if cameras.last() != Some(&distances[i]) {
-            cameras.push(distances[i]);
-        }
-        Photo {
-            pose: six(positions[i], attitudes[i]),
-            observed: six(positions_observed[i], attitudes_observed[i]),
-            sd: six(position_sd[i], attitude_sd[i]),
-            camera: cameras.len() - 1,
-        }
+    let photo = |i: usize| Photo {
+        pose: six(positions[i], attitudes[i]),
+        observed: six(positions_observed[i], attitudes_observed[i]),
+        sd: six(position_sd[i], attitude_sd[i]),
+        camera: camera_of[i],
     };
     let photos = (0..positions.len()).map(photo).collect();
-    let camera = |principal_distance| Camera::held(Perspective { principal_distance }.into());
     let network = Network {
         space: object_space(spheroid)?,
         poses: PoseNumbers::Angles(rotation_sense(photo_to_ground)),
         refraction: refraction.map(refraction_of).transpose()?,
-        cameras: cameras.into_iter().map(camera).collect(),
+        cameras: cameras.into_iter().map(camera).collect::<PyResult<_>>()?,
         photos,
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,

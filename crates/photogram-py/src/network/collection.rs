@@ -2,6 +2,7 @@
 
 use numpy::{PyArray2, PyReadonlyArrayDyn};
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
+use photocore::geometry::camera::ModelFacts;
 use photocore::geometry::{self, ObjectSpace, Orientation, Point as GroundPoint, PoseNumbers, Unit};
 use photocore::network::{Camera, Network, NetworkError as Failure, Options, Photo, Start, UnitVariance};
 use pyo3::exceptions::PyValueError;
@@ -23,14 +24,14 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 /// Parameters of a pose in vectors.
 const POSE: usize = 6;
 
-/// Formula and parameters of a camera.
-fn model(camera: &str) -> PyResult<(&'static str, &'static [(&'static str, Unit)])> {
+/// What is known of a model of cameras.
+fn model(camera: &str) -> PyResult<ModelFacts> {
     geometry::Camera::model(camera).ok_or_else(|| unknown("camera", camera))
 }
 
 #[pyfunction]
 fn camera_model(camera: &str) -> PyResult<(&'static str, Vec<(&'static str, bool)>)> {
-    let (formula, parameters) = model(camera)?;
+    let ModelFacts { formula, parameters, .. } = model(camera)?;
     Ok((formula, parameters.iter().map(|&(name, unit)| (name, unit == Unit::Image)).collect()))
 }
 
@@ -44,7 +45,7 @@ fn photos(
         let (pose, own) = row.split_first_chunk().ok_or_else(|| unknown("camera", camera))?;
         Ok((*pose, geometry::Camera::named(camera, own).ok_or_else(|| unknown("camera", camera))?))
     };
-    slices(name, array, POSE + model(camera)?.1.len())?.into_iter().map(split).collect()
+    slices(name, array, POSE + model(camera)?.parameters.len())?.into_iter().map(split).collect()
 }
 
 #[pyfunction]
@@ -91,7 +92,7 @@ fn adjust_collection(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<CollectionSolution> {
     let given = photos(camera, "photo_parameters", &photo_parameters)?;
-    let unknowns = POSE + model(camera)?.1.len();
+    let unknowns = POSE + model(camera)?.parameters.len();
     let sd = slices("photo_sd", &photo_sd, unknowns)?;
     check_lengths(("photo_parameters", given.len()), &[("photo_sd", sd.len())])?;
     let photo = |(camera, ((pose, _), sd)): (usize, (&([f64; POSE], _), &Vec<f64>))| Photo {

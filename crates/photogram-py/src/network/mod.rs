@@ -2,6 +2,7 @@
 
 mod block;
 mod collection;
+mod first_values;
 mod solution;
 
 use numpy::PyReadonlyArrayDyn;
@@ -17,13 +18,13 @@ create_exception!(
     _photocore,
     BlockError,
     PyException,
-    "The block cannot be adjusted: (kind, message, photos, points)."
+    "The block cannot be adjusted: (kind, message, photos, points, cameras)."
 );
 create_exception!(
     _photocore,
     CollectionError,
     PyException,
-    "The collection cannot be adjusted: (kind, message, photos, points)."
+    "The collection cannot be adjusted: (kind, message, photos, points, cameras)."
 );
 
 /// Adds the functions and classes to the extension module.
@@ -32,6 +33,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("CollectionError", module.py().get_type::<CollectionError>())?;
     block::register(module)?;
     collection::register(module)?;
+    first_values::register(module)?;
     solution::register(module)
 }
 
@@ -73,16 +75,18 @@ fn adjusted(
     watched(py, workers, progress, |pool, watch| network.adjust(options, pool, watch))
 }
 
-/// Kind, message, and the photos and points concerned.
-type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>);
+/// Kind, message, and the photos, points and cameras concerned; photos and cameras combination by combination.
+type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>, Vec<Vec<usize>>);
 
 /// A failure as Python sees it.
 fn failure(error: &Failure, what: &str) -> FailureRow {
+    let mut cameras = vec![];
     let (kind, photos, points) = match error {
         Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
         Failure::Undetermined(combinations) => {
             let photos = combinations.iter().map(|combination| combination.photos.clone()).collect();
+            cameras = combinations.iter().map(|combination| combination.cameras.clone()).collect();
             ("undetermined photos", photos, vec![])
         }
         Failure::Coarse(Coarse { photos, points }) => ("coarse", vec![photos.clone()], points.clone()),
@@ -98,13 +102,14 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::LeftOut(_)
         | Failure::Partials { .. }
         | Failure::State
+        | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
         | Failure::Datum(_)
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
     };
-    (kind, said(error, what), photos, points)
+    (kind, said(error, what), photos, points, cameras)
 }
 
 /// What went wrong, in terms of what was given: a block or a collection.

@@ -1,7 +1,7 @@
 //! What an adjustment of a network has found, as arrays.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use photocore::network::{AdjustedPhoto, Solution};
+use photocore::network::{AdjustedCamera, AdjustedPhoto, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -27,8 +27,10 @@ fn photo_cofactors<'py>(
     let mut all = vec![0.0; photos.len() * unknowns * unknowns];
     for (photo, matrix) in photos.iter().zip(all.chunks_exact_mut(unknowns * unknowns)) {
         let own = photo.redundancy.len();
-        for (row, values) in photo.cofactors.chunks_exact(own).enumerate() {
-            matrix[row * unknowns..][..own].copy_from_slice(values);
+        // A block has the unknowns of cameras apart.
+        let shown = own.min(unknowns);
+        for (row, values) in photo.cofactors.chunks_exact(own).take(shown).enumerate() {
+            matrix[row * unknowns..][..shown].copy_from_slice(&values[..shown]);
         }
         if photo.cofactors[0].is_nan() {
             matrix.fill(f64::NAN);
@@ -45,12 +47,21 @@ fn photo_redundancy<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let mut all = vec![0.0; photos.len() * unknowns];
     for (photo, row) in photos.iter().zip(all.chunks_exact_mut(unknowns)) {
-        row[..photo.redundancy.len()].copy_from_slice(&photo.redundancy);
+        let shown = photo.redundancy.len().min(unknowns);
+        row[..shown].copy_from_slice(&photo.redundancy[..shown]);
         if photo.redundancy[0].is_nan() {
             row.fill(f64::NAN);
         }
     }
     PyArray1::from_vec(py, all).reshape([photos.len(), unknowns])
+}
+
+/// Parameters, cofactors row by row, redundancy numbers, diagonal of the normal equations, photos and images of an adjusted camera.
+type CameraRow = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, usize, usize);
+
+fn camera_row(camera: &AdjustedCamera) -> CameraRow {
+    let AdjustedCamera { parameters, cofactors, redundancy, information, photos, images } = camera.clone();
+    (parameters, cofactors, redundancy, information, photos, images)
 }
 
 /// A class of adjusted networks: what all have, and what the class has besides.
@@ -201,9 +212,17 @@ solution_class! {
     BlockSolution, "block", {
         #[getter]
         fn photo_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-            let iterations = &self.solution.photo_corrections;
-            let values = iterations.iter().flatten().copied().collect();
-            PyArray1::from_vec(py, values).reshape([iterations.len(), self.solution.photos.len(), 6])
+            let (iterations, photos) = (&self.solution.photo_corrections, &self.solution.photos);
+            let mut values = Vec::with_capacity(6 * iterations.len() * photos.len());
+            for corrections in iterations {
+                let mut rest = corrections.as_slice();
+                for photo in photos {
+                    let (own, others) = rest.split_at(photo.redundancy.len());
+                    values.extend_from_slice(&own[..6]);
+                    rest = others;
+                }
+            }
+            PyArray1::from_vec(py, values).reshape([iterations.len(), photos.len(), 6])
         }
 
         #[getter]
@@ -232,6 +251,16 @@ solution_class! {
         #[getter]
         fn weak(&self) -> Vec<(usize, usize)> {
             self.solution.weak.clone()
+        }
+
+        #[getter]
+        fn weak_cameras(&self) -> Vec<(usize, usize)> {
+            self.solution.weak_cameras.clone()
+        }
+
+        #[getter]
+        fn cameras(&self) -> Vec<CameraRow> {
+            self.solution.cameras.iter().map(camera_row).collect()
         }
 
         #[getter]

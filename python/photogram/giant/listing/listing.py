@@ -90,13 +90,14 @@ def _input_pages(project: Contents, block: Block, space: Space) -> Iterator[Page
     common = project.common
     if common.list_input_stations or common.list_input_images:
         images = {frame.name: frame for frame in reversed(project.images)}
+        distances = block.known_distances("GIANT files")
         for row, name in enumerate(block.photo_ids):
             station = Station(
                 block.photo_positions[row],
                 block.photo_attitudes[row],
                 block.photo_position_sd[row],
                 block.photo_attitude_sd[row],
-                block.principal_distances[row],
+                distances[row],
             )
             yield from frame_pages(
                 space,

@@ -1,5 +1,6 @@
 //! The camera of Bundler and of "Bundle Adjustment in the Large" (Agarwal, Snavely, Seitz and Szeliski 2010).
 
+use super::inverse::{RadialFactor, RadialLimit};
 use super::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
@@ -18,29 +19,14 @@ pub struct Bal {
     pub radial: [f64; 2],
 }
 
-/// Steps of Newton's method at the most.
-const STEPS: usize = 50;
-
 impl Bal {
     /// 1 + k1 q + k2 q^2, q being |p|^2.
     fn radial_factor(&self, square: f64) -> f64 {
         1.0 + square * (self.radial[0] + square * self.radial[1])
     }
 
-    /// d (r times the radial factor) / dr = 1 + 3 k1 q + 5 k2 q^2: positive while the model is one-to-one.
-    fn slope(&self, square: f64) -> f64 {
-        1.0 + square * (3.0 * self.radial[0] + 5.0 * square * self.radial[1])
-    }
-
-    /// |p| up to which the model is one-to-one: the root of the slope.
-    fn domain(&self) -> f64 {
-        let [k1, k2] = self.radial;
-        // 1 + 3 k1 q + 5 k2 q^2 = 0 as q = 2 / (-b + root): the smallest positive root, also where k2 = 0.
-        let (b, discriminant) = (3.0 * k1, 9.0 * k1 * k1 - 20.0 * k2);
-        let root = discriminant.sqrt();
-        let candidates = [2.0 / (-b + root), 2.0 / (-b - root)];
-        let positive = candidates.into_iter().filter(|q| *q > 0.0);
-        positive.fold(f64::INFINITY, f64::min).sqrt()
+    fn radial_part(&self) -> RadialFactor {
+        RadialFactor::polynomial(&self.radial)
     }
 }
 
@@ -50,6 +36,7 @@ impl CameraModel for Bal {
     const NAME: &'static str = "bal";
     const PARAMETERS: &'static [(&'static str, Unit)] =
         &[("f", Unit::Image), ("k1", Unit::One), ("k2", Unit::One)];
+    const IN_LINE: bool = true;
     const FORMULA: &'static str = "p = -(P1, P2) / P3, image = f (1 + k1 p^2 + k2 p^4) p";
 
     fn with_parameters([focal_length, k1, k2]: [f64; 3]) -> Self {
@@ -93,33 +80,15 @@ impl CameraModel for Bal {
         }
     }
 
-    /// Newton's method for the radius, kept within the domain where the model is one-to-one.
     fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
         let distorted = xy.map(|value| value / self.focal_length);
         let radius = distorted[0].hypot(distorted[1]);
-        let (mut low, mut high) = (0.0, self.domain());
-        if !radius.is_finite() || radius >= high * self.radial_factor(high * high) {
-            return None;
-        }
-        let mut ideal = radius.min(high);
-        for _ in 0..STEPS {
-            let square = ideal * ideal;
-            let excess = ideal * self.radial_factor(square) - radius;
-            if excess > 0.0 {
-                high = ideal
-            } else {
-                low = ideal
-            }
-            let next = ideal - excess / self.slope(square);
-            let inside = next >= low && next <= high;
-            let next = if inside { next } else { 0.5 * (low + high) };
-            let change = (next - ideal).abs();
-            ideal = next;
-            if change <= 4.0 * f64::EPSILON * ideal {
-                break;
-            }
-        }
+        let ideal = self.radial_part().invert(radius)?;
         let ratio = if radius > 0.0 { ideal / radius } else { 1.0 };
         Some(Vector3::new(ratio * distorted[0], ratio * distorted[1], -1.0).normalize())
+    }
+
+    fn radial_limit(&self) -> Option<RadialLimit> {
+        self.radial_part().limit()
     }
 }

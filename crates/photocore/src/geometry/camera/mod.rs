@@ -2,11 +2,22 @@
 //!
 //! Each camera is a file with a type that implements [`CameraModel`], and a line of `cameras!` below.
 
+pub mod backward;
+mod inverse;
+mod projections;
+mod radial_tangential;
+
 use super::Vector3;
+
+pub use inverse::{Matrix2, RadialLimit};
 
 /// How a camera maps u, a point in the photo's axes (it looks along -z), to image coordinates.
 ///
 /// Only the direction of u counts: (dx/du) u = 0.
+///
+/// A **forward** camera has a lens whose terms are functions of ideal coordinates: it maps u to what is measured. That of a **backward**
+/// one has terms that are functions of measured coordinates: it corrects what is measured, and compares that with the central perspective
+/// of u ([`backward::BackwardModel`]).
 pub trait CameraModel: Copy {
     /// Its interior parameters, an array of numbers.
     type Parameters: Copy + AsRef<[f64]> + for<'a> TryFrom<&'a [f64]>;
@@ -15,8 +26,14 @@ pub trait CameraModel: Copy {
     const NAME: &'static str;
     /// What its parameters are called and measured in, in their order.
     const PARAMETERS: &'static [(&'static str, Unit)];
+    /// How many of the parameters, the last ones, are constants: never unknowns.
+    const CONSTANTS: usize = 0;
     /// The image of P, a point in the photo's axes, as documents say it.
     const FORMULA: &'static str;
+    /// What the terms of its lens are functions of.
+    const LENS: LensDirection = LensDirection::Forward;
+    /// Whether the adjustment compiles its equations in line: for cameras of a few operations, where a call would show.
+    const IN_LINE: bool = false;
 
     /// The camera with the given parameters.
     fn with_parameters(parameters: Self::Parameters) -> Self;
@@ -33,8 +50,48 @@ pub trait CameraModel: Copy {
     /// The image with its partials.
     fn linearize(&self, u: &Vector3) -> Image<Self::Parameters>;
 
+    /// Observed minus computed of a measured position, and what is computed with its partials: the image, or what a backward camera
+    /// compares with the corrected position.
+    #[inline(always)]
+    fn compare(&self, u: &Vector3, measured: [f64; 2]) -> ([f64; 2], Image<Self::Parameters>) {
+        let image = self.linearize(u);
+        ([measured[0] - image.xy[0], measured[1] - image.xy[1]], image)
+    }
+
     /// The unit direction in the photo's axes, in front of the camera, of an image position; None where no direction has it.
     fn direction(&self, xy: [f64; 2]) -> Option<Vector3>;
+
+    /// What a measured position is corrected to; None of a forward camera.
+    fn correction(&self, _measured: [f64; 2]) -> Option<[f64; 2]> {
+        None
+    }
+
+    /// Up to where the radial part of the lens is one-to-one; None where it is so everywhere.
+    fn radial_limit(&self) -> Option<RadialLimit> {
+        None
+    }
+}
+
+/// What the terms of a lens are functions of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LensDirection {
+    /// Of ideal coordinates.
+    Forward,
+    /// Of measured coordinates.
+    Backward,
+}
+
+/// A model of cameras.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModelFacts {
+    /// [`CameraModel::FORMULA`].
+    pub formula: &'static str,
+    /// [`CameraModel::PARAMETERS`].
+    pub parameters: &'static [(&'static str, Unit)],
+    /// [`CameraModel::CONSTANTS`].
+    pub constants: usize,
+    /// [`CameraModel::LENS`].
+    pub lens: LensDirection,
 }
 
 /// What a parameter of a camera is measured in.
@@ -42,6 +99,8 @@ pub trait CameraModel: Copy {
 pub enum Unit {
     /// The unit of image coordinates.
     Image,
+    /// The reciprocal of this power of it.
+    PerImage(u8),
     /// None: a number.
     One,
 }
@@ -57,11 +116,22 @@ pub struct Image<P> {
     pub by_parameters: [P; 2],
 }
 
+impl<P: AsRef<[f64]>> Image<P> {
+    fn listed(self) -> Image<Vec<f64>> {
+        let by_parameters = self.by_parameters.map(|row| row.as_ref().to_vec());
+        Image { xy: self.xy, by_u: self.by_u, by_parameters }
+    }
+}
+
 macro_rules! cameras {
-    ($d:tt $($file:ident::$name:ident;)*) => {
+    ($d:tt $($file:ident::$name:ident;)* $([$family:ident] { $($member:ident;)* })*) => {
         $(mod $file;
         pub use $file::$name;)*
-
+        $(mod $family;
+        pub use $family::{$($member),*};)*
+        cameras! { @kinds $d $($name)* $($($member)*)* }
+    };
+    (@kinds $d:tt $($name:ident)*) => {
         /// A camera of any kind.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum Camera {
@@ -76,25 +146,25 @@ macro_rules! cameras {
 
         impl Camera {
             /// What the models are called.
-            pub const NAMES: &'static [&'static str] = &[$($name::NAME),*];
+            pub const NAMES: &'static [&'static str] = &[$(<$name as CameraModel>::NAME),*];
 
-            /// Formula and parameters of a model, [`CameraModel::FORMULA`] and [`CameraModel::PARAMETERS`]; None where no model has
-            /// the name.
-            pub fn model(name: &str) -> Option<(&'static str, &'static [(&'static str, Unit)])> {
-                match name {
-                    $($name::NAME => Some(($name::FORMULA, $name::PARAMETERS)),)*
-                    _ => None,
+            /// What is known of a model; None where none has the name.
+            pub fn model(name: &str) -> Option<ModelFacts> {
+                fn facts<C: CameraModel>() -> ModelFacts {
+                    ModelFacts { formula: C::FORMULA, parameters: C::PARAMETERS, constants: C::CONSTANTS, lens: C::LENS }
                 }
+                $(if name == <$name as CameraModel>::NAME {
+                    return Some(facts::<$name>());
+                })*
+                None
             }
 
             /// The camera of the model that has the name; None where there is none, or it has not as many parameters.
             pub fn named(name: &str, parameters: &[f64]) -> Option<Self> {
-                match name {
-                    $($name::NAME => {
-                        Some($name::with_parameters(parameters.try_into().ok()?).into())
-                    })*
-                    _ => None,
-                }
+                $(if name == <$name as CameraModel>::NAME {
+                    return Some(<$name as CameraModel>::with_parameters(parameters.try_into().ok()?).into());
+                })*
+                None
             }
         }
 
@@ -116,6 +186,38 @@ cameras! { $
     perspective::Perspective;
     bal::Bal;
     radial::Radial;
+    equirectangular::Equirectangular;
+    brown_forward::BrownForward;
+    [brown] {
+        Brown;
+        BrownAffinityAfter;
+    }
+    [orthogonal] {
+        Ebner;
+        Gruen;
+    }
+    [vision] {
+        SimplePinhole;
+        Pinhole;
+        SimpleRadial;
+        Opencv;
+        FullOpencv;
+        OpencvPinhole;
+        Fov;
+        SimpleFisheye;
+        Fisheye;
+        SimpleRadialFisheye;
+        RadialFisheye;
+        OpencvFisheye;
+        OpencvFisheyeSkew;
+        ThinPrismFisheye;
+        RadTanThinPrismFisheye;
+        SimpleDivision;
+        Division;
+        Eucm;
+        AgisoftFrame;
+        AgisoftFisheye;
+    }
 }
 
 impl Camera {
@@ -135,14 +237,25 @@ impl Camera {
         each_camera!(self, camera => of(camera))
     }
 
+    /// How many of these, the last ones, are constants.
+    pub fn constants(&self) -> usize {
+        fn of<C: CameraModel>(_: &C) -> usize {
+            C::CONSTANTS
+        }
+        each_camera!(self, camera => of(camera))
+    }
+
     /// A camera of the same kind with other parameters; None unless they are as many.
     pub fn with_parameters(&self, parameters: &[f64]) -> Option<Self> {
-        Self::named(self.name(), parameters)
+        fn of<C: CameraModel + Into<Camera>>(_: &C, parameters: &[f64]) -> Option<Camera> {
+            Some(C::with_parameters(parameters.try_into().ok()?).into())
+        }
+        each_camera!(self, camera => of(camera, parameters))
     }
 
     /// Its parameters.
     pub fn parameters(&self) -> Vec<f64> {
-        each_camera!(self, camera => camera.parameters().as_ref().to_vec())
+        each_camera!(self, camera => CameraModel::parameters(camera).as_ref().to_vec())
     }
 
     /// See [`CameraModel::scale`].
@@ -157,14 +270,29 @@ impl Camera {
 
     /// See [`CameraModel::linearize`].
     pub fn linearize(&self, u: &Vector3) -> Image<Vec<f64>> {
+        each_camera!(self, camera => camera.linearize(u).listed())
+    }
+
+    /// See [`CameraModel::compare`].
+    pub fn compare(&self, u: &Vector3, measured: [f64; 2]) -> ([f64; 2], Image<Vec<f64>>) {
         each_camera!(self, camera => {
-            let Image { xy, by_u, by_parameters } = camera.linearize(u);
-            Image { xy, by_u, by_parameters: by_parameters.map(|row| row.as_ref().to_vec()) }
+            let (residual, image) = camera.compare(u, measured);
+            (residual, image.listed())
         })
     }
 
     /// See [`CameraModel::direction`].
     pub fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
         each_camera!(self, camera => camera.direction(xy))
+    }
+
+    /// See [`CameraModel::correction`].
+    pub fn correction(&self, measured: [f64; 2]) -> Option<[f64; 2]> {
+        each_camera!(self, camera => camera.correction(measured))
+    }
+
+    /// See [`CameraModel::radial_limit`].
+    pub fn radial_limit(&self) -> Option<RadialLimit> {
+        each_camera!(self, camera => camera.radial_limit())
     }
 }

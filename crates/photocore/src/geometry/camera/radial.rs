@@ -1,6 +1,6 @@
 //! RADIAL of COLMAP: radial distortion about a principal point, in pixels.
 
-use super::{Bal, CameraModel, Image, Unit};
+use super::{Bal, CameraModel, Image, RadialLimit, Unit};
 use crate::geometry::Vector3;
 
 /// Radial distortion, forward, in axes of computer vision: x right, y down, z forward.
@@ -25,6 +25,7 @@ impl CameraModel for Radial {
     const NAME: &'static str = "radial";
     const PARAMETERS: &'static [(&'static str, Unit)] =
         &[("f", Unit::Image), ("cx", Unit::Image), ("cy", Unit::Image), ("k1", Unit::One), ("k2", Unit::One)];
+    const IN_LINE: bool = true;
     const FORMULA: &'static str = "p = (P1, -P2) / -P3, image = (cx, cy) + f (1 + k1 p^2 + k2 p^4) p";
 
     fn with_parameters([f, cx, cy, k1, k2]: [f64; 5]) -> Self {
@@ -60,5 +61,9 @@ impl CameraModel for Radial {
     fn direction(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
         let [cx, cy] = self.principal_point;
         self.lens.direction([x - cx, cy - y])
+    }
+
+    fn radial_limit(&self) -> Option<RadialLimit> {
+        self.lens.radial_limit()
     }
 }

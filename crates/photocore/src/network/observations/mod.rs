@@ -13,6 +13,7 @@ use thiserror::Error;
 use crate::geometry::Matrix3;
 
 pub use adjusted::{AdjustedObservation, KindSums};
+pub(super) use attitude::misalignment;
 pub use precision::Precision;
 pub use rows::{Rows, Sites};
 pub(super) use tied::{TiedModel, TiedObservation};

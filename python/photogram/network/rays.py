@@ -68,7 +68,7 @@ def local_axes(block: Block) -> LocalAxes:
 def frame_radius(block: Block) -> float:
     """Return how far from the centre images reach, millimetres."""
     reach = float(np.quantile(np.hypot(block.image_xy[:, 0], block.image_xy[:, 1]), 0.95))
-    return max(reach, SMALL_FRAME * float(np.abs(block.principal_distances).min()))
+    return max(reach, SMALL_FRAME * float(np.abs(block.known_distances("checks")).min()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ class Rays:
     def directions(self) -> Floats:
         """(m, 3) unit vectors towards the ground: the photo looks along its negative z axis."""
         block = self.block
-        distances = block.principal_distances[block.image_photos]
+        distances = block.known_distances("checks")[block.image_photos]
         inner = np.column_stack([block.image_xy, distances]) * -np.sign(distances)[:, np.newaxis]
         outer = np.einsum("mij,mj->mi", self.cameras[block.image_photos], inner)
         unit: Floats = outer / np.linalg.norm(outer, axis=1, keepdims=True)
@@ -183,7 +183,7 @@ class Rays:
         photos = block.image_photos[which]
         inner = np.einsum("mji,mj->mi", self.cameras[photos], positions - self.centres[photos])
         with np.errstate(divide="ignore", invalid="ignore"):
-            scale = block.principal_distances[photos] / inner[:, 2]
+            scale = block.known_distances("checks")[photos] / inner[:, 2]
         return block.image_xy[which] - inner[:, :2] * scale[:, np.newaxis], inner[:, 2] < 0
 
 

@@ -1,0 +1,156 @@
+//! The camera of photogrammetric calibration certificates: Brown (1971), on measured coordinates.
+
+use super::Unit;
+use super::backward::{BackwardModel, Corrected};
+use super::inverse::{RadialFactor, RadialLimit, from_radial};
+use super::radial_tangential::{Bent, RadialTangential};
+
+/// Radial and tangential corrections, affinity and shear, backward: functions of measured coordinates, which they are added to.
+///
+/// ```text
+/// X = (x - xp)(1 + b1) + (y - yp) b2,    Y = y - yp,    r^2 = X^2 + Y^2
+/// R = K1 (r^2 - r0^2) + K2 (r^4 - r0^4) + K3 (r^6 - r0^6)
+/// gx = X + X R + P1 (r^2 + 2 X^2) + 2 P2 X Y
+/// gy = Y + Y R + P2 (r^2 + 2 Y^2) + 2 P1 X Y
+/// residual = g - c (u1, u2) / u3
+/// ```
+///
+/// x to the right, y up. r0 is zero unless the radial terms are balanced, and never an unknown. With AFTER, X = x - xp, and b1 X + b2 Y
+/// is added to gx (Fraser 1997): affinity beside the terms of the lens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BrownCorrection<const AFTER: bool> {
+    /// c, negative for the positive plane.
+    pub principal_distance: f64,
+    /// xp, yp.
+    pub principal_point: [f64; 2],
+    /// K1, K2, K3.
+    pub radial: [f64; 3],
+    /// P1, P2.
+    pub tangential: [f64; 2],
+    /// b1, b2.
+    pub affinity: [f64; 2],
+    /// r0.
+    pub balance: f64,
+}
+
+/// [`BrownCorrection`] with affinity and shear first.
+pub type Brown = BrownCorrection<false>;
+/// [`BrownCorrection`] with affinity and shear beside the terms of the lens.
+pub type BrownAffinityAfter = BrownCorrection<true>;
+
+impl<const AFTER: bool> BrownCorrection<AFTER> {
+    #[inline(always)]
+    fn lens(&self) -> RadialTangential {
+        RadialTangential {
+            radial: balanced(self.radial, self.balance),
+            tangential: self.tangential,
+            prism: [[0.0; 2]; 2],
+        }
+    }
+
+    /// What affinity and shear do to the argument of the lens, and what they add to its value.
+    #[inline(always)]
+    fn affine(&self) -> ([f64; 2], [f64; 2]) {
+        if AFTER { ([0.0; 2], self.affinity) } else { (self.affinity, [0.0; 2]) }
+    }
+}
+
+/// 1 + R as a function of r^2.
+#[inline(always)]
+pub fn balanced([k1, k2, k3]: [f64; 3], balance: f64) -> RadialFactor {
+    let at = balance * balance;
+    let constant = 1.0 - at * (k1 + at * (k2 + at * k3));
+    RadialFactor { numerator: [constant, k1, k2, k3, 0.0, 0.0, 0.0], denominator: [1.0, 0.0, 0.0, 0.0] }
+}
+
+impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
+    type Parameters = [f64; 11];
+
+    const NAME: &'static str = if AFTER { "brown_affinity_after" } else { "brown" };
+    const PARAMETERS: &'static [(&'static str, Unit)] = &[
+        ("c", Unit::Image),
+        ("xp", Unit::Image),
+        ("yp", Unit::Image),
+        ("K1", Unit::PerImage(2)),
+        ("K2", Unit::PerImage(4)),
+        ("K3", Unit::PerImage(6)),
+        ("P1", Unit::PerImage(1)),
+        ("P2", Unit::PerImage(1)),
+        ("b1", Unit::One),
+        ("b2", Unit::One),
+        ("r0", Unit::Image),
+    ];
+    const CONSTANTS: usize = 1;
+    const FORMULA: &'static str = if AFTER {
+        "X = x - xp, Y = y - yp, R = K1 (r^2 - r0^2) + K2 (r^4 - r0^4) + K3 (r^6 - r0^6), corrected = (X + X R + P1 (r^2 + 2 X^2) + \
+         2 P2 X Y + b1 X + b2 Y, Y + Y R + P2 (r^2 + 2 Y^2) + 2 P1 X Y), residual = corrected - image, image = c (u1, u2) / u3"
+    } else {
+        "X = (x - xp)(1 + b1) + (y - yp) b2, Y = y - yp, R = K1 (r^2 - r0^2) + K2 (r^4 - r0^4) + K3 (r^6 - r0^6), corrected = (X + \
+         X R + P1 (r^2 + 2 X^2) + 2 P2 X Y, Y + Y R + P2 (r^2 + 2 Y^2) + 2 P1 X Y), residual = corrected - image, image = c (u1, u2) / u3"
+    };
+
+    fn with_parameters([principal_distance, xp, yp, k1, k2, k3, p1, p2, b1, b2, balance]: [f64; 11]) -> Self {
+        Self {
+            principal_distance,
+            principal_point: [xp, yp],
+            radial: [k1, k2, k3],
+            tangential: [p1, p2],
+            affinity: [b1, b2],
+            balance,
+        }
+    }
+
+    fn parameters(&self) -> [f64; 11] {
+        let ([xp, yp], [k1, k2, k3]) = (self.principal_point, self.radial);
+        let ([p1, p2], [b1, b2]) = (self.tangential, self.affinity);
+        [self.principal_distance, xp, yp, k1, k2, k3, p1, p2, b1, b2, self.balance]
+    }
+
+    fn principal_distance(&self) -> f64 {
+        self.principal_distance
+    }
+
+    #[inline(always)]
+    fn correct(&self, measured: [f64; 2]) -> Corrected<[f64; 11]> {
+        let [dx, dy] = [measured[0] - self.principal_point[0], measured[1] - self.principal_point[1]];
+        let ([a1, a2], [b1, b2]) = self.affine();
+        let place = [dx * (1.0 + a1) + dy * a2, dy];
+        let bent = self.lens().bend(place);
+        let [[xx, xy], [yx, yy]] = bent.by_place;
+        let by_measured = [[xx * (1.0 + a1) + b1, xx * a2 + xy + b2], [yx * (1.0 + a1), yx * a2 + yy]];
+        let by_affinity = |along: [f64; 2]| along.map(|d| if AFTER { [d, 0.0] } else { [xx * d, yx * d] });
+        let ([by_b1, by_b2], [by_p1, by_p2]) = (by_affinity([dx, dy]), bent.by_tangential());
+        let square = self.balance * self.balance;
+        let by_radial = |power: i32| {
+            let (free, whole) = (square.powi(power), bent.by_numerator(power));
+            [whole[0] - free * place[0], whole[1] - free * place[1]]
+        };
+        // r0 is never free.
+        let row = |k: usize| {
+            let [to_x, to_y] = by_measured[k];
+            let radial = [1, 2, 3].map(|power| by_radial(power)[k]);
+            let [k1, k2, k3] = radial;
+            [0.0, -to_x, -to_y, k1, k2, k3, by_p1[k], by_p2[k], by_b1[k], by_b2[k], 0.0]
+        };
+        Corrected {
+            xy: [bent.xy[0] + b1 * dx + b2 * dy, bent.xy[1]],
+            by_measured,
+            by_parameters: [row(0), row(1)],
+        }
+    }
+
+    fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]> {
+        let ([a1, a2], [b1, b2]) = self.affine();
+        let lens = self.lens();
+        let [x, y] = from_radial(&lens.radial, corrected, |[x, y]| {
+            let Bent { xy, by_place: [by_x, by_y], .. } = lens.bend([x, y]);
+            ([xy[0] + b1 * x + b2 * y, xy[1]], [[by_x[0] + b1, by_x[1] + b2], by_y])
+        })?;
+        let dx = (x - a2 * y) / (1.0 + a1);
+        Some([self.principal_point[0] + dx, self.principal_point[1] + y])
+    }
+
+    fn radial_limit(&self) -> Option<RadialLimit> {
+        self.lens().radial.limit()
+    }
+}

@@ -1,0 +1,225 @@
+//! The way back through a lens: where its radial part is one-to-one, and Newton's method in one and two dimensions.
+
+/// A matrix of two rows.
+pub type Matrix2 = [[f64; 2]; 2];
+
+/// Steps of Newton's method at the most.
+const STEPS: usize = 50;
+/// A step so small a fraction of the value is the last.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// What a way back may be wrong by where rounding ends it, as a fraction of its size.
+const REACHED: f64 = 1e-9;
+
+/// Up to where the radial part of a lens is one-to-one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RadialLimit {
+    /// The radius that the lens is a function of; infinite where only its image ends.
+    pub radius: f64,
+    /// What it becomes.
+    pub distorted: f64,
+}
+
+/// s(q) = N(q) / D(q) of the square q of a radius r, which becomes r s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RadialFactor {
+    /// Coefficients of N by the power of q, from the constant on.
+    pub numerator: [f64; 7],
+    /// Those of D.
+    pub denominator: [f64; 4],
+}
+
+impl RadialFactor {
+    /// 1 + k1 q + k2 q^2 + ...; terms beyond the sixth do not count.
+    pub fn polynomial(terms: &[f64]) -> Self {
+        let numerator = std::array::from_fn(|i| match i.checked_sub(1) {
+            None => 1.0,
+            Some(term) => terms.get(term).copied().unwrap_or_default(),
+        });
+        Self { numerator, denominator: [1.0, 0.0, 0.0, 0.0] }
+    }
+
+    /// N, D and their derivatives by q.
+    #[inline(always)]
+    pub fn at(&self, q: f64) -> [f64; 4] {
+        let (n, by_n) = horner(&self.numerator, q);
+        let (d, by_d) = horner(&self.denominator, q);
+        [n, d, by_n, by_d]
+    }
+
+    /// s.
+    pub fn value(&self, q: f64) -> f64 {
+        let [n, d, ..] = self.at(q);
+        n / d
+    }
+
+    /// D^2 d(r s)/dr = N D + 2 q (N' D - N D'): the lens is one-to-one while this and D are positive.
+    fn slope(&self) -> [f64; 10] {
+        let mut slope = [0.0; 10];
+        for (i, n) in self.numerator.iter().enumerate() {
+            for (j, d) in self.denominator.iter().enumerate() {
+                slope[i + j] += n * d * (1.0 + 2.0 * i as f64 - 2.0 * j as f64);
+            }
+        }
+        slope
+    }
+
+    /// Up to where r s is one-to-one; None where it is so everywhere.
+    pub fn limit(&self) -> Option<RadialLimit> {
+        let ends = [first_root(&self.slope()), first_root(&self.denominator)];
+        let q = ends.into_iter().flatten().reduce(f64::min)?;
+        Some(RadialLimit { radius: q.sqrt(), distorted: q.sqrt() * self.value(q).abs() })
+    }
+
+    /// The radius that becomes the given one; None where there is none before the limit.
+    pub fn invert(&self, distorted: f64) -> Option<f64> {
+        if !distorted.is_finite() {
+            return None;
+        }
+        let slope = self.slope();
+        // Most lenses need no root: what the negative terms take away by then leaves something.
+        let certain = |q: f64| lower_bound(&slope, q) > 0.0 && lower_bound(&self.denominator, q) > 0.0;
+        if let Some(radius) = self.newton(distorted, &slope, f64::INFINITY).filter(|r| certain(r * r)) {
+            return Some(radius);
+        }
+        match self.limit() {
+            Some(limit) if distorted >= limit.distorted => None,
+            Some(limit) => self.newton(distorted, &slope, limit.radius),
+            None => self.newton(distorted, &slope, f64::INFINITY),
+        }
+    }
+
+    /// Newton's method for the radius, kept between what is too small and too large by bisection.
+    fn newton(&self, distorted: f64, slope: &[f64], limit: f64) -> Option<f64> {
+        let (mut low, mut high) = (0.0f64, limit);
+        let mut radius = distorted.min(limit);
+        for _ in 0..STEPS {
+            let q = radius * radius;
+            let [n, d, ..] = self.at(q);
+            let excess = radius * n / d - distorted;
+            if excess > 0.0 {
+                high = radius
+            } else {
+                low = radius
+            }
+            let next = radius - excess * d * d / horner(slope, q).0;
+            let middle = if high.is_finite() { 0.5 * (low + high) } else { 2.0 * low };
+            let next = if next >= low && next <= high { next } else { middle };
+            let change = (next - radius).abs();
+            radius = next;
+            if change <= ROUNDING * radius {
+                return Some(radius);
+            }
+        }
+        // Where the curve is flat, rounding moves the radius by more than its last digits.
+        let apart = radius * self.value(radius * radius) - distorted;
+        (apart.abs() <= REACHED * distorted).then_some(radius)
+    }
+}
+
+/// A polynomial and its derivative.
+#[inline(always)]
+fn horner(coefficients: &[f64], x: f64) -> (f64, f64) {
+    coefficients.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * x + c, slope * x + value))
+}
+
+/// What a polynomial is nowhere less than from zero to x: its constant and its negative terms at x.
+fn lower_bound(coefficients: &[f64], x: f64) -> f64 {
+    let terms = coefficients.iter().rev().fold(0.0, |value, c| value * x + c.min(0.0));
+    terms + coefficients[0].max(0.0)
+}
+
+/// The smallest positive root where a polynomial changes sign.
+fn first_root(coefficients: &[f64]) -> Option<f64> {
+    positive_roots(coefficients).first().copied()
+}
+
+/// The positive roots where a polynomial changes sign, ascending: one between neighbouring roots of its derivative.
+fn positive_roots(coefficients: &[f64]) -> Vec<f64> {
+    let used = coefficients.iter().rposition(|&c| c != 0.0).unwrap_or_default();
+    if used == 0 || !coefficients.iter().all(|c| c.is_finite()) {
+        return vec![];
+    }
+    let own = &coefficients[..=used];
+    let value = |x: f64| horner(own, x).0;
+    let derivative: Vec<f64> = (1..=used).map(|i| i as f64 * own[i]).collect();
+    // No root is larger than this (Fujiwara 1916).
+    let term = |i: usize| (own[i] / own[used]).abs().powf(((used - i) as f64).recip());
+    let bound = 2.0 * (0..used).map(term).fold(0.0, f64::max);
+    let mut ends = positive_roots(&derivative);
+    ends.retain(|&end| end < bound);
+    ends.push(bound);
+    let mut roots = Vec::new();
+    let mut low = 0.0;
+    for high in ends {
+        if (value(low) < 0.0) != (value(high) < 0.0) {
+            roots.push(bisected(low, high, value));
+        }
+        low = high;
+    }
+    roots
+}
+
+/// Where a function changes sign between two ends.
+fn bisected(mut low: f64, mut high: f64, value: impl Fn(f64) -> f64) -> f64 {
+    let sign = value(low) < 0.0;
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return middle;
+        }
+        if (value(middle) < 0.0) == sign { low = middle } else { high = middle }
+    }
+}
+
+/// The inverse of a matrix; not finite where there is none.
+#[inline(always)]
+pub fn inverted([[a, b], [c, d]]: Matrix2) -> Matrix2 {
+    let determinant = a * d - b * c;
+    [[d / determinant, -b / determinant], [-c / determinant, a / determinant]]
+}
+
+/// A matrix times a vector.
+#[inline(always)]
+pub fn times(m: &Matrix2, v: [f64; 2]) -> [f64; 2] {
+    m.map(|row| row[0] * v[0] + row[1] * v[1])
+}
+
+/// The place that a map (its value and partials) takes to `target`, by Newton's method from `start`; None where there is none near, or
+/// where the map has turned over on the way.
+pub fn way_back(
+    start: [f64; 2],
+    target: [f64; 2],
+    map: impl Fn([f64; 2]) -> ([f64; 2], Matrix2),
+) -> Option<[f64; 2]> {
+    let mut at = start;
+    let (mut before, mut grown) = (f64::INFINITY, 0);
+    for _ in 0..STEPS {
+        let (value, by) = map(at);
+        if by[0][0] * by[1][1] <= by[0][1] * by[1][0] {
+            return None;
+        }
+        let step = times(&inverted(by), [target[0] - value[0], target[1] - value[1]]);
+        at = [at[0] + step[0], at[1] + step[1]];
+        let [length, size] = [step, at].map(|[a, b]| a.hypot(b));
+        grown += usize::from(length >= before);
+        before = length;
+        if length <= ROUNDING * size {
+            return Some(at);
+        }
+        if grown == 2 || !length.is_finite() {
+            return (length <= REACHED * size).then_some(at);
+        }
+    }
+    None
+}
+
+/// The place that a lens (its value and partials) takes to `target`: from what its radial part alone says, along the direction of that.
+pub fn from_radial(
+    radial: &RadialFactor,
+    target: [f64; 2],
+    lens: impl Fn([f64; 2]) -> ([f64; 2], Matrix2),
+) -> Option<[f64; 2]> {
+    let distorted = target[0].hypot(target[1]);
+    let ratio = if distorted > 0.0 { radial.invert(distorted)? / distorted } else { 1.0 };
+    way_back(target.map(|value| ratio * value), target, lens)
+}

@@ -1,0 +1,95 @@
+//! The terms of Brown (1966, 1971), Conrady (1919) and those who came after: radial, tangential, thin prism.
+
+use super::inverse::{Matrix2, RadialFactor};
+
+/// The lens
+///
+/// ```text
+/// q = a^2 + b^2
+/// x = a s(q) + t1 (q + 2 a^2) + 2 t2 a b + s1 q + s2 q^2
+/// y = b s(q) + t2 (q + 2 b^2) + 2 t1 a b + s3 q + s4 q^2
+/// ```
+///
+/// (t1, t2) are P1, P2 of photogrammetry, and p2, p1 of OpenCV.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RadialTangential {
+    /// s.
+    pub radial: RadialFactor,
+    /// t1, t2.
+    pub tangential: [f64; 2],
+    /// s1, s2; s3, s4.
+    pub prism: Matrix2,
+}
+
+/// Where a place goes, with its partials by the place, and what those by the terms need.
+#[derive(Debug, Clone, Copy)]
+pub struct Bent {
+    /// x, y.
+    pub xy: [f64; 2],
+    /// With respect to a, b.
+    pub by_place: Matrix2,
+    place: [f64; 2],
+    square: f64,
+    /// 1 / D.
+    reciprocal: f64,
+    /// s.
+    factor: f64,
+}
+
+impl RadialTangential {
+    /// Where a place goes.
+    #[inline(always)]
+    pub fn bend(&self, place: [f64; 2]) -> Bent {
+        let [a, b] = place;
+        let ([t1, t2], [[s1, s2], [s3, s4]]) = (self.tangential, self.prism);
+        let square = a * a + b * b;
+        let [n, d, by_n, by_d] = self.radial.at(square);
+        let reciprocal = d.recip();
+        let factor = n * reciprocal;
+        let slope = 2.0 * (by_n - factor * by_d) * reciprocal;
+        let cross = slope * a * b + 2.0 * (t1 * b + t2 * a);
+        let [along_x, along_y] = [2.0 * (s1 + 2.0 * s2 * square), 2.0 * (s3 + 2.0 * s4 * square)];
+        Bent {
+            xy: [
+                a * factor + t1 * (square + 2.0 * a * a) + 2.0 * t2 * a * b + square * (s1 + s2 * square),
+                b * factor + t2 * (square + 2.0 * b * b) + 2.0 * t1 * a * b + square * (s3 + s4 * square),
+            ],
+            by_place: [
+                [factor + slope * a * a + 6.0 * t1 * a + 2.0 * t2 * b + along_x * a, cross + along_x * b],
+                [cross + along_y * a, factor + slope * b * b + 6.0 * t2 * b + 2.0 * t1 * a + along_y * b],
+            ],
+            place,
+            square,
+            reciprocal,
+            factor,
+        }
+    }
+}
+
+impl Bent {
+    /// By the coefficient of q^i in N.
+    #[inline(always)]
+    pub fn by_numerator(&self, power: i32) -> [f64; 2] {
+        let scale = self.square.powi(power) * self.reciprocal;
+        self.place.map(|value| scale * value)
+    }
+
+    /// By the coefficient of q^i in D.
+    #[inline(always)]
+    pub fn by_denominator(&self, power: i32) -> [f64; 2] {
+        self.by_numerator(power).map(|value| -self.factor * value)
+    }
+
+    /// By t1, t2.
+    #[inline(always)]
+    pub fn by_tangential(&self) -> [[f64; 2]; 2] {
+        let ([a, b], q) = (self.place, self.square);
+        [[q + 2.0 * a * a, 2.0 * a * b], [2.0 * a * b, q + 2.0 * b * b]]
+    }
+
+    /// By s1, s2, which only x has, as s3, s4 are those of y.
+    #[inline(always)]
+    pub fn by_prism(&self) -> [f64; 2] {
+        [self.square, self.square * self.square]
+    }
+}

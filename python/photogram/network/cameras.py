@@ -1,0 +1,315 @@
+"""Cameras: a model with its parameters, known, weighted or unknown, shared by photos."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, Literal, Self, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram import _photocore
+from photogram.arguments.arrays import number, one_of, shaped, shown, text
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+
+__all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "checked_cameras", "images_of", "photo_indices"]
+
+ImageUnit = Literal["mm", "px"]
+"""What image coordinates are measured in."""
+
+CameraRow = tuple[str, list[float], list[float]]
+"""Model, parameters and their standard deviations, as the core takes a camera."""
+
+_GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta"})
+"""Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras. Where w and h
+are given, cx and cy are counted from the middle of the picture, and may be missing."""
+
+
+@cache
+def _models() -> dict[str, tuple[str, list[tuple[str, int]], int, str]]:
+    return dict(_photocore.camera_models())
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A camera of one photo or of many.
+
+    Parameters
+    ----------
+    model
+        The name of its model (`docs/cameras.md`): `perspective`, `brown`, `opencv`, ...
+    parameters
+        Values by the model's names; lens terms, principal points `xp`, `yp` and `r0` that are missing are 0.
+        Lengths are in the unit of image coordinates, the rest as the model says.
+    sd
+        Standard deviations by the same names, or one for all that may be unknown: infinite (free: the value
+        is where the adjustment starts from), 0 (held; so are all that are missing) or between (weighted: the
+        value is an observation).
+    name
+        For reports; a block numbers cameras without one.
+    unit
+        Of image coordinates, `mm` or `px`. None: `px` where the model has a focal length `f` or `fx`, `mm`
+        where it has a principal distance `c`.
+
+    Raises
+    ------
+    InputError
+        A model or a parameter that there is not, a principal distance that is missing or zero, values that
+        are not finite, negative standard deviations, a constant of the model that is not held.
+    """
+
+    model: str
+    parameters: Mapping[str, float]
+    sd: Mapping[str, float] | float = 0.0
+    name: str = ""
+    unit: ImageUnit | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.model, str) or self.model not in _photocore.CAMERAS:
+            raise InputError(f"a camera is one of {', '.join(_photocore.CAMERAS)}, not {shown(self.model)}")
+        text("name", self.name)
+        if self.unit is None:
+            self._set("unit", "mm" if "c" in self.names else "px")
+        one_of("unit", self.unit, get_args(ImageUnit))
+        self._set("parameters", self._checked_parameters())
+        self._set("sd", self._checked_sd())
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The k parameters of the model, in their order."""
+        return tuple(name for name, _ in self._facts[1])
+
+    @property
+    def constants(self) -> frozenset[str]:
+        """Parameters that are never unknown."""
+        names, count = self.names, self._facts[2]
+        return frozenset(names[len(names) - count :])
+
+    @property
+    def direction(self) -> str:
+        """What lens terms are functions of: `forward` ideal coordinates, `backward` measured ones."""
+        return self._facts[3]
+
+    @property
+    def _facts(self) -> tuple[str, list[tuple[str, int]], int, str]:
+        return _models()[self.model]
+
+    @property
+    def values(self) -> Floats:
+        """(k,) the parameters in the order of the model."""
+        return np.array([self.parameters[name] for name in self.names])
+
+    @property
+    def deviations(self) -> Floats:
+        """(k,) their standard deviations: infinite free, 0 held."""
+        return np.array([self._sd[name] for name in self.names])
+
+    @property
+    def _sd(self) -> Mapping[str, float]:
+        return self.sd if isinstance(self.sd, Mapping) else {}
+
+    @property
+    def is_held(self) -> bool:
+        """Whether all parameters are known."""
+        return not self.deviations.any()
+
+    @property
+    def scale(self) -> float:
+        """What a small angle near the axis is multiplied by: the principal distance, without sign."""
+        for name in ("c", "f", "fx"):
+            if name in self.parameters:
+                return abs(self.parameters[name])
+        return abs(self.parameters["w"]) / math.tau
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit of a parameter; nothing for a plain number."""
+        power = dict(self._facts[1])[name]
+        return "" if power == 0 else f"{self.unit}" if power == 1 else f"{self.unit}^{power}"
+
+    @property
+    def title(self) -> str:
+        """What reports call it."""
+        return self.name or self.model
+
+    def replace(self, **changes: Any) -> Self:
+        """Return the camera with some fields replaced, checked anew."""
+        return replace(self, **changes)
+
+    def _named(self, what: str, given: object) -> dict[str, float]:
+        if not isinstance(given, Mapping):
+            raise InputError(
+                f"{what} of the camera {self.title} is no mapping of names to numbers: {shown(given)}"
+            )
+        unknown = [str(name) for name in given if name not in self.names]
+        if unknown:
+            raise InputError(
+                f"{what} of the camera {self.title}: {self.model} has no {', '.join(unknown)}, but"
+                f" {', '.join(self.names)}"
+            )
+        return {name: number(f"{name} of the camera {self.title}", value) for name, value in given.items()}
+
+    def _checked_parameters(self) -> dict[str, float]:
+        given = self._named("parameters", self.parameters)
+        needed = _GIVEN - ({"cx", "cy"} if "w" in self.names else set())
+        missing = [name for name in self.names if name in needed and name not in given]
+        if missing:
+            raise InputError(f"parameters of the camera {self.title}: {', '.join(missing)} must be given")
+        for name, value in given.items():
+            if not math.isfinite(value):
+                raise InputError(f"{name} of the camera {self.title} is not a finite number: {value}")
+            if value == 0 and name in _GIVEN - {"cx", "cy"}:
+                raise InputError(f"{name} of the camera {self.title} is zero")
+        return {name: given.get(name, 0.0) for name in self.names}
+
+    def _checked_sd(self) -> dict[str, float]:
+        if isinstance(self.sd, Mapping):
+            given = self._named("sd", self.sd)
+        else:
+            own = number(f"sd of the camera {self.title}", self.sd)
+            given = {name: own for name in self.names if name not in self.constants}
+        for name, value in given.items():
+            if not value >= 0:
+                raise InputError(f"sd of {name} of the camera {self.title} is no standard deviation: {value}")
+            if value > 0 and name in self.constants:
+                raise InputError(f"{name} of the camera {self.title} is a constant: its sd is 0")
+        return {name: given.get(name, 0.0) for name in self.names}
+
+    def project(self, u: ArrayLike) -> Floats:
+        """Return the images of directions.
+
+        Parameters
+        ----------
+        u
+            (n, 3) points or directions in the axes of the photo: x right, y up, z back towards the viewer;
+            what is visible has u3 < 0. Only the direction counts.
+
+        Returns
+        -------
+        (n, 2) image coordinates in the unit of the camera; NaN or infinite where there are none.
+
+        Raises
+        ------
+        InputError
+            Another shape, or what is no number.
+        """
+        given = shaped("u", u, (len(np.atleast_1d(np.asarray(u))), 3), missing=True)
+        return _photocore.camera_images(self.model, self.values, given)
+
+    def rays(self, xy: ArrayLike) -> Floats:
+        """Return the directions of image positions.
+
+        Parameters
+        ----------
+        xy
+            (n, 2) image coordinates in the unit of the camera.
+
+        Returns
+        -------
+        (n, 3) unit vectors in the axes of the photo, in front of it; NaN where no direction has the image.
+
+        Raises
+        ------
+        InputError
+            Another shape, or what is no number.
+        """
+        given = shaped("xy", xy, (len(np.atleast_1d(np.asarray(xy))), 2), missing=True)
+        return _photocore.camera_rays(self.model, self.values, given)
+
+
+def checked_cameras(cameras: object) -> tuple[Camera, ...]:
+    """Return the cameras of a block.
+
+    Raises
+    ------
+    InputError
+        What is no list of cameras, equal names, different units.
+    """
+    if not isinstance(cameras, Sequence):
+        raise InputError(f"cameras is no list: {shown(cameras)}")
+    for each in cameras:
+        if not isinstance(each, Camera):
+            raise InputError(f"cameras holds what is no Camera: {shown(each)}")
+    names = [each.name for each in cameras if each.name]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"cameras: {twice!r} stands there more than once")
+    units = {each.unit for each in cameras}
+    if len(units) > 1:
+        raise InputError("cameras: image coordinates of one block are in one unit, mm or px")
+    return tuple(cameras)
+
+
+def photo_indices(given: object, cameras: Sequence[Camera], photos: int) -> Indices:
+    """Return (P,) which camera each photo has.
+
+    Parameters
+    ----------
+    given
+        (P,) indices or names of cameras, one for all photos, or None: the only camera there is, or one for
+        each photo.
+    cameras
+        The cameras.
+    photos
+        P.
+
+    Raises
+    ------
+    InputError
+        Cameras that are not there, another number of photos, None where it does not say which.
+    """
+    if given is None:
+        if len(cameras) not in (1, photos):
+            raise InputError("photo_cameras must say which photo has which camera")
+        return np.zeros(photos, dtype=np.int64) if len(cameras) == 1 else np.arange(photos)
+    whole = [given] * photos if isinstance(given, str | int) else given
+    try:
+        listed = list(whole)  # type: ignore[call-overload]
+    except TypeError:
+        raise InputError(f"photo_cameras is no list of cameras: {shown(given)}") from None
+    if len(listed) != photos:
+        raise InputError(f"photo_cameras has {len(listed)} rows, but there are {photos} photos")
+    places: dict[object, int] = {each.name: row for row, each in enumerate(cameras) if each.name}
+    found = np.empty(photos, dtype=np.int64)
+    for row, each in enumerate(listed):
+        place = places.get(each) if isinstance(each, str) else _index(each, len(cameras))
+        if place is None:
+            raise InputError(f"photo_cameras: there is no camera {shown(each)}")
+        found[row] = place
+    return found
+
+
+def _index(each: object, count: int) -> int | None:
+    if isinstance(each, bool | np.bool_) or not isinstance(each, int | np.integer):
+        return None
+    return int(each) if 0 <= each < count else None
+
+
+def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> Floats:
+    """Return (m, 2) the images of directions, each by its camera.
+
+    Parameters
+    ----------
+    cameras
+        The cameras.
+    which
+        (m,) the index of each direction's camera.
+    directions
+        (m, 3) as for :meth:`Camera.project`.
+    """
+    images = np.full((len(directions), 2), np.nan)
+    for row, camera in enumerate(cameras):
+        own = which == row
+        images[own] = camera.project(directions[own])
+    return images
+
+
+def camera_rows(cameras: Sequence[Camera]) -> list[CameraRow]:
+    """Return cameras as the core takes them."""
+    return [(each.model, each.values.tolist(), each.deviations.tolist()) for each in cameras]

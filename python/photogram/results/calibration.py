@@ -1,0 +1,274 @@
+"""What a self-calibration has found: which parameters are significant, which cannot be told apart.
+
+For an estimated parameter p with cofactor q: its standard deviation is s = sigma0 sqrt(q), its test value
+t = (p - p_ref) / s has Student's distribution with the degrees of freedom of the adjustment (the normal one
+where the unit weight is a priori), p_ref being 0 for terms of the lens and the given value for focal length
+and principal point. R^2 = 1 - 1 / (n q), n the diagonal of the normal equations, is its multiple correlation
+with all other unknowns. A group of g terms has p' Q^-1 p / (g sigma0^2), Fisher's F with g and those degrees
+of freedom.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.distortion import INTERIOR
+from photogram.results.result import Result
+
+__all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "calibrations"]
+
+LEVEL = 0.05
+"""Probability that a term that is not there is called significant."""
+CORRELATED = 0.95
+"""Larger correlations are named."""
+INSEPARABLE = 0.9999
+"""R^2 above this: nothing tells the parameter from the others."""
+FROM_PRIOR = 0.05
+"""A weight whose redundancy number is below this determines the parameter, not the images."""
+FAR = 5.0
+"""A weighted parameter that has moved by more of its standard deviations a priori is a contradiction."""
+
+
+@dataclass(frozen=True)
+class ParameterTest:
+    """An estimated parameter.
+
+    Attributes
+    ----------
+    name, unit
+        What it is called and measured in; no unit for numbers.
+    value, sd
+        Adjusted, with its standard deviation.
+    given, given_sd
+        The value it started from, or was observed with; infinite where it was free.
+    test_value
+        (value - reference) / sd.
+    probability
+        Of a test value as large where the reference is right.
+    multiple_correlation
+        R with all other unknowns, 0 to 1.
+    redundancy
+        Redundancy number of its weight; 0 without.
+    gain
+        By how much the weighted sum of squares would rise without the parameter (to first order).
+    """
+
+    name: str
+    unit: str
+    value: float
+    sd: float
+    given: float
+    given_sd: float
+    test_value: float
+    probability: float
+    multiple_correlation: float
+    redundancy: float
+    gain: float
+
+    @property
+    def change(self) -> float:
+        """Adjusted minus given."""
+        return self.value - self.given
+
+    @property
+    def significant(self) -> bool:
+        """Whether it differs from its reference at the level of 5 percent."""
+        return self.probability < LEVEL
+
+    @property
+    def separable(self) -> bool:
+        """Whether the observations tell it from the other unknowns."""
+        return not self.multiple_correlation**2 > INSEPARABLE
+
+    @property
+    def from_prior(self) -> bool:
+        """Whether its weight determines it rather than the images."""
+        return 0 < self.given_sd < math.inf and self.redundancy < FROM_PRIOR
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the images contradict its weight."""
+        return 0 < self.given_sd < math.inf and abs(self.change) > FAR * self.given_sd
+
+    @property
+    def is_lens(self) -> bool:
+        """Whether it is a term of the lens, not of the principal point or distance."""
+        return self.name not in INTERIOR
+
+
+@dataclass(frozen=True)
+class GroupTest:
+    """Terms of a lens tested together.
+
+    Attributes
+    ----------
+    names
+        The parameters.
+    test_value
+        p' Q^-1 p / (g sigma0^2).
+    probability
+        Of a test value as large where all are zero.
+    """
+
+    names: tuple[str, ...]
+    test_value: float
+    probability: float
+
+    @property
+    def significant(self) -> bool:
+        """Whether they differ from zero at the level of 5 percent."""
+        return self.probability < LEVEL
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Two unknowns that are correlated, by name, and their coefficient."""
+
+    first: str
+    second: str
+    coefficient: float
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A calibrated camera.
+
+    Attributes
+    ----------
+    camera
+        The adjusted camera.
+    parameters
+        Its estimated parameters, tested.
+    groups
+        Families of terms, tested together.
+    correlations
+        Pairs of its parameters that are correlated by more than 0.95, largest first.
+    removable
+        The term that may be left out: the least significant one that stands alone; None where all are needed.
+        Never several at once: without one of them the others have other tests.
+    """
+
+    camera: AdjustedCamera
+    parameters: tuple[ParameterTest, ...]
+    groups: tuple[GroupTest, ...]
+    correlations: tuple[Correlation, ...]
+    removable: str | None
+
+    def remarks(self) -> list[str]:
+        """Say what needs attention, in sentences."""
+        said = []
+        for each in self.parameters:
+            if not each.separable:
+                said.append(
+                    f"{each.name} cannot be told from the other unknowns: its multiple correlation is"
+                    f" {each.multiple_correlation:.6f}"
+                )
+            if each.from_prior:
+                said.append(
+                    f"{each.name} is from its prior: the redundancy number of its weight is"
+                    f" {each.redundancy:.3f}, the images say little of it"
+                )
+            if each.contradicts:
+                said.append(
+                    f"{each.name} has moved by {abs(each.change) / each.given_sd:.1f} standard deviations of"
+                    " its prior: value or weight is wrong"
+                )
+        if self.removable is not None:
+            said.append(
+                f"{self.removable} may be left out: the least significant term; adjust again before the next"
+            )
+        return said
+
+
+def calibrations(result: Result) -> list[Calibration]:
+    """Return what has been found of each camera with unknown parameters; none without covariances."""
+    cameras = [each for each in result.cameras if each.estimated]
+    return [_calibration(result, each) for each in cameras if np.isfinite(each.cofactors).all()]
+
+
+def _calibration(result: Result, camera: AdjustedCamera) -> Calibration:
+    parameters = tuple(_parameter(result, camera, k) for k in camera.estimated)
+    groups = tuple(_group(result, camera, names) for names in _families(camera))
+    return Calibration(camera, parameters, groups, _correlations(camera), _removable(parameters))
+
+
+def _a_posteriori(result: Result) -> bool:
+    return result.unit_variance != "unity" and result.variance_of_unit_weight is not None
+
+
+def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:
+    name, given = camera.names[k], float(camera.given.values[k])
+    value, sd = float(camera.values[k]), float(camera.sd[k])
+    reference = given if name in INTERIOR else 0.0
+    t = (value - reference) / sd if sd > 0 else math.nan
+    freedom = float(result.degrees_of_freedom) if _a_posteriori(result) else math.inf
+    probability = math.erfc(abs(t) / math.sqrt(2)) if math.isinf(freedom) else _photocore.student(t, freedom)
+    own = camera.information[k] * camera.cofactors[k, k]
+    return ParameterTest(
+        name=name,
+        unit=camera.camera.unit_of(name),
+        value=value,
+        sd=sd,
+        given=given,
+        given_sd=float(camera.given.deviations[k]),
+        test_value=t,
+        probability=probability,
+        multiple_correlation=math.sqrt(max(0.0, 1.0 - 1.0 / own)) if own > 0 else math.nan,
+        redundancy=float(camera.redundancy[k]),
+        gain=t * t * result.covariance_scale,
+    )
+
+
+def _group(result: Result, camera: AdjustedCamera, names: tuple[str, ...]) -> GroupTest:
+    rows = [camera.names.index(name) for name in names]
+    p, q = camera.values[rows], camera.covariance[np.ix_(rows, rows)]
+    scale = np.sqrt(np.diag(q))
+    whitened = np.linalg.solve(q / np.outer(scale, scale), p / scale)
+    value = float(p / scale @ whitened) / len(rows)
+    if _a_posteriori(result):
+        probability = _photocore.fisher(value, len(rows), result.degrees_of_freedom)
+    else:
+        probability = _photocore.chi_square(value * len(rows), len(rows))
+    return GroupTest(names, value, probability)
+
+
+def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
+    """Return groups of estimated terms: by letter, radial ones also without the first, Gruen's by degree."""
+    by_family: dict[str, list[str]] = {}
+    for k in camera.estimated:
+        name = camera.names[k]
+        found = re.fullmatch(r"([A-Za-z]+)_?(\d+)", name)
+        if name in INTERIOR or found is None:
+            continue
+        letter, number = found.groups()
+        degree = "" if len(number) < 2 or letter == "e" else f" {sum(map(int, number)) - 2}"
+        by_family.setdefault("degree" + degree if degree else letter, []).append(name)
+    families = [tuple(names) for names in by_family.values() if len(names) > 1]
+    radial = [tuple(names[1:]) for letter, names in by_family.items() if letter in "Kk" and len(names) > 2]
+    return families + radial
+
+
+def _correlations(camera: AdjustedCamera) -> tuple[Correlation, ...]:
+    table, rows = camera.correlations, camera.estimated
+    pairs = [
+        Correlation(camera.names[i], camera.names[j], float(table[i, j]))
+        for place, i in enumerate(rows)
+        for j in rows[place + 1 :]
+        if abs(table[i, j]) > CORRELATED
+    ]
+    return tuple(sorted(pairs, key=lambda pair: -abs(pair.coefficient)))
+
+
+def _removable(parameters: tuple[ParameterTest, ...]) -> str | None:
+    """Return the least significant term; a radial one only after those of higher powers."""
+    lens = [each for each in parameters if each.is_lens]
+    radial = [each.name for each in lens if re.fullmatch(r"[Kk]\d", each.name)]
+    held_up = set(radial[:-1])
+    candidates = [each for each in lens if not each.significant and each.name not in held_up]
+    return max(candidates, key=lambda each: each.probability).name if candidates else None

@@ -1,0 +1,137 @@
+"""Adjusted cameras: parameters with their cofactors, in the order of the block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.arguments.arrays import standard_deviations
+from photogram.arguments.types import Floats
+from photogram.network.block import Block
+from photogram.network.cameras import Camera
+
+if TYPE_CHECKING:
+    from photogram import _photocore
+
+__all__ = ["AdjustedCamera", "adjusted_cameras", "units"]
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustedCamera:
+    """A camera after the adjustment, with k parameters. Arrays cannot be written.
+
+    Attributes
+    ----------
+    name
+        What the block calls it.
+    given
+        The camera as it was given: initial values, observed where weighted.
+    camera
+        The same with the adjusted parameters.
+    cofactors
+        (k, k) for a priori unit weight; zero for held parameters, NaN without covariances.
+    covariance
+        (k, k) cofactors times the variance of unit weight.
+    redundancy
+        (k,) redundancy numbers of weighted parameters as observations; 0 unless weighted.
+    information
+        (k,) diagonal of the normal equations, weights counted: reciprocal cofactors that the parameters would
+        have if all other unknowns were known; 0 for held ones.
+    photos, images
+        How many photos have it, and how many images on these took part.
+    """
+
+    name: str
+    given: Camera
+    camera: Camera
+    cofactors: Floats
+    covariance: Floats
+    redundancy: Floats
+    information: Floats
+    photos: int
+    images: int
+
+    def __post_init__(self) -> None:
+        for array in (self.cofactors, self.covariance, self.redundancy, self.information):
+            array.flags.writeable = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters."""
+        return self.camera.names
+
+    @property
+    def values(self) -> Floats:
+        """(k,) adjusted parameters."""
+        return self.camera.values
+
+    @property
+    def sd(self) -> Floats:
+        """(k,) their standard deviations; 0 where held."""
+        return np.asarray(standard_deviations(self.covariance[np.newaxis])[0])
+
+    @property
+    def correlations(self) -> Floats:
+        """(k, k) correlation coefficients; NaN for held parameters."""
+        sd = np.sqrt(np.diag(self.cofactors))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self.cofactors / np.outer(sd, sd))
+
+    @property
+    def estimated(self) -> list[int]:
+        """Which parameters are free or weighted."""
+        return np.flatnonzero(self.given.deviations > 0).tolist()
+
+    @property
+    def weighted(self) -> list[int]:
+        """Which of these are weighted."""
+        sd = self.given.deviations
+        return np.flatnonzero((sd > 0) & np.isfinite(sd)).tolist()
+
+    def value(self, name: str) -> float:
+        """Return an adjusted parameter."""
+        return self.camera.parameters[name]
+
+    def deviation(self, name: str) -> float:
+        """Return the standard deviation of a parameter."""
+        return float(self.sd[self.names.index(name)])
+
+
+def adjusted_cameras(
+    block: Block, solution: _photocore.BlockSolution, scale: float
+) -> tuple[AdjustedCamera, ...]:
+    """Return the adjusted cameras of a block, covariances scaled; none where it has principal distances."""
+    if not block.cameras:
+        return ()
+    found = []
+    for name, given, row in zip(block.camera_names, block.cameras, solution.cameras, strict=True):
+        parameters, cofactors, redundancy, information, photos, images = row
+        k = len(parameters)
+        matrix = np.array(cofactors).reshape(k, k)
+        found.append(
+            AdjustedCamera(
+                name=name,
+                given=given,
+                camera=given.replace(parameters=dict(zip(given.names, parameters, strict=True))),
+                cofactors=matrix,
+                covariance=matrix * scale,
+                redundancy=np.array(redundancy),
+                information=np.array(information),
+                photos=photos,
+                images=images,
+            )
+        )
+    return tuple(found)
+
+
+def units(camera: Camera) -> list[str]:
+    """Return the unit of each parameter: `mm`, `mm^-2`, ... or nothing for plain numbers."""
+    return [camera.unit_of(name) for name in camera.names]
+
+
+def parameters_named(cameras: Sequence[AdjustedCamera], unknowns: Sequence[tuple[int, int]]) -> list[str]:
+    """Name cameras and parameters given by their numbers."""
+    return [f"{cameras[camera].names[k]} of {cameras[camera].name}" for camera, k in unknowns]

@@ -1,0 +1,192 @@
+"""The radial distortion of an adjusted camera, with what is known of it.
+
+A curve dr(r) of the radial terms k, its partials J = d(dr)/dk and the block Q of their cofactors give the
+band s(r) = sigma0 sqrt(J Q J'). What a user measures with includes the principal distance c. A forward camera
+maps a ray to r + dr, which moves by J dk + (r / c) dc; a backward one maps a measured position to the ray
+(r + dr) / c, which moves by (J dk - (r / c) dc) / c: so the band of the mapping is that of (J, r / c) or of
+(J, -r / c) with the block of k and c. Balanced, a part B r that c may take over is subtracted so that the
+curve vanishes at r0: J - r w with w = J(r0) / r0; the principal distance is then c / (1 + B), c (1 + B) where
+the lens is forward.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.network.cameras import Camera
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.result import Result
+
+__all__ = ["INTERIOR", "DistortionCurve", "distortion_curve", "largest_radius", "own_images"]
+
+DISTANCES = ("c", "f", "fx")
+INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy"})
+"""Principal distance and principal point; all other parameters are terms of the lens."""
+
+BALANCED_AT = 2.0 / 3.0
+"""r0, of the largest observed radius."""
+BEYOND = 1.25
+"""How far the curve goes on, of the largest observed radius."""
+ROWS = 51
+"""Radii of a curve."""
+
+
+@dataclass(frozen=True, eq=False)
+class DistortionCurve:
+    """Radial distortion at n radii, in the unit of image coordinates.
+
+    Attributes
+    ----------
+    direction
+        `backward`: what is added to measured coordinates, over the measured radius; `forward`: what is added
+        to ideal ones, over the ideal radius.
+    radii
+        (n,) from 0.
+    values, sd
+        (n,) the curve and its standard deviations, principal distance known.
+    sd_mapping
+        (n,) standard deviations of the whole mapping: with the principal distance.
+    balanced, sd_balanced
+        (n,) the curve that vanishes at `balanced_at`, and its standard deviations.
+    balanced_at
+        r0.
+    balanced_distance
+        The principal distance that belongs to the balanced curve, signed.
+    observed
+        The largest radius with an image; values beyond are extrapolated.
+    """
+
+    direction: str
+    radii: Floats
+    values: Floats
+    sd: Floats
+    sd_mapping: Floats
+    balanced: Floats
+    sd_balanced: Floats
+    balanced_at: float
+    balanced_distance: float
+    observed: float
+
+
+def own_images(result: Result, camera: AdjustedCamera) -> Floats:
+    """Return (k, 2) the images of a camera that took part."""
+    block = result.block
+    cameras = np.asarray(block.photo_cameras)[block.image_photos]
+    row = [each.name for each in result.cameras].index(camera.name)
+    return np.asarray(block.image_xy[result.used_images & (cameras == row)])
+
+
+def largest_radius(result: Result, camera: AdjustedCamera) -> float:
+    """Return how far from the principal point images of a camera reach: measured, or ideal where forward."""
+    xy = own_images(result, camera)
+    if not len(xy):
+        return 0.0
+    if _is_backward(camera.camera):
+        return float(np.hypot(*(xy - _principal_point(camera.camera)).T).max())
+    rays = camera.camera.rays(xy)
+    return camera.camera.scale * float(np.nanmax(_ideal(camera.camera, rays)))
+
+
+def distortion_curve(
+    result: Result, camera: AdjustedCamera, radii: Floats | None = None
+) -> DistortionCurve | None:
+    """Return the curve of a camera that has radial terms, None of one that has none or no images.
+
+    Parameters
+    ----------
+    result
+        The result that has the camera.
+    camera
+        The camera.
+    radii
+        (n,) in the unit of image coordinates; evenly to a quarter beyond the largest observed when None.
+    """
+    terms = [k for k, name in enumerate(camera.names) if re.fullmatch(r"[KkA]\d", name)]
+    used = any(camera.values[k] != 0 or k in camera.estimated for k in terms)
+    observed = largest_radius(result, camera)
+    if not used or observed == 0:
+        return None
+    at = np.linspace(0.0, BEYOND * observed, ROWS) if radii is None else np.asarray(radii, dtype=np.float64)
+    r0 = BALANCED_AT * observed
+    both = np.append(at, r0)
+    curve, partials = _radial(camera, terms, both)
+    distance = next(k for k, name in enumerate(camera.names) if name in DISTANCES)
+    c = float(camera.values[distance])
+    part = curve[-1] / r0
+    with_distance = np.column_stack([partials, -both / c if _is_backward(camera.camera) else both / c])
+    balanced = partials - np.outer(both / r0, partials[-1])
+    return DistortionCurve(
+        direction="backward" if _is_backward(camera.camera) else "forward",
+        radii=at,
+        values=curve[:-1],
+        sd=_deviations(camera, terms, partials)[:-1],
+        sd_mapping=_deviations(camera, [*terms, distance], with_distance)[:-1],
+        balanced=(curve - part * both)[:-1],
+        sd_balanced=_deviations(camera, terms, balanced)[:-1],
+        balanced_at=r0,
+        balanced_distance=c / (1.0 + part) if _is_backward(camera.camera) else c * (1.0 + part),
+        observed=observed,
+    )
+
+
+def _deviations(camera: AdjustedCamera, terms: list[int], partials: Floats) -> Floats:
+    covariance = camera.covariance[np.ix_(terms, terms)]
+    variances = np.einsum("ni,ij,nj->n", partials, covariance, partials)
+    return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
+
+
+def _radial(camera: AdjustedCamera, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
+    """Return the curve of the radial terms alone, and its partials by these: the curve is linear in them."""
+    own = camera.camera
+    keep = {"c", "f", "fx", "fy", *own.constants, *(camera.names[k] for k in terms)}
+    bare = {name: value if name in keep else 0.0 for name, value in own.parameters.items()}
+    largest = radii.max()
+
+    def at(changes: dict[str, float]) -> Floats:
+        return _along(own.replace(parameters={**bare, **changes}), radii)
+
+    partials = np.empty((len(radii), len(terms)))
+    for column, k in enumerate(terms):
+        name = camera.names[k]
+        step = camera.sd[k] or abs(camera.values[k]) or largest ** -(2 * (column + 1))
+        step *= 0.01
+        upper, lower = (at({name: bare[name] + sign * step}) for sign in (1, -1))
+        partials[:, column] = (upper - lower) / (2 * step)
+    return at({}), partials
+
+
+def _along(camera: Camera, radii: Floats) -> Floats:
+    """Return what is added to a radius along x: to measured coordinates, or to ideal ones."""
+    zero = np.zeros_like(radii)
+    if _is_backward(camera):
+        corrected = _photocore.camera_correct(camera.model, camera.values, np.column_stack([radii, zero]))
+        return np.asarray(corrected[:, 0] - radii)
+    argument = radii / camera.scale
+    across = np.sin(argument) if _is_fisheye(camera) else argument
+    back = -np.cos(argument) if _is_fisheye(camera) else zero - 1.0
+    middle = camera.project([[0.0, 0.0, -1.0]])[0, 0]
+    return np.asarray(camera.project(np.column_stack([across, zero, back]))[:, 0] - middle - radii)
+
+
+def _ideal(camera: Camera, rays: Floats) -> Floats:
+    """Return the argument of forward radial terms: the tangent of the angle from the axis, or the angle."""
+    across = np.hypot(rays[:, 0], rays[:, 1])
+    return np.arctan2(across, -rays[:, 2]) if _is_fisheye(camera) else across / -rays[:, 2]
+
+
+def _principal_point(camera: Camera) -> Floats:
+    names = ("xp", "yp") if "xp" in camera.names else ("cx", "cy")
+    return np.array([camera.parameters.get(name, 0.0) for name in names])
+
+
+def _is_backward(camera: Camera) -> bool:
+    return camera.direction == "backward"
+
+
+def _is_fisheye(camera: Camera) -> bool:
+    return "fisheye" in camera.model.lower()
