@@ -63,6 +63,18 @@ pub trait CameraModel: Copy {
     /// The unit direction in the photo's axes, in front of the camera, of an image position; None where no direction has it.
     fn direction(&self, xy: [f64; 2]) -> Option<Vector3>;
 
+    /// Whether a camera looks to where u is: in front of it, but for those that see more than half of the sphere.
+    #[inline]
+    fn faces(&self, u: &Vector3) -> bool {
+        u.z <= 0.0
+    }
+
+    /// Whether u, or what was measured of it, lies beyond where the radial part of the lens is one-to-one: its image is that of another
+    /// direction, too.
+    fn folds(&self, _u: &Vector3, _measured: [f64; 2]) -> bool {
+        false
+    }
+
     /// What a measured position is corrected to; None of a forward camera.
     fn correction(&self, _measured: [f64; 2]) -> Option<[f64; 2]> {
         None
@@ -290,6 +302,16 @@ impl Camera {
     /// See [`CameraModel::direction`].
     pub fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
         each_camera!(self, camera => camera.direction(xy))
+    }
+
+    /// See [`CameraModel::faces`].
+    pub fn faces(&self, u: &Vector3) -> bool {
+        each_camera!(self, camera => camera.faces(u))
+    }
+
+    /// See [`CameraModel::folds`].
+    pub fn folds(&self, u: &Vector3, measured: [f64; 2]) -> bool {
+        each_camera!(self, camera => camera.folds(u, measured))
     }
 
     /// See [`CameraModel::correction`].
