@@ -11,7 +11,7 @@ use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{self, Bal, ObjectSpace, Perspective, PoseNumbers};
 use photocore::network::observations::Distance;
 use photocore::network::{
-    Camera, Combination, Image, Network, NetworkError, Options, Photo, Point, Solution,
+    Camera, Combination, Image, Network, NetworkError, Options, Photo, Point, PosePart, Solution,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -380,11 +380,52 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
             network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
         }
     }
-    let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1] };
+    let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1], ..Combination::default() };
     assert_eq!(adjust(&network, TIGHT).unwrap_err(), NetworkError::Undetermined(vec![combination]));
     // A weight is enough.
     network.cameras[1].sd = vec![0.1];
     let solution = adjust(&network, TIGHT).unwrap();
     assert!((solution.cameras[1].cofactors[0].sqrt() - 0.1).abs() < 1e-9);
     assert!(solution.cameras[1].redundancy[0].abs() < 1e-8);
+}
+
+/// The same with poses in angles: what takes part is named.
+#[test]
+fn what_is_not_determined_is_named_by_parameters_and_parts_of_poses() {
+    let sense = RotationSense::GroundToPhoto;
+    let places: Vec<[f64; 3]> = (0..9).map(|k| [(k % 3) as f64, (k / 3) as f64, 0.0]).collect();
+    let lens = geometry::Camera::named("radial", &[1000.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
+    let network = |free: &[usize]| {
+        let sd = (0..5).map(|k| if free.contains(&k) { FREE } else { 0.0 }).collect();
+        let mut network = Network {
+            space: ObjectSpace::Rectangular,
+            poses: PoseNumbers::Angles(sense),
+            refraction: None,
+            cameras: vec![Camera { camera: lens, sd }],
+            photos: vec![],
+            points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
+            images: vec![],
+            observations: vec![],
+        };
+        for (photo, [x, y]) in [[0.5, 1.0], [1.0, 1.2], [1.5, 0.8]].into_iter().enumerate() {
+            let pose = [x, y, 10.0, 0.0, 0.0, 0.0];
+            network.photos.push(Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 });
+            for (point, place) in places.iter().enumerate() {
+                let xy = lens.image(&[place[0] - x, place[1] - y, -10.0].into());
+                network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
+            }
+        }
+        network
+    };
+    let combinations = |free: &[usize]| match adjust(&network(free), TIGHT) {
+        Err(NetworkError::Undetermined(found)) => found,
+        other => panic!("{:?}", other.map(|solution| solution.degrees_of_freedom)),
+    };
+    let [found] = &combinations(&[0])[..] else { panic!("one combination") };
+    assert_eq!((&found.parameters[..], &found.poses[..]), (&[(0, 0)][..], &[PosePart::Along][..]));
+    // The principal point and the positions across, x and y.
+    let found = combinations(&[1, 2]);
+    let parameters: Vec<_> = found.iter().flat_map(|one| one.parameters.clone()).collect();
+    assert_eq!(parameters, [(0, 1), (0, 2)]);
+    assert!(found.iter().all(|one| one.poses == [PosePart::Across]), "{found:?}");
 }

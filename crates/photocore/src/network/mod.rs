@@ -55,6 +55,7 @@ mod cameras;
 mod datum;
 mod error;
 mod model;
+mod naming;
 mod neighbourhood;
 pub mod observations;
 mod precision;
@@ -75,6 +76,7 @@ use crate::normals::Ordering;
 pub use cameras::AdjustedCamera;
 pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError};
+pub use naming::PosePart;
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub use screening::{Dropped, Reason};
@@ -276,7 +278,8 @@ impl Network {
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
             let adjusted = adjustment::adjust(problem, &own, pool, watch);
-            let mut adjusted = adjusted.map_err(|error| NetworkError::new(error, &assembled))?;
+            let named = |error| self.name(NetworkError::new(error, &assembled), &assembled, pool);
+            let mut adjusted = adjusted.map_err(named)?;
             let earlier = before.take();
             adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
             if adjusted.collapsed.is_empty() {
