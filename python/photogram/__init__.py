@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.first_values import FirstValues, first_values
+    from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
@@ -31,6 +33,7 @@ __all__ = [
     "Attitudes",
     "Block",
     "Camera",
+    "FirstValues",
     "InputError",
     "Iteration",
     "Message",
@@ -48,6 +51,8 @@ __all__ = [
     "Spheroid",
     "__version__",
     "adjust",
+    "first_values",
+    "hints",
     "orient",
     "plan",
     "predict",
@@ -61,6 +66,7 @@ _HOMES = {
     "Attitudes": "network.attitudes",
     "Block": "network.block",
     "Camera": "network.cameras",
+    "FirstValues": "adjustment.first_values",
     "InputError": "errors",
     "Iteration": "results.iteration",
     "Message": "messages",
@@ -78,6 +84,8 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "first_values": "adjustment.first_values",
+    "hints": "adjustment.hints",
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",

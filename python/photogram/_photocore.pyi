@@ -16,8 +16,8 @@ _Indices = NDArray[np.int64]
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
-CombinationRow = tuple[list[int], list[int], list[tuple[int, int]], list[str]]
-"""Photos; cameras that several of them share; cameras with parameters that take a notable part; parts of
+CombinationRow = tuple[list[int], list[int], list[int], list[tuple[int, int]], list[str]]
+"""Photos; cameras that several of them share; common unknowns; cameras with parameters that take a notable part; parts of
 poses that do: positions `along` and `across` the directions of view, `tilt`, `swing` about these."""
 
 FailureRow = tuple[str, str, list[CombinationRow], list[int]]
@@ -403,6 +403,60 @@ class BlockError(Exception):
     one), points a list of point indices.
     """
 
+def find_first_values(
+    photo_positions: _Floats,
+    photo_attitudes: _Floats,
+    observed_positions: _Floats,
+    observed_attitudes: _Floats,
+    point_positions: _Floats,
+    point_sd: _Floats,
+    image_photos: _Indices,
+    image_points: _Indices,
+    directions: _Floats,
+    direction_sd: _Floats,
+    *,
+    threads: int,
+) -> tuple[
+    _Floats,
+    _Floats,
+    list[tuple[str, int, int]],
+    _Floats,
+    NDArray[np.bool_],
+    int | None,
+    float | None,
+]:
+    """Find poses of photos from what is known, in cartesian object space (`docs/first-values.md`).
+
+    Parameters
+    ----------
+    photo_positions, photo_attitudes
+        (P, 3) and (P, 3, 3), photo to object: given poses; NaN where none is.
+    observed_positions, observed_attitudes
+        The same as observed; NaN where they were not.
+    point_positions, point_sd
+        (n, 3) control in the linear unit, and its standard deviations; infinite where it is not held.
+    image_photos, image_points
+        (m,) indices into photos and points.
+    directions, direction_sd
+        (m, 3) unit directions in the axes of the photos, not finite where there is none, and (m,) their
+        standard deviations in radians.
+    threads
+        As for `adjust_block`.
+
+    Returns
+    -------
+    (P, 3) positions and (P, 3, 3) attitudes, NaN where none was found; for each photo (`given`, `resected`,
+    `observed` or `oriented`, 0, 0), or why it has none: (`points`, known points, 0), (`misfit`, known points,
+    0) or (`apart`, what its model has in common, photos of the model); (n, 3) positions of points; (m,)
+    whether an image was set aside; the photo that is the datum, if nothing else is; the median of the angles
+    between observed and computed directions, radians.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape or length, an index out of range; the message names it.
+    """
+
 def adjust_block(
     photo_positions: _Floats,
     photo_attitudes: _Floats,
@@ -419,7 +473,9 @@ def adjust_block(
     image_xy: _Floats,
     image_sd: _Floats,
     *,
-    observation_groups: list[tuple[str, _Indices, _Floats, _Floats]],
+    observation_groups: list[tuple[str, _Indices, _Indices, _Indices, _Floats, _Floats]],
+    unknowns: list[tuple[str, list[float], list[float], list[float]]],
+    mounts: list[tuple[int, int, int]],
     spheroid: tuple[float, float] | None,
     photo_to_ground: bool,
     refraction: RefractionRow | None,
@@ -458,12 +514,20 @@ def adjust_block(
     image_xy, image_sd
         (m, 2) millimetres.
     observation_groups
-        Observations beside images, each kind with its name, (k, p) indices of points or photos, (k, v) values
-        and (k, r, r) covariance matrices of its r components. Values: `distance` the length, `equal height`
-        the difference, `difference` three components (NaN where not observed), `control` three coordinates,
-        `position` three coordinates and the lever arm, `attitude` two matrices row by row (body to object,
-        body to photo), `relative` a translation and a matrix. Lengths in the unit of the object space, angles
-        in radians.
+        Observations beside images, each kind with its name, (k, p) indices of points, (k, q) of photos and
+        (k, c) of common unknowns (-1 for none), (k, v) values and (k, r, r) covariance matrices of its r
+        components. Values: `distance` the length (unknown: instrument), `equal height` the difference,
+        `difference` three components (NaN where not observed), `control` three coordinates, `on level` the
+        height above it, `on plane` the distance from it, `on plumb line` and `on line` none, `position` three
+        coordinates, the lever arm where it is known and the time (unknowns: lever arm, shift, drift),
+        `attitude` two matrices row by row (body to object; body to photo where that is known; unknown:
+        boresight), `relative` a translation and a matrix, `base` the length (two sensors, -1 for the frame),
+        `prior` none. Lengths in the unit of the object space, angles in radians, times in seconds.
+    unknowns
+        Common unknowns: type (see `UNKNOWNS`), position, rotation matrix row by row, standard deviations.
+    mounts
+        Photos on frames: index of the photo, of the photo that stands for the frame, and of the sensor among
+        the common unknowns.
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
@@ -639,6 +703,20 @@ class BlockSolution(_NetworkSolution):
         """Photos and their unknowns (0 to 5) held to give a datum.
 
         Empty where observations and weights give one.
+        """
+
+    @property
+    def weak_unknowns(self) -> list[tuple[int, int]]:
+        """The same for common unknowns: unknowns and their components."""
+
+    @property
+    def adjusted_unknowns(
+        self,
+    ) -> list[tuple[list[float], list[float], list[float], list[float], list[float], int]]:
+        """The adjusted common unknowns, in the order in which they were given.
+
+        Change from what was given, position (3), rotation matrix row by row (9), cofactors row by row for
+        rotations about the adjusted axes, redundancy numbers, and the number of observations and images.
         """
 
     @property
@@ -1392,6 +1470,10 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     -------
     (k,) numbers, and whether they are the whole text.
     """
+
+UNKNOWNS: list[tuple[str, list[tuple[str, str]]]]
+"""Types of common unknowns: name, and for each unknown its name and whether it is a `length`, a `speed`, an
+`angle` or a `ratio`."""
 
 CAMERAS: list[str]
 """What the models of cameras are called."""

@@ -69,6 +69,8 @@ fn around() -> Network {
         points,
         images,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 

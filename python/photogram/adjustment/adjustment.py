@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.ends import behind, datum, rounded, too_coarse, undetermined
+from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.undetermined import undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
@@ -21,6 +22,7 @@ from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
 from photogram.network.observations import observation_rows
 from photogram.network.refracted import check_cameras, remarks
+from photogram.network.rigs import mount_rows
 from photogram.results.iteration import Iteration
 from photogram.results.result import Result
 
@@ -166,7 +168,8 @@ def adjust(
             photo_positions_observed=None,
             photo_attitudes_observed=None,
         )
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids)
+    unknowns = block.unknowns
+    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, unknowns)
     cameras, photo_cameras = block.core_cameras()
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
 
@@ -187,6 +190,8 @@ def adjust(
             block.image_xy,
             block.image_sd,
             observation_groups=[group for _, group in groups],
+            unknowns=[each.row() for each in unknowns],
+            mounts=mount_rows(block.mounts, block.photo_ids, unknowns),
             spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
             photo_to_ground=block.photo_to_ground,
             refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
@@ -202,9 +207,9 @@ def adjust(
             progress=None if progress is None else teller(progress),
         )
     except _photocore.BlockError as error:
-        raise _named(block, *error.args) from None
+        raise hinted(_named(block, *error.args), block) from None
     with turned("the adjusted block"):
-        return _result(block, solution, unit_variance, row, as_published)
+        return with_hints(_result(block, solution, unit_variance, row, as_published))
 
 
 def _fits_anywhere(block: Block) -> bool:
@@ -287,7 +292,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     messages += behind(block, solution)
     messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
     dropped = {block.point_ids[point] for point, _ in solution.dropped}
-    lost = [each.name for each in block.observations if not each.OF_PHOTOS and dropped.intersection(each.of)]
+    lost = [each.name for each in block.observations if dropped.intersection(each.points)]
     if lost:
         messages.append(Message(f"left out with their points: {listed(lost)}"))
     messages = datum(block, solution) + messages

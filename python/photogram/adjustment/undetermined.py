@@ -28,17 +28,20 @@ _PARTS = {
 
 def undetermined_combinations(block: Block, combinations: list[_photocore.CombinationRow]) -> RankError:
     """Name the photos, points and cameras of undetermined combinations, and what they are."""
-    rows = [(tuple(of), tuple(by), tuple(moved), tuple(poses)) for of, by, moved, poses in combinations]
+    rows = [
+        (tuple(of), tuple(by), tuple(others), tuple(moved), tuple(poses))
+        for of, by, others, moved, poses in combinations
+    ]
     concerned = sorted({photo for of, *_ in rows for photo in of})
     names = [block.photo_ids[photo] for photo in concerned]
-    cameras = {camera for _, by, moved, _ in rows for camera in (*by, *(each for each, _ in moved))}
+    cameras = {camera for _, by, _, moved, _ in rows for camera in (*by, *(each for each, _ in moved))}
     camera_names = [block.camera_names[row] for row in sorted(cameras)]
     points = np.unique(block.image_points[np.isin(block.image_photos, concerned)])
     point_names = [block.point_ids[point] for point in points]
     lines = [f"the observations leave {len(rows)} combinations of unknowns undetermined:"]
     for each in sorted(set(rows)):
-        of, by, moved, poses = each
-        lines.append(f"  {rows.count(each)} moving {_moved(block, of, by)}")
+        of, by, others, moved, poses = each
+        lines.append(f"  {rows.count(each)} moving {_moved(block, of, by, others)}")
         if moved:
             lines.append(f"    {_said(block, moved, poses)}")
     if not np.isfinite(block.point_sd).any():
@@ -52,11 +55,13 @@ def undetermined_combinations(block: Block, combinations: list[_photocore.Combin
     return RankError("\n".join(lines), names, point_names, camera_names)
 
 
-def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...]) -> str:
-    """Say which photos and cameras a combination moves."""
+def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: tuple[int, ...]) -> str:
+    """Say which photos, cameras and common unknowns a combination moves."""
     of_cameras = listed([block.camera_names[camera] for camera in cameras])
+    others = listed([block.unknowns[row].title for row in unknowns])
     if not photos:
-        return f"the parameters of {of_cameras}"
+        parts = [f"the parameters of {of_cameras}"] if cameras else []
+        return " and ".join([*parts, *([others] if unknowns else [])])
     on = np.unique(block.image_points[np.isin(block.image_photos, photos)])
     moved = (
         f"all {len(photos)} photos together"
@@ -65,6 +70,8 @@ def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...]) -> s
     )
     if cameras:
         moved += f" with the parameters of {of_cameras}"
+    if unknowns:
+        moved += f" with {others}"
     held = f"hold the points {listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
     return f"{moved}, which {held}"
 

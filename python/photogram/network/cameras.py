@@ -16,7 +16,7 @@ from photogram.arguments.arrays import number, one_of, shaped, shown, text
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 
-__all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "checked_cameras", "photo_indices"]
+__all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "checked_cameras", "images_of", "photo_indices"]
 
 ImageUnit = Literal["mm", "px"]
 """What image coordinates are measured in."""
@@ -289,6 +289,25 @@ def _index(each: object, count: int) -> int | None:
     if isinstance(each, bool | np.bool_) or not isinstance(each, int | np.integer):
         return None
     return int(each) if 0 <= each < count else None
+
+
+def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> Floats:
+    """Return (m, 2) the images of directions, each by its camera.
+
+    Parameters
+    ----------
+    cameras
+        The cameras.
+    which
+        (m,) the index of each direction's camera.
+    directions
+        (m, 3) as for :meth:`Camera.project`.
+    """
+    images = np.full((len(directions), 2), np.nan)
+    for row, camera in enumerate(cameras):
+        own = which == row
+        images[own] = camera.project(directions[own])
+    return images
 
 
 def camera_rows(cameras: Sequence[Camera]) -> list[CameraRow]:

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.block import Block
-from photogram.network.cameras import Camera, checked_cameras
+from photogram.network.cameras import Camera, checked_cameras, images_of
 
 __all__ = ["photographed"]
 
@@ -50,7 +49,10 @@ def photographed(
     of_images = photo_cameras[truth.image_photos]
     directions = np.column_stack([truth.image_xy, np.full(len(truth.image_xy), distance)])
     # The camera looks along -z, whatever the sign of the principal distance.
-    images = _images(true, of_images, -np.sign(distance) * directions)
+    images = images_of(true, of_images, -np.sign(distance) * directions)
+    if not np.isfinite(images).all():
+        name = true[of_images[np.flatnonzero(~np.isfinite(images).all(axis=1))[0]]].title
+        raise InputError(f"the camera {name} has no image of some points: they are beyond its lens terms")
     larger = np.array([each.scale for each in true])[of_images, np.newaxis] / abs(distance)
     changes = {
         "principal_distances": None,
@@ -61,15 +63,3 @@ def photographed(
         truth.replace(**changes, cameras=true, image_xy=images),
         block.replace(**changes, cameras=start, image_xy=images + larger * (block.image_xy - truth.image_xy)),
     )
-
-
-def _images(cameras: Sequence[Camera], of_images: Indices, directions: Floats) -> Floats:
-    """Return (m, 2) the images of directions, (m, 3), each by its camera."""
-    images = np.full((len(directions), 2), np.nan)
-    for number, camera in enumerate(cameras):
-        own = of_images == number
-        images[own] = camera.project(directions[own])
-    if not np.isfinite(images).all():
-        name = cameras[of_images[np.flatnonzero(~np.isfinite(images).all(axis=1))[0]]].title
-        raise InputError(f"the camera {name} has no image of some points: they are beyond its lens terms")
-    return images

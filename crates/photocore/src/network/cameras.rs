@@ -1,13 +1,12 @@
 //! Cameras whose parameters are unknown: those of one photo are unknowns of that, those of several are blocks of their own.
 
-use std::ops::Range;
-
-use super::model::Bundle;
+use super::model::{Bundle, Station};
 use super::precision::median;
 use super::problem::Assembled;
-use super::{AdjustedPhoto, Network};
+use super::{AdjustedPhoto, Image, Network};
 use crate::adjustment::{Adjustment, Model};
-use crate::normals::GroupRows;
+use crate::geometry::camera::each_camera;
+use crate::geometry::{CameraModel, Vector3};
 
 /// An adjusted camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,10 +27,12 @@ pub struct AdjustedCamera {
 }
 
 impl Network {
-    /// The cameras with unknown parameters that several photos share, ascending.
+    /// The cameras with unknown parameters that several photos share, or one on a frame has, ascending.
     pub(super) fn shared_cameras(&self) -> Vec<usize> {
         let mut photos = vec![0; self.cameras.len()];
         self.photos.iter().for_each(|photo| photos[photo.camera] += 1);
+        // A photo on a frame has no unknowns of its own.
+        self.mounts.iter().for_each(|mount| photos[self.photos[mount.photo].camera] += 1);
         (0..photos.len()).filter(|&camera| photos[camera] > 1 && !self.cameras[camera].is_held()).collect()
     }
 
@@ -70,12 +71,8 @@ impl Network {
                 camera.take_over(photo);
             }
         }
-        let mut start = (0..model.cameras.len()).map(|photo| model.of_block(photo).len().pow(2)).sum();
         for (shared, &index) in model.shared.iter().enumerate() {
-            let range = model.of_block(model.cameras.len() + shared);
-            let count = range.len().pow(2);
-            cameras[index].take_block(range, start..start + count, adjustment, unknowns);
-            start += count;
+            cameras[index].take_block(model, model.cameras.len() + shared, adjustment, unknowns);
         }
         cameras
     }
@@ -93,38 +90,37 @@ impl Network {
             camera.information = given.sd.iter().map(weight).collect();
         }
         let stations = model.prepare(unknowns);
-        let (mut constant, mut local) = ([0.0; 2], [0.0; 6]);
-        let (mut kept, mut common) = (Vec::new(), Vec::new());
         for point in 0..model.points.len() {
             for index in model.start[point]..model.start[point + 1] {
                 let image = &model.images[index];
-                let camera = self.photos[image.photo].camera;
-                let given = &self.cameras[camera];
-                if given.is_held() {
+                let number = self.photos[image.photo].camera;
+                if self.cameras[number].is_held() {
                     continue;
                 }
-                let own = model.of_block(image.photo).len();
-                kept.resize(2 * own, 0.0);
-                common.resize(if own > 6 { 0 } else { 2 * given.sd.len() }, 0.0);
-                let (kept, common) = (kept.as_mut_slice(), common.as_mut_slice());
-                let mut rows = GroupRows {
-                    constant: &mut constant,
-                    local: &mut local,
-                    kept: &mut *kept,
-                    common: &mut *common,
-                };
-                model.observe(&stations, point, index, &mut rows);
+                let Station { orientation, camera } = &stations.photos[image.photo];
+                let u = orientation.sight(&stations.points[point]);
                 let weight = adjustment.weights.as_ref().map_or(1.0, |weights| weights[index]);
-                for row in 0..2 {
-                    let partials = if own > 6 {
-                        &kept[row * own + 6..(row + 1) * own]
-                    } else {
-                        &common[row * given.sd.len()..(row + 1) * given.sd.len()]
-                    };
-                    for (k, partial) in partials.iter().enumerate().filter(|&(k, _)| given.sd[k] > 0.0) {
-                        cameras[camera].information[k] += weight * (partial / image.sd[row]).powi(2);
-                    }
-                }
+                let (sd, sums) = (&self.cameras[number].sd, &mut cameras[number].information);
+                each_camera!(camera, camera => add_squares(camera, &u, image, weight, sd, sums));
+            }
+        }
+    }
+}
+
+/// Adds the squares of the partials of an image, straight as its ray is, by the parameters of its camera that are not held.
+fn add_squares<C: CameraModel>(
+    camera: &C,
+    u: &Vector3,
+    image: &Image,
+    weight: f64,
+    sd: &[f64],
+    sums: &mut [f64],
+) {
+    let (_, computed) = camera.compare(u, image.xy);
+    for (partials, image_sd) in computed.by_parameters.iter().zip(image.sd) {
+        for ((sum, partial), sd) in sums.iter_mut().zip(partials.as_ref()).zip(sd) {
+            if *sd > 0.0 {
+                *sum += weight * (partial / image_sd).powi(2);
             }
         }
     }
@@ -137,11 +133,30 @@ impl Bundle {
         for (place, block) in photos.iter().zip(&self.camera_block) {
             block.iter().for_each(|block| of_cameras[block - self.cameras.len()].push(*place));
         }
-        let middle = |places: Vec<[f64; 3]>| {
-            [0, 1, 2].map(|k| median(places.iter().map(|place| place[k]).collect()).unwrap_or_default())
-        };
-        of_cameras.into_iter().map(middle).collect()
+        of_cameras.into_iter().map(|places| middle(&places)).collect()
     }
+
+    /// The places of the common unknowns that have blocks: the medians of those of the photos and points that they belong to; `tied`
+    /// are those of the points that are not local.
+    pub(super) fn places_of_commons(&self, photos: &[[f64; 3]], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let mut of_commons: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.commons.len()];
+        for mount in self.mounts.iter().flatten() {
+            of_commons[mount.sensor].push(photos[mount.photo]);
+        }
+        for touches in self.observations.iter().map(|tied| &tied.touches) {
+            let points = touches.points.iter().map(|&point| tied[point - self.locals]);
+            let places: Vec<[f64; 3]> =
+                points.chain(touches.photos.iter().map(|&photo| photos[photo])).collect();
+            touches.commons.iter().for_each(|&(common, _)| of_commons[common].extend(&places));
+        }
+        let own = of_commons.iter().zip(&self.common_block).filter(|(_, block)| block.is_some());
+        own.map(|(places, _)| middle(places)).collect()
+    }
+}
+
+/// The medians of coordinates.
+fn middle(places: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|k| median(places.iter().map(|place| place[k]).collect()).unwrap_or_default())
 }
 
 impl AdjustedCamera {
@@ -154,17 +169,12 @@ impl AdjustedCamera {
             photo.cofactors.chunks_exact(width).skip(6).flat_map(|row| &row[6..]).copied().collect();
     }
 
-    /// Takes what was found of a kept block of its own, known by its unknowns and their cofactors among those of all kept blocks.
-    fn take_block(
-        &mut self,
-        own: Range<usize>,
-        cofactors: Range<usize>,
-        adjustment: &Adjustment,
-        unknowns: &[f64],
-    ) {
+    /// Takes what was found of a kept block of its own.
+    fn take_block(&mut self, model: &Bundle, block: usize, adjustment: &Adjustment, unknowns: &[f64]) {
+        let own = model.of_block(block);
         self.parameters = unknowns[own.clone()].to_vec();
         if let Some(all) = &adjustment.cofactors {
-            self.cofactors = all.kept[cofactors].to_vec();
+            self.cofactors = model.cofactors_of_block(all, block).to_vec();
         }
         if let Some(all) = &adjustment.prior_redundancy {
             self.redundancy = all[own].to_vec();

@@ -40,6 +40,8 @@
 //!     points: corners.map(|coordinates| Point { coordinates, sd: [0.02; 3] }).to_vec(),
 //!     images,
 //!     observations: vec![],
+//!     commons: vec![],
+//!     mounts: vec![],
 //! };
 //! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
 //! let solution = network.adjust(&Options::default(), &pool, &mut |_| ControlFlow::Continue(()))?;
@@ -52,9 +54,11 @@
 //! ```
 
 mod cameras;
+pub mod commons;
 mod datum;
 mod error;
 mod model;
+mod mounts;
 mod naming;
 mod neighbourhood;
 pub mod observations;
@@ -74,13 +78,17 @@ use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
 pub use cameras::AdjustedCamera;
+pub use commons::{AdjustedCommon, Common, CommonKind};
 pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError};
+pub use mounts::Mount;
 pub use naming::PosePart;
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
+pub(crate) use precision::median;
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+pub(crate) use start::meet;
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
@@ -165,6 +173,10 @@ pub struct Network {
     pub images: Vec<Image>,
     /// What else was observed.
     pub observations: Vec<Observation>,
+    /// Unknowns that observations, and the photos of rigs, have in common.
+    pub commons: Vec<Common>,
+    /// Which photos are on a frame with others.
+    pub mounts: Vec<Mount>,
 }
 
 /// What the variance of unit weight is based on (GIANT guide, Appendix E).
@@ -340,8 +352,14 @@ impl Network {
                 return Err(NetworkError::CameraConstant { camera: index, parameter: known[free].0 });
             }
         }
+        for (index, common) in self.commons.iter().enumerate() {
+            if common.sd.len() != common.kind.unknowns().len() {
+                return Err(NetworkError::CommonDeviations(index));
+            }
+        }
+        self.check_mounts()?;
         for (index, observation) in self.observations.iter().enumerate() {
-            let checked = observation.check(self.points.len(), self.photos.len());
+            let checked = observation.check(self.points.len(), self.photos.len(), &self.commons);
             checked.map_err(|fault| NetworkError::Observation { index, kind: observation.kind(), fault })?;
         }
         let cartesian = self.space == ObjectSpace::Rectangular && self.refraction.is_none();

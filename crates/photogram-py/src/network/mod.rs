@@ -2,6 +2,7 @@
 
 mod block;
 mod collection;
+mod first_values;
 mod solution;
 
 use numpy::PyReadonlyArrayDyn;
@@ -34,6 +35,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("CollectionError", module.py().get_type::<CollectionError>())?;
     block::register(module)?;
     collection::register(module)?;
+    first_values::register(module)?;
     solution::register(module)
 }
 
@@ -75,8 +77,8 @@ fn adjusted(
     watched(py, workers, progress, |pool, watch| network.adjust(options, pool, watch))
 }
 
-/// What an undetermined combination moves: photos, cameras, parameters of cameras, parts of poses.
-type CombinationRow = (Vec<usize>, Vec<usize>, Vec<(usize, usize)>, Vec<&'static str>);
+/// What an undetermined combination moves: photos, cameras, common unknowns, parameters of cameras, parts of poses.
+type CombinationRow = (Vec<usize>, Vec<usize>, Vec<usize>, Vec<(usize, usize)>, Vec<&'static str>);
 
 /// Kind, message, and what is concerned: combinations or, where there are none, photos in one; points.
 type FailureRow = (&'static str, String, Vec<CombinationRow>, Vec<usize>);
@@ -99,6 +101,8 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
+        | Failure::CommonDeviations(_)
+        | Failure::Mount(_)
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
@@ -110,8 +114,8 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
 }
 
 fn combination_row(combination: &Combination) -> CombinationRow {
-    let Combination { photos, cameras, parameters, poses } = combination.clone();
-    (photos, cameras, parameters, poses.into_iter().map(PosePart::name).collect())
+    let Combination { photos, cameras, commons, parameters, poses } = combination.clone();
+    (photos, cameras, commons, parameters, poses.into_iter().map(PosePart::name).collect())
 }
 
 /// What went wrong, in terms of what was given: a block or a collection.
