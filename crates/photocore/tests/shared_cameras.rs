@@ -8,10 +8,10 @@ use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
 use num_complex::Complex64 as C;
 use photocore::adjustment::{self, Method, Status, Stop};
-use photocore::geometry::{self, Bal, ObjectSpace, Perspective, PoseNumbers};
+use photocore::geometry::{self, Bal, ObjectSpace, Perspective, PoseNumbers, RotationSense};
 use photocore::network::observations::Distance;
 use photocore::network::{
-    Camera, Combination, Image, Network, NetworkError, Options, Photo, Point, PosePart, Solution,
+    Camera, Combination, Image, Network, NetworkError, Of, Options, Photo, Point, PosePart, Solution,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -157,11 +157,14 @@ fn network() -> Network {
     }
 }
 
+fn options(method: Method) -> Options {
+    let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
+    Options { adjustment, ..Options::default() }
+}
+
 fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
     let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
-    let options = Options { adjustment, ..Options::default() };
-    network.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
+    network.adjust(&options(method), &pool, &mut |_| ControlFlow::Continue(()))
 }
 
 /// The same network with full matrices: poses, parameters of all cameras, points; those that are fixed have an equation of their own.
@@ -339,6 +342,92 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
     assert!((solution.sums_of_squares.total() - total).abs() < 1e-9 * total);
 }
 
+/// Everything with everything, and a part of it with another, from where the adjustment ended.
+#[test]
+fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
+    let network = network();
+    let options = options(TIGHT);
+    let mut go = |_| ControlFlow::Continue(());
+    let in_threads = |threads: usize| ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let pool = in_threads(2);
+    let solution = network.adjust(&options, &pool, &mut go).unwrap();
+    let dense = Dense::new(&network);
+    let (_, q) = dense.adjust();
+    let (_, sd) = dense.observed();
+    let photos = (0..PHOTOS).map(Of::Photo);
+    let of: Vec<Of> = (0..POINTS).map(Of::Point).rev().chain(photos).chain((0..5).map(Of::Camera)).collect();
+    let unknowns = |of: &[Of]| -> Vec<usize> {
+        let own = |of: &Of| match *of {
+            Of::Photo(photo) | Of::PhotoStep(photo) => 6 * photo..6 * photo + 6,
+            Of::Point(point) => dense.point(point),
+            Of::Camera(camera) => dense.camera(camera),
+        };
+        of.iter().flat_map(own).collect()
+    };
+    let covariances = network.covariances(&options, &solution.state, None, &pool, &mut go).unwrap();
+    let all = covariances.cofactors(&of, None, &pool, &mut go).unwrap();
+    let compare = |found: &[f64], rows: &[usize], columns: &[usize]| {
+        assert_eq!(found.len(), rows.len() * columns.len());
+        for (k, value) in found.iter().enumerate() {
+            let (i, j) = (rows[k / columns.len()], columns[k % columns.len()]);
+            let expected = if sd[i] == 0.0 || sd[j] == 0.0 { 0.0 } else { q[(i, j)] };
+            let scale = (q[(i, i)] * q[(j, j)]).sqrt();
+            assert!((value - expected).abs() <= 1e-8 * scale, "{i} {j}: {value:e} {expected:e}");
+        }
+    };
+    compare(&all, &unknowns(&of), &unknowns(&of));
+    // The same bits with any number of threads.
+    let one = in_threads(1);
+    let again = network.covariances(&options, &solution.state, None, &one, &mut go).unwrap();
+    let again = again.cofactors(&of, None, &one, &mut go).unwrap();
+    assert!(all.iter().zip(&again).all(|(a, b)| a.to_bits() == b.to_bits()));
+    // A camera with everything, everything with a camera, a few points with others.
+    for (rows, columns) in [
+        (vec![Of::Camera(0)], of.clone()),
+        (of.clone(), vec![Of::Camera(1)]),
+        (vec![Of::Point(4), Of::Point(30)], vec![Of::Point(30), Of::Photo(7), Of::Point(5)]),
+    ] {
+        let found = covariances.cofactors(&rows, Some(&columns), &pool, &mut go).unwrap();
+        compare(&found, &unknowns(&rows), &unknowns(&columns));
+    }
+    // A distance, as a function.
+    let ends = [Of::Point(3), Of::Point(22)];
+    let [p, r] = [3, 22].map(|point| solution.points[point].unwrap().coordinates);
+    let length = (0..3).map(|k| (r[k] - p[k]).powi(2)).sum::<f64>().sqrt();
+    let direction: Vec<f64> = (0..3).map(|k| (r[k] - p[k]) / length).collect();
+    let partials: Vec<f64> = direction.iter().map(|d| -d).chain(direction.iter().copied()).collect();
+    let found = covariances.propagate(&partials, &ends, &pool, &mut go).unwrap();
+    let places = unknowns(&ends);
+    let pairs = (0..6).flat_map(|i| (0..6).map(move |j| (i, j)));
+    let expected: f64 = pairs.map(|(i, j)| partials[i] * q[(places[i], places[j])] * partials[j]).sum();
+    assert!((found[0] / expected - 1.0).abs() < 1e-8, "{} {expected}", found[0]);
+}
+
+#[test]
+fn what_has_no_cofactors_is_refused() {
+    let network = network();
+    let mut go = |_| ControlFlow::Continue(());
+    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let options = Options { memory: Some(1 << 30), ..options(TIGHT) };
+    let solution = network.adjust(&options, &pool, &mut go).unwrap();
+    let covariances = network.covariances(&options, &solution.state, None, &pool, &mut go).unwrap();
+    let mut refused = |of: Of| covariances.cofactors(&[of], None, &pool, &mut go).unwrap_err();
+    assert_eq!(refused(Of::Photo(PHOTOS)), NetworkError::NoPhoto(PHOTOS));
+    assert_eq!(refused(Of::Point(POINTS)), NetworkError::NoPoint(POINTS));
+    assert_eq!(refused(Of::Camera(5)), NetworkError::CameraIndex(5));
+    let partials = covariances.propagate(&[1.0; 4], &[Of::Point(0)], &pool, &mut go).unwrap_err();
+    assert_eq!(partials, NetworkError::Partials { unknowns: 3, numbers: 4 });
+    let many = vec![Of::Point(0); 4000];
+    let too_many = covariances.cofactors(&many, None, &pool, &mut go).unwrap_err();
+    assert!(matches!(too_many, NetworkError::Memory { needed, .. } if needed > 8 * 12_000 * 12_000));
+    let stopped = covariances.cofactors(&[Of::Point(0)], None, &pool, &mut |_| ControlFlow::Break(()));
+    assert_eq!(stopped.unwrap_err(), NetworkError::Interrupted);
+    let mut other = solution.state;
+    other.unknowns.pop();
+    let found = network.covariances(&options, &other, None, &pool, &mut go).err();
+    assert_eq!(found, Some(NetworkError::State));
+}
+
 /// Without control: what the datum holds are photos, and redundancy numbers add up to the degrees of freedom.
 #[test]
 fn redundancy_numbers_of_a_free_network_add_up() {
@@ -410,6 +499,8 @@ fn what_is_not_determined_is_named_by_parameters_and_parts_of_poses() {
             points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
             images: vec![],
             observations: vec![],
+            commons: vec![],
+            mounts: vec![],
         };
         for (photo, [x, y]) in [[0.5, 1.0], [1.0, 1.2], [1.5, 0.8]].into_iter().enumerate() {
             let pose = [x, y, 10.0, 0.0, 0.0, 0.0];

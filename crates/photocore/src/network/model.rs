@@ -625,6 +625,10 @@ impl Model for Bundle {
     }
 
     fn motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        if self.placed { None } else { self.rigid_motions(unknowns) }
+    }
+
+    fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
         self.rigid_motions(unknowns)
     }
 

@@ -16,6 +16,7 @@ use crate::geometry::{
 use crate::normals::{Layout, System, TieRows};
 
 /// A problem, and what its parts are in the network.
+#[derive(Debug)]
 pub(super) struct Assembled {
     pub problem: Problem<Bundle>,
     /// The points that take part, in the order of the model.
@@ -31,6 +32,15 @@ pub(super) struct Reached {
 }
 
 impl Assembled {
+    /// Refuses what takes more memory than it may.
+    pub fn check_memory(&self, options: &Options) -> Result<(), NetworkError> {
+        let needed = self.problem.system.memory();
+        match options.memory {
+            Some(available) if needed > available => Err(NetworkError::Memory { needed, available }),
+            _ => Ok(()),
+        }
+    }
+
     /// Takes over adjusted unknowns; `count` is the number of all points.
     pub fn reached(&self, unknowns: &[f64], count: usize) -> Reached {
         let model = &self.problem.model;

@@ -103,6 +103,12 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::CameraDeviations(_)
         | Failure::CommonDeviations(_)
         | Failure::Mount(_)
+        | Failure::NoPhoto(_)
+        | Failure::NoPoint(_)
+        | Failure::CameraIndex(_)
+        | Failure::LeftOut(_)
+        | Failure::Partials { .. }
+        | Failure::State
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
