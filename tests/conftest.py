@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 from photogram import Block, simulate
 from photogram.cli import app
 
-STRASBOURG = Path(__file__).parents[2] / "shared" / "data" / "strasbourg"
+SHARED = Path(__file__).parents[2] / "shared" / "data"
+STRASBOURG = SHARED / "strasbourg"
 
 
 @pytest.fixture(scope="session")
@@ -20,6 +21,14 @@ def strasbourg() -> Path:
     if not STRASBOURG.is_dir():
         pytest.skip("the Strasbourg block is not there (../shared/data/strasbourg)")
     return STRASBOURG
+
+
+@pytest.fixture(scope="session")
+def roma() -> Path:
+    """Directory of the Roma photos; the test is skipped where it is absent."""
+    if not (SHARED / "roma").is_dir():
+        pytest.skip("the Roma photos are not there (../shared/data/roma)")
+    return SHARED / "roma"
 
 
 @pytest.fixture(scope="session")

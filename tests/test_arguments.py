@@ -26,7 +26,7 @@ PACKAGES = (
     "photogram.stellar",
 )
 MADE_BY_THE_LIBRARY = {
-    "photogram": "Iteration Message Orientation Plan Pose Progress Resection Result Simulation",
+    "photogram": "FirstValues Iteration Message Orientation Plan Pose Progress Resection Result Simulation",
     "photogram.absolute_orientation": "Orientation",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
@@ -125,6 +125,8 @@ def good(tmp_path_factory):
             "Refraction": {"air": "giant", "water": None, "water_level": 0.0, "refractive_index": 1.34},
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},
+            "first_values": {"block": block},
+            "hints": {"block": block},
             "orient": {"stations": stations},
             "plan": {"patterns": {"one": block}},
             "predict": {"block": block},

@@ -69,8 +69,8 @@ SPOILT = {
         replace("photo_positions", lambda a: [[1.0, 2.0], [3.0]]),
         "photo_positions is not an array of numbers",
     ),
-    "photo at NaN": (
-        set_at("photo_positions", (2, 1), math.nan),
+    "photo at infinity": (
+        set_at("photo_positions", (2, 1), math.inf),
         "photo_positions of 0103 is not a finite number",
     ),
     "angle infinite": (

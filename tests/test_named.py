@@ -125,8 +125,8 @@ def test_the_order_of_images_does_not_matter(small_block):
 # Masks and types
 
 ARRAYS = (
-    "photo_positions", "photo_attitudes", "principal_distances", "image_xy", "image_sd", "photo_position_sd",
-    "photo_attitude_sd", "point_sd", "image_photos", "image_points",
+    "principal_distances", "image_xy", "image_sd", "photo_position_sd", "photo_attitude_sd", "point_sd",
+    "image_photos", "image_points",
 )  # fmt: skip
 
 
@@ -144,6 +144,15 @@ def test_masked_coordinates_of_points_are_unknown(bad_block):
     made = Block(**{**bad_block, "point_positions": positions})
     np.testing.assert_array_equal(made.point_positions, bad_block["point_positions"])
     assert not np.ma.isMaskedArray(made.point_positions)
+
+
+def test_masked_poses_are_unknown(bad_block):
+    free = {**bad_block, "photo_position_sd": np.inf, "photo_attitude_sd": np.inf}
+    for name in ("photo_positions", "photo_attitudes"):
+        masked = np.ma.array(bad_block[name])
+        masked[1] = np.ma.masked
+        made = Block(**{**free, name: masked})
+        assert np.isnan(getattr(made, name)).all(axis=1).tolist() == [False, True, False, False, False, False]
 
 
 def test_masks_of_collections_are_not_ignored():

@@ -11,12 +11,15 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.first_values import FirstValues, first_values
+    from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
     from photogram.network.block import Block
+    from photogram.network.cameras import Camera
     from photogram.network.geometry import Spheroid
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
@@ -29,6 +32,8 @@ __all__ = [
     "AsPublished",
     "Attitudes",
     "Block",
+    "Camera",
+    "FirstValues",
     "InputError",
     "Iteration",
     "Message",
@@ -46,6 +51,8 @@ __all__ = [
     "Spheroid",
     "__version__",
     "adjust",
+    "first_values",
+    "hints",
     "orient",
     "plan",
     "predict",
@@ -58,6 +65,8 @@ _HOMES = {
     "AsPublished": "adjustment.adjustment",
     "Attitudes": "network.attitudes",
     "Block": "network.block",
+    "Camera": "network.cameras",
+    "FirstValues": "adjustment.first_values",
     "InputError": "errors",
     "Iteration": "results.iteration",
     "Message": "messages",
@@ -75,6 +84,8 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "first_values": "adjustment.first_values",
+    "hints": "adjustment.hints",
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",

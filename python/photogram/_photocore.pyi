@@ -95,6 +95,64 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     NaN for arguments that cannot be.
     """
 
+def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str]]]:
+    """Return the models of cameras, `CAMERAS`, by their names.
+
+    Returns
+    -------
+    Of each its formula, its parameters with the power of the unit of the image in which they are measured (0
+    for plain numbers), how many of these, the last ones, are constants that are never unknown, and its
+    direction: `forward`, lens terms are functions of ideal coordinates, or `backward`, of measured ones.
+    """
+
+def camera_images(model: str, parameters: _Floats, u: _Floats) -> _Floats:
+    """Images of directions.
+
+    Parameters
+    ----------
+    model
+        One of `CAMERAS`.
+    parameters
+        (k,) in the order of the model.
+    u
+        (n, 3) in the axes of the photo: x right, y up, z back towards the viewer; the camera looks along -z.
+
+    Returns
+    -------
+    (n, 2) in the unit of the camera; not finite where there are none.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, other shapes or numbers of parameters.
+    """
+
+def camera_rays(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
+    """Directions of image positions; arguments as in :func:`camera_images`.
+
+    Returns
+    -------
+    (n, 3) unit vectors in the axes of the photo, in front of it; NaN where no direction has the image.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, other shapes or numbers of parameters.
+    """
+
+def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
+    """Corrected image positions of a backward camera; arguments as in :func:`camera_images`.
+
+    Returns
+    -------
+    (n, 2) g, compared with c (u1, u2) / u3.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not or that is forward, other shapes or numbers of parameters.
+    """
+
 def attitudes_from_numbers(
     representation: str, numbers: _Floats, boresight: _Floats
 ) -> tuple[_Floats, _Floats]:
@@ -339,6 +397,60 @@ class BlockError(Exception):
     photos`, `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or
     `input`; photos, cameras and common unknowns are lists of indices for each undetermined combination of
     unknowns, points a list of point indices.
+    """
+
+def find_first_values(
+    photo_positions: _Floats,
+    photo_attitudes: _Floats,
+    observed_positions: _Floats,
+    observed_attitudes: _Floats,
+    point_positions: _Floats,
+    point_sd: _Floats,
+    image_photos: _Indices,
+    image_points: _Indices,
+    directions: _Floats,
+    direction_sd: _Floats,
+    *,
+    threads: int,
+) -> tuple[
+    _Floats,
+    _Floats,
+    list[tuple[str, int, int]],
+    _Floats,
+    NDArray[np.bool_],
+    int | None,
+    float | None,
+]:
+    """Find poses of photos from what is known, in cartesian object space (`docs/first-values.md`).
+
+    Parameters
+    ----------
+    photo_positions, photo_attitudes
+        (P, 3) and (P, 3, 3), photo to object: given poses; NaN where none is.
+    observed_positions, observed_attitudes
+        The same as observed; NaN where they were not.
+    point_positions, point_sd
+        (n, 3) control in the linear unit, and its standard deviations; infinite where it is not held.
+    image_photos, image_points
+        (m,) indices into photos and points.
+    directions, direction_sd
+        (m, 3) unit directions in the axes of the photos, not finite where there is none, and (m,) their
+        standard deviations in radians.
+    threads
+        As for `adjust_block`.
+
+    Returns
+    -------
+    (P, 3) positions and (P, 3, 3) attitudes, NaN where none was found; for each photo (`given`, `resected`,
+    `observed` or `oriented`, 0, 0), or why it has none: (`points`, known points, 0), (`misfit`, known points,
+    0) or (`apart`, what its model has in common, photos of the model); (n, 3) positions of points; (m,)
+    whether an image was set aside; the photo that is the datum, if nothing else is; the median of the angles
+    between observed and computed directions, radians.
+
+    Raises
+    ------
+    ValueError
+        An argument of another shape or length, an index out of range; the message names it.
     """
 
 def adjust_block(

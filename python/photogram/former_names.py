@@ -24,6 +24,7 @@ TODAY = {
     "arrays": "arguments.arrays",
     "absolute_orientation.oriented": "absolute_orientation.orientation",
     "block": "network.block",
+    "checks.rays": "network.rays",
     "collection.bal": "collection.formats",
     "collection.solution": "collection.adjusted",
     "document": "results.document",

@@ -14,13 +14,13 @@ from photogram.checks.editing import kept_images, without_photos
 from photogram.checks.heights import neighbours
 from photogram.checks.orientation import MIRRORS
 from photogram.checks.predictions import exchange
-from photogram.checks.rays import Rays
 from photogram.checks.robust import critical, fit, mad_sd
 from photogram.checks.stations import strips_of
 from photogram.checks.structure import parts_of
 from photogram.cli import app
 from photogram.giant import Limits, Project, check, write_project
 from photogram.network.geometry import Spheroid
+from photogram.network.rays import Rays
 
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
 

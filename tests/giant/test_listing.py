@@ -298,8 +298,8 @@ def test_section_10_without_degrees_of_freedom_the_estimates_are_undefined():
 
 def stable(text):
     """Round heights among the corrections: from geocentric coordinates they are noise beyond 8 decimals."""
-    pattern = re.compile(r"(POSITION +\S+ +\S+ +)(-?\d+\.\d{9})")
-    return pattern.sub(lambda match: f"{match[1]}{round(float(match[2]), 4) + 0.0:.4f}", text)
+    pattern = re.compile(r"(POSITION +\S+ +\S+) +(-?\d+\.\d{9})")
+    return pattern.sub(lambda match: f"{match[1]} {round(float(match[2]), 4) + 0.0:11.4f}", text)
 
 
 def test_the_listing_of_the_example_is_the_snapshot(example, adjusted):

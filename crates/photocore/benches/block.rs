@@ -176,7 +176,7 @@ impl Phases {
         for (point, weight) in block.points.iter().zip(weight.as_chunks_mut::<3>().0) {
             *weight = point.sd.map(|sd| (sd * sd).recip());
         }
-        let prior = Prior { right: vec![0.0; weight.len()], weight };
+        let prior = Prior { right: vec![0.0; weight.len()], weight, between: vec![] };
         let equations = Linear::new(block);
         Self { pool: pool(), system: System::new(layout, Ordering::Auto), equations, prior }
     }

@@ -36,7 +36,10 @@ fn system(photos: usize) -> (System, Prior) {
     let pointers = (0..=POINTS).map(|point| point * photos).collect();
     let layout = Layout::new(2, 3, &vec![DIM; photos], pointers, kept).expect("a layout");
     let unknowns = layout.unknowns();
-    (System::new(layout, Ordering::Auto), Prior { weight: vec![100.0; unknowns], right: vec![0.0; unknowns] })
+    (
+        System::new(layout, Ordering::Auto),
+        Prior { weight: vec![100.0; unknowns], right: vec![0.0; unknowns], between: vec![] },
+    )
 }
 
 /// Time of the factorisation alone.

@@ -5,7 +5,7 @@
 use std::f64::consts::FRAC_PI_2;
 use std::ops::ControlFlow;
 
-use photocore::adjustment::Status;
+use photocore::adjustment::{Method, Published, Status};
 use photocore::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Orientation, Perspective, Point as At, PoseNumbers, RotationSense,
     Vector3, angle_axis_rotation,
@@ -156,5 +156,63 @@ fn at_ninety_degrees_the_angles_are_not_given_and_all_else_is() {
         let numbers = AttitudeNumbers::OmegaPhiKappa(sense);
         let [.., o, p, k] = network.photos[index].pose;
         assert!((numbers.attitude([omega, phi, kappa]) - numbers.attitude([o, p, k])).amax() < 1e-8);
+    }
+}
+
+#[test]
+fn weighted_angles_are_observations_of_the_angles() {
+    let quarter = angle_axis_rotation(&Vector3::new(0.0, FRAC_PI_2, 0.0));
+    // With these axes phi is zero for all photos.
+    let upright =
+        [(RotationSense::GroundToPhoto, quarter), (RotationSense::PhotoToGround, Matrix3::identity())];
+    for (sense, turned) in upright {
+        let mut network = around(sense, &turned, SD, 0.02);
+        for (index, photo) in network.photos.iter_mut().enumerate() {
+            // All three, one alone, or none.
+            let weighted = [3, 1, 0][index % 3];
+            photo.sd[6 - weighted..].fill(0.002);
+        }
+        // The program of its time has the angles themselves as unknowns.
+        let mut published = Options::default();
+        published.adjustment.method = Method::Full(Published::Percent(1e-10));
+        published.adjustment.max_iterations = 30;
+        let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        let expected = network.adjust(&published, &pool, &mut |_| ControlFlow::Continue(())).unwrap();
+        let found = adjust(&network).unwrap();
+        assert_eq!(found.adjustment.status, Status::Converged);
+        assert_eq!(found.degrees_of_freedom, expected.degrees_of_freedom);
+        let [camera, as_unknowns] = [&found, &expected].map(|own| own.sums_of_squares.camera);
+        assert!(camera > 1.0 && (camera / as_unknowns - 1.0).abs() < 1e-7, "{camera} {as_unknowns}");
+        for (a, b) in found.photos.iter().zip(&expected.photos) {
+            for (k, (x, y)) in a.pose.iter().zip(b.pose).enumerate() {
+                let sd = b.cofactors[7 * k].sqrt();
+                assert!((x - y).abs() < 1e-6 * sd, "{k}: {x} {y}");
+            }
+            for (i, (q, expected)) in a.cofactors.iter().zip(&b.cofactors).enumerate() {
+                let scale = (b.cofactors[7 * (i / 6)] * b.cofactors[7 * (i % 6)]).sqrt();
+                assert!((q - expected).abs() < 1e-7 * scale, "{i}: {q} {expected}");
+            }
+            for (r, expected) in a.redundancy.iter().zip(&b.redundancy) {
+                assert!((r - expected).abs() < 1e-7, "{r} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn weighted_angles_near_ninety_degrees_do_not_hinder() {
+    let sense = RotationSense::GroundToPhoto;
+    for sd in [0.01, 0.1, 1.0] {
+        let mut network = around(sense, &Matrix3::identity(), SD, 0.02);
+        network.photos.iter_mut().for_each(|photo| photo.sd[3..].fill(sd));
+        let solution = adjust(&network).unwrap();
+        let Solution { adjustment, degrees_of_freedom, .. } = &solution;
+        assert_eq!(adjustment.status, Status::Converged);
+        assert!(adjustment.iterations.len() < 8, "{}: {}", sd, adjustment.iterations.len());
+        let images = solution.images.iter().flatten().flat_map(|image| image.redundancy);
+        let photos = solution.photos.iter().flat_map(|photo| photo.redundancy.clone());
+        let points = solution.points.iter().flatten().flat_map(|point| point.redundancy);
+        let sum: f64 = images.chain(photos).chain(points).sum();
+        assert!((sum - *degrees_of_freedom as f64).abs() < 1e-7, "{sum} {degrees_of_freedom}");
     }
 }

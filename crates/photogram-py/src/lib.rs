@@ -2,6 +2,7 @@
 
 mod arrays;
 mod attitude;
+mod camera;
 mod commons;
 mod comparator;
 mod distributions;
@@ -29,6 +30,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     distributions::register(module)?;
     attitude::register(module)?;
     geometry::register(module)?;
+    camera::register(module)?;
     commons::register(module)?;
     network::register(module)?;
     comparator::register(module)?;

@@ -11,7 +11,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.ends import behind, datum, rounded, steep, too_coarse, undetermined
+from photogram.adjustment.ends import behind, datum, rounded, too_coarse, undetermined
+from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
@@ -205,9 +206,9 @@ def adjust(
             progress=None if progress is None else teller(progress),
         )
     except _photocore.BlockError as error:
-        raise _named(block, *error.args) from None
+        raise hinted(_named(block, *error.args), block) from None
     with turned("the adjusted block"):
-        return _result(block, solution, unit_variance, row, as_published)
+        return with_hints(_result(block, solution, unit_variance, row, as_published))
 
 
 def _fits_anywhere(block: Block) -> bool:
@@ -293,7 +294,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     lost = [each.name for each in block.observations if dropped.intersection(each.points)]
     if lost:
         messages.append(Message(f"left out with their points: {listed(lost)}"))
-    messages = datum(block, solution) + messages + steep(block)
+    messages = datum(block, solution) + messages
     return messages + remarks(block, solution.photo_positions)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -15,13 +14,10 @@ from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["behind", "datum", "hidden", "rounded", "steep", "too_coarse", "undetermined"]
+__all__ = ["behind", "datum", "hidden", "rounded", "too_coarse", "undetermined"]
 
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
-
-STEEP = math.radians(5.0)
-"""Angles of photos whose phi is as near to 90 degrees have weights that say little."""
 
 
 def undetermined(
@@ -55,22 +51,6 @@ def datum(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     if held.any() or block.observations or (block.photo_position_sd == 0).all():
         return []
     return [Message("there is no control: the datum of the block rests on the weights of its photos")]
-
-
-def steep(block: Block) -> list[Message]:
-    """Remark on weighted angles near where two of them turn about one axis."""
-    weighted = ((block.photo_attitude_sd > 0) & np.isfinite(block.photo_attitude_sd)).any(axis=1)
-    near = np.abs(np.cos(block.photo_attitudes[:, 1])) < math.sin(STEEP)
-    names = [block.photo_ids[photo] for photo in np.flatnonzero(weighted & near)]
-    if not names:
-        return []
-    return [
-        Message(
-            f"phi is within {math.degrees(STEEP):.0f} degrees of 90 on {listed(names)}: omega and kappa turn"
-            " about nearly the same axis there, and their weights say little; leave the angles free and give"
-            " an observed attitude (docs/observations.md)"
-        )
-    ]
 
 
 def _unknowns(

@@ -18,6 +18,7 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.network import geometry
 from photogram.network.block import Block, checked, of_images_alone
+from photogram.network.cameras import images_of
 from photogram.results.result import Result
 
 __all__ = ["at_adjusted", "computed_images", "image_depths", "predict"]
@@ -93,11 +94,7 @@ def computed_images(block: Block) -> Floats:
         return ideal
     # With a principal distance of -1 an image is the direction (u1, u2) / -u3 of what lies in front.
     directions = np.column_stack([ideal, np.full(len(ideal), -1.0)])
-    cameras = block.photo_cameras[photos]
-    for row, camera in enumerate(block.cameras):
-        of_camera = cameras == row
-        ideal[of_camera] = camera.project(directions[of_camera])
-    return ideal
+    return images_of(block.cameras, block.photo_cameras[photos], directions)
 
 
 def at_adjusted(result: Result) -> Block:

@@ -23,10 +23,10 @@ from photogram.checks.predictions import (
     freed,
     tests_of_predictions,
 )
-from photogram.checks.rays import Rays
 from photogram.checks.robust import critical, mad_sd
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
+from photogram.network.rays import Rays
 from photogram.results.result import Result
 
 __all__ = ["Edited", "edit"]

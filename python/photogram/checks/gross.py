@@ -12,9 +12,9 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.checks.findings import Finding, Level, Section
-from photogram.checks.rays import Rays, meet
 from photogram.checks.robust import fit, mad_sd
 from photogram.network.block import Block
+from photogram.network.rays import Rays, meet
 from photogram.results.result import Result
 
 __all__ = ["Suspects", "disproved", "gross", "without"]

@@ -6,8 +6,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.checks.findings import Finding, Section
-from photogram.checks.rays import local_axes
 from photogram.checks.robust import MAD_TO_SD
+from photogram.network.rays import local_axes
 from photogram.results.result import Result
 
 __all__ = ["neighbours", "two_ray_heights"]

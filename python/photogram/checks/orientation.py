@@ -11,8 +11,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.checks.findings import Finding, Section
-from photogram.checks.rays import Intersection, Rays, frame_radius, meet
 from photogram.network.block import Block
+from photogram.network.rays import Intersection, Rays, frame_radius, meet
 
 __all__ = ["orientation", "spare_explained"]
 

@@ -12,9 +12,9 @@ from itertools import combinations
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.checks.rays import Rays
 from photogram.checks.robust import normal_of_chi_square
 from photogram.network.block import Block
+from photogram.network.rays import Rays
 from photogram.results.result import Result
 
 __all__ = ["exchange", "exchanged_pair", "exchanged_where_rays_meet", "freed", "tests_of_predictions"]

@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.checks.findings import Finding, Section
-from photogram.checks.rays import frame_radius
 from photogram.checks.robust import critical, normal_of_chi_square
+from photogram.network.rays import frame_radius
 from photogram.results.result import Result
 
 __all__ = ["residuals"]

@@ -9,10 +9,10 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.checks.findings import Finding, Level, Section
-from photogram.checks.rays import local_axes
 from photogram.checks.robust import MAD_TO_SD, fit
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.rays import local_axes
 from photogram.results.result import Result
 
 __all__ = ["stations", "strips_of"]

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram.adjustment.hints import hints
 from photogram.checks.editing import HOPELESS, Edited, blunder_section, edit
 from photogram.checks.findings import Check, Finding, Section
 from photogram.checks.gross import Suspects, disproved, gross, without
 from photogram.checks.heights import two_ray_heights
 from photogram.checks.orientation import orientation, spare_explained
-from photogram.checks.rays import Rays
 from photogram.checks.residuals import residuals
 from photogram.checks.stations import stations
 from photogram.checks.structure import structure_section
@@ -21,6 +21,7 @@ from photogram.giant.control import control, key_numbers
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
 from photogram.network.block import Block
+from photogram.network.rays import Rays
 
 if TYPE_CHECKING:
     from photogram.giant.project import Project
@@ -65,6 +66,8 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
 
 def _checked(project: Project, block: Block, limits: Limits | None, threads: int | None) -> Check:
     upright, oriented = orientation(block)
+    if oriented is block:
+        upright.findings += [Finding("convention", "grave", str(hint)) for hint in hints(block)]
     errors, suspects = gross(oriented)
     if suspects.photos.any():
         spare_explained(upright, oriented, suspects.photos)

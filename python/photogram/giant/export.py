@@ -19,7 +19,7 @@ from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
 from photogram.giant.images import ImageFrame
 from photogram.messages import Message
-from photogram.network.block import Block, of_images_alone
+from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.refraction import Refraction, metres_per_unit
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def block_files(
     block: Block, common: Common | None
 ) -> tuple[Common, list[Camera], list[Frame], list[ImageFrame], list[GroundPoint], list[Message]]:
     """Return the content of the five files for a block; see :meth:`Project.from_block`."""
-    of_images_alone(block, "GIANT files")
+    of_images_alone(checked(block), "GIANT files")
     common = dataclasses.replace(
         common or Common(error_propagation=True),
         title=block.title[:80],

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import frozen, indices, length, names, shaped, shown, text, truth_value
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_cameras, photo_indices
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation, observation_rows
@@ -48,7 +49,8 @@ class Block:
         P names, all different: strings that print, or whole numbers.
     photo_positions, photo_attitudes
         (P, 3) initial positions, and omega, phi, kappa in radians: M = M_kappa M_phi M_omega (GIANT guide,
-        section 5). Components whose standard deviation is 0 stay at these values.
+        section 5). Components whose standard deviation is 0 stay at these values. NaN where unknown:
+        :func:`photogram.first_values` finds them.
     principal_distances
         (P,) in millimetres; negative for the positive (diapositive) plane, positive for the negative plane:
         cameras that are known and free of distortion, image coordinates counted from the principal point.
@@ -149,7 +151,8 @@ class Block:
         for name, shape in shapes.items():
             if name == "principal_distances" and self.cameras:
                 continue
-            self._set(name, shaped(name, getattr(self, name), shape, missing=name == "point_positions"))
+            missing = name in ("point_positions", "photo_positions", "photo_attitudes")
+            self._set(name, shaped(name, getattr(self, name), shape, missing=missing))
         for name in ("photo_positions_observed", "photo_attitudes_observed"):
             if getattr(self, name) is not None:
                 self._set(name, shaped(name, getattr(self, name), (photos, 3), missing=True))
@@ -176,8 +179,10 @@ class Block:
 
     def _check_values(self) -> None:
         owners = {"photo": self.photo_ids, "princ": self.photo_ids, "point": self.point_ids}
+        for name in ("photo_positions", "photo_attitudes"):
+            self._refuse(name, np.isinf(getattr(self, name)), "is not a finite number", self.photo_ids)
         given = ("principal_distances",) if self.principal_distances is not None else ()
-        for name in ("photo_positions", "photo_attitudes", *given, "image_xy"):
+        for name in (*given, "image_xy"):
             bad = ~np.isfinite(getattr(self, name))
             self._refuse(name, bad, "is not a finite number", owners.get(name[:5]))
         beyond = np.abs(self.photo_attitudes) > _ANGLES
@@ -201,6 +206,9 @@ class Block:
         ):
             observed = getattr(self, name)
             if observed is None:
+                unknown = np.isnan(initial) & np.isfinite(sd)
+                why = "is unknown but weighted or fixed (its sd is finite)"
+                self._refuse(name.removesuffix("_observed"), unknown, why, self.photo_ids)
                 continue
             self._refuse(name, np.isinf(observed), "is infinite", self.photo_ids)
             if initial is self.photo_attitudes:
@@ -436,15 +444,22 @@ def of_images_alone(block: Block, what: str) -> Block:
 
 
 def checked(block: Block) -> Block:
-    """Return a block; refuse what is none.
+    """Return a block whose photos have positions and attitudes; refuse all else.
 
     Raises
     ------
     InputError
-        Anything else.
+        What is no block, or photos without a pose, named.
     """
     if not isinstance(block, Block):
         raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    unknown = np.isnan(block.photo_positions).any(axis=1) | np.isnan(block.photo_attitudes).any(axis=1)
+    if unknown.any():
+        photos = listed([block.photo_ids[row] for row in np.flatnonzero(unknown)])
+        raise InputError(
+            f"positions or attitudes of the photos {photos} are not known: photogram.first_values finds"
+            " initial values"
+        )
     return block
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
@@ -15,7 +16,7 @@ from photogram.arguments.arrays import number, one_of, shaped, shown, text
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 
-__all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "checked_cameras", "photo_indices"]
+__all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "checked_cameras", "images_of", "photo_indices"]
 
 ImageUnit = Literal["mm", "px"]
 """What image coordinates are measured in."""
@@ -23,8 +24,14 @@ ImageUnit = Literal["mm", "px"]
 CameraRow = tuple[str, list[float], list[float]]
 """Model, parameters and their standard deviations, as the core takes a camera."""
 
-_GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b"})
-"""Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras."""
+_GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta"})
+"""Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras. Where w and h
+are given, cx and cy are counted from the middle of the picture, and may be missing."""
+
+
+@cache
+def _models() -> dict[str, tuple[str, list[tuple[str, int]], int, str]]:
+    return dict(_photocore.camera_models())
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +84,22 @@ class Camera:
     @property
     def names(self) -> tuple[str, ...]:
         """The k parameters of the model, in their order."""
-        return tuple(name for name, _ in _photocore.camera_model(self.model)[1])
+        return tuple(name for name, _ in self._facts[1])
 
     @property
     def constants(self) -> frozenset[str]:
         """Parameters that are never unknown."""
-        return frozenset(self.names) & {"r0"}
+        names, count = self.names, self._facts[2]
+        return frozenset(names[len(names) - count :])
+
+    @property
+    def direction(self) -> str:
+        """What lens terms are functions of: `forward` ideal coordinates, `backward` measured ones."""
+        return self._facts[3]
+
+    @property
+    def _facts(self) -> tuple[str, list[tuple[str, int]], int, str]:
+        return _models()[self.model]
 
     @property
     def values(self) -> Floats:
@@ -106,12 +123,15 @@ class Camera:
     @property
     def scale(self) -> float:
         """What a small angle near the axis is multiplied by: the principal distance, without sign."""
-        return abs(next(self.parameters[name] for name in ("c", "f", "fx") if name in self.parameters))
+        for name in ("c", "f", "fx"):
+            if name in self.parameters:
+                return abs(self.parameters[name])
+        return abs(self.parameters["w"]) / math.tau
 
     def unit_of(self, name: str) -> str:
         """Return the unit of a parameter; nothing for a plain number."""
-        lengths = {name for name, in_image in _photocore.camera_model(self.model)[1] if in_image}
-        return str(self.unit) if name in lengths else ""
+        power = dict(self._facts[1])[name]
+        return "" if power == 0 else f"{self.unit}" if power == 1 else f"{self.unit}^{power}"
 
     @property
     def title(self) -> str:
@@ -137,7 +157,8 @@ class Camera:
 
     def _checked_parameters(self) -> dict[str, float]:
         given = self._named("parameters", self.parameters)
-        missing = [name for name in self.names if name in _GIVEN and name not in given]
+        needed = _GIVEN - ({"cx", "cy"} if "w" in self.names else set())
+        missing = [name for name in self.names if name in needed and name not in given]
         if missing:
             raise InputError(f"parameters of the camera {self.title}: {', '.join(missing)} must be given")
         for name, value in given.items():
@@ -268,6 +289,25 @@ def _index(each: object, count: int) -> int | None:
     if isinstance(each, bool | np.bool_) or not isinstance(each, int | np.integer):
         return None
     return int(each) if 0 <= each < count else None
+
+
+def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> Floats:
+    """Return (m, 2) the images of directions, each by its camera.
+
+    Parameters
+    ----------
+    cameras
+        The cameras.
+    which
+        (m,) the index of each direction's camera.
+    directions
+        (m, 3) as for :meth:`Camera.project`.
+    """
+    images = np.full((len(directions), 2), np.nan)
+    for row, camera in enumerate(cameras):
+        own = which == row
+        images[own] = camera.project(directions[own])
+    return images
 
 
 def camera_rows(cameras: Sequence[Camera]) -> list[CameraRow]:

@@ -9,7 +9,7 @@ that the points a photograph may see are known beforehand.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,8 +22,10 @@ from photogram.errors import InputError
 from photogram.memory import available_memory
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.cameras import Camera
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Refraction
+from photogram.network.simulated_cameras import photographed
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
@@ -130,6 +132,8 @@ def simulate(
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     photo_to_ground: bool = False,
     refraction: Refraction | None = None,
+    cameras: Sequence[Camera] = (),
+    start_cameras: Sequence[Camera] | None = None,
     seed: int | np.random.Generator = 0,
 ) -> Simulation:
     """Simulate a block of vertical photographs.
@@ -181,6 +185,13 @@ def simulate(
         The sense of the attitude angles.
     refraction
         What bends the rays, in the images and in the block; None: they are straight.
+    cameras
+        Take the photos in turn: with distortion, in millimetres or pixels; `frame_size` and
+        `principal_distance` then only say what they see, and errors of image coordinates are as large in
+        angle. None given: a camera without distortion, with the principal distance.
+    start_cameras
+        What the block knows of them: where it starts from, and which parameters are free or weighted. None:
+        they are known.
     seed
         Equal seeds and equal arguments give equal blocks.
 
@@ -297,6 +308,8 @@ def simulate(
         point_positions=np.where(known, ground + np.where(held, control_noise, 0.0), np.nan),
         image_xy=measured,
     )
+    if cameras:
+        truth, block = photographed(truth, block, cameras, start_cameras)
     return Simulation(block, truth, faults)
 
 
@@ -308,7 +321,7 @@ def _observed(truth: Floats, sd: Floats, random: np.random.Generator) -> Floats 
 
 _WHOLE_NUMBERS = ("strips", "photos_per_strip", "control_spacing", "check_points", "blunders")
 _CLASSES = {"spheroid": Spheroid, "refraction": Refraction}
-_OTHERS = ("control", "origin", "photo_to_ground", "seed")
+_OTHERS = ("control", "origin", "photo_to_ground", "cameras", "start_cameras", "seed")
 
 
 def _check_types(arguments: Mapping[str, object]) -> None:

@@ -2,10 +2,10 @@
 
 For an estimated parameter p with cofactor q: its standard deviation is s = sigma0 sqrt(q), its test value
 t = (p - p_ref) / s has Student's distribution with the degrees of freedom of the adjustment (the normal one
-where the unit weight is a priori), p_ref being 0 for terms of the lens and the given value for focal length and
-principal point. R^2 = 1 - 1 / (n q), n the diagonal of the normal equations, is its multiple correlation with
-all other unknowns. A group of g terms has p' Q^-1 p / (g sigma0^2), Fisher's F with g and those degrees of
-freedom (Gotthardt 1978, "Einfuehrung in die Ausgleichungsrechnung"; Jacobsen 1982 for the choice of terms).
+where the unit weight is a priori), p_ref being 0 for terms of the lens and the given value for focal length
+and principal point. R^2 = 1 - 1 / (n q), n the diagonal of the normal equations, is its multiple correlation
+with all other unknowns. A group of g terms has p' Q^-1 p / (g sigma0^2), Fisher's F with g and those degrees
+of freedom.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.results.cameras import AdjustedCamera
+from photogram.results.distortion import INTERIOR
 from photogram.results.result import Result
 
 __all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "calibrations"]
@@ -32,9 +33,6 @@ FROM_PRIOR = 0.05
 """A weight whose redundancy number is below this determines the parameter, not the images."""
 FAR = 5.0
 """A weighted parameter that has moved by more of its standard deviations a priori is a contradiction."""
-
-INTERIOR = frozenset({"c", "f", "fx", "fy", "xp", "yp", "cx", "cy"})
-"""Compared with their given values; all others with zero."""
 
 
 @dataclass(frozen=True)
@@ -241,7 +239,7 @@ def _group(result: Result, camera: AdjustedCamera, names: tuple[str, ...]) -> Gr
 
 
 def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
-    """Return groups of estimated terms: by letter, the radial ones also without the first, Gruen's by degree."""
+    """Return groups of estimated terms: by letter, radial ones also without the first, Gruen's by degree."""
     by_family: dict[str, list[str]] = {}
     for k in camera.estimated:
         name = camera.names[k]

@@ -71,7 +71,7 @@ class AdjustedCamera:
     @property
     def sd(self) -> Floats:
         """(k,) their standard deviations; 0 where held."""
-        return standard_deviations(self.covariance)
+        return np.asarray(standard_deviations(self.covariance[np.newaxis])[0])
 
     @property
     def correlations(self) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.io import json
+from photogram.results.calibration_report import calibration_members
 from photogram.results.report import problems_of
 from photogram.results.result import Result
 from photogram.show.ways import document_of
@@ -69,7 +70,11 @@ def _document(result: Result) -> dict[str, Any]:
         "global_test": _global_test(result),
         "covariance_scale": result.covariance_scale,
         "photos": _photos(result),
-        **({"cameras": _cameras(result)} if result.cameras else {}),
+        **(
+            {"cameras": _cameras(result), "calibrations": calibration_members(result)}
+            if result.cameras
+            else {}
+        ),
         **({"unknowns": _unknowns(result)} if result.unknowns else {}),
         "points": _points(result),
         "observations": _observations(result),

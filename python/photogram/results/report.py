@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.structuring import structure
+from photogram.results.calibration_report import calibration_sections
 from photogram.results.kinds import kind_lines, tested_kind
 from photogram.results.observed import image_lines, observed_lines, tested
 from photogram.results.result import Result
@@ -60,6 +61,8 @@ def report(result: Result) -> str:
             "Observations beside images: observed minus adjusted, redundancy, standardized residual",
             kind_lines(result.kinds),
         ),
+        *calibration_sections(result),
+        ("Cameras that are held", _held_cameras(result)),
         ("Unknowns that observations have in common", unknown_lines(result.unknowns)),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
@@ -129,6 +132,7 @@ def _adjustment(result: Result) -> list[str]:
         ),
         ("weighted sum of squares, total", f"{sums.total:.6f}"),
         ("photos", f"{len(block.photo_ids)}"),
+        *([("cameras", f"{len(block.cameras)}")] if block.cameras else []),
         ("points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
         ("held components of control", components),
         ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
@@ -269,6 +273,15 @@ def _photos(result: Result) -> list[str]:
         lines.append(f"{name:<10}{position(values)}" + "".join(f"{angle:>15.7f}" for angle in angles))
         lines.append(f"{'':<10}{sd_position(sd[:3])}" + "".join(f"{each / ARCSEC:>15.3f}" for each in sd[3:]))
     return lines
+
+
+def _held_cameras(result: Result) -> list[str]:
+    return [
+        f"{each.name:<16}{each.camera.model}, {each.photos} photos: "
+        + ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0)
+        for each in result.cameras
+        if each.given.is_held
+    ]
 
 
 def _points(result: Result) -> list[str]:

@@ -22,6 +22,19 @@ pub(super) struct Open {
     pub hold: Vec<usize>,
 }
 
+impl Open {
+    /// All motions, each by itself.
+    pub fn all(motions: &Motions) -> Self {
+        let count = motions.vectors.len();
+        let unknowns = motions.vectors.first().map_or(0, Vec::len);
+        Self {
+            combinations: Mat::identity(count, count),
+            vectors: Mat::from_fn(unknowns, count, |unknown, k| motions.vectors[k][unknown]),
+            hold: vec![],
+        }
+    }
+}
+
 /// What a combination may change of the observations, as the square of a share of what its parts change, and be rounding: the eigenvalues
 /// of a matrix of ones are good to 1e-15. Positions of photos that are observed to a hundred metres change 1e4 times as much.
 const NULL: f64 = 1e-14;
@@ -191,7 +204,17 @@ impl<M: Model> Problem<M> {
                 candidates.add_row(&mut sums, layout.tie_columns(tie).zip(row.iter().copied()));
             }
         });
-        for unknown in (0..values.len()).filter(|&unknown| self.is_weighted(unknown)) {
+        let together = self.weighted(values);
+        for own in &together {
+            for row in own.coefficients.row_iter() {
+                candidates.add_row(&mut sums, own.unknowns().zip(row.iter().copied()));
+            }
+        }
+        let apart = |unknown: &usize| {
+            let before = together.partition_point(|own| own.unknowns().end <= *unknown);
+            together.get(before).is_none_or(|own| own.first > *unknown)
+        };
+        for unknown in (0..values.len()).filter(|&i| self.is_weighted(i)).filter(apart) {
             let (weight, moved) = (self.sd[unknown].powi(2).recip(), candidates.of(unknown));
             add_square(&mut sums.together, weight, moved);
             let apart = moved.as_flattened().iter().zip(sums.apart.as_flattened_mut());

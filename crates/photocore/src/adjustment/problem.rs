@@ -1,5 +1,8 @@
 //! Models, and problems: a model with everything that is known beforehand.
 
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
 use rayon::ThreadPool;
 
 use super::loss::Reweighting;
@@ -26,6 +29,12 @@ pub trait Model: Sync {
         unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
     }
 
+    /// The equations of weighted unknowns to which steps are not added (see [`Model::advance`]), at the given values, in ascending order.
+    /// `prior` and `sd` are those of the problem. All other weighted unknowns have equations of one unknown each.
+    fn weighted(&self, _values: &[f64], _prior: &[f64], _sd: &[f64]) -> Vec<Weighted> {
+        vec![]
+    }
+
     /// Computes the local unknowns afresh from the others, where the model knows how; false where it does not. Far from the
     /// solution this often leads back into the region where linearized steps do.
     fn relocate(&self, _unknowns: &mut [f64]) -> bool {
@@ -43,6 +52,11 @@ pub trait Model: Sync {
     /// trying, and as many unknowns are held; None where it is known that they give a datum, which then costs nothing.
     fn motions(&self, _unknowns: &[f64]) -> Option<Motions> {
         None
+    }
+
+    /// Its motions whether or not observations and weights give a datum.
+    fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        self.motions(unknowns)
     }
 
     /// Moves the unknowns by amounts of its motions, which need not be small. By default along their vectors, which is exact where the
@@ -65,6 +79,24 @@ pub struct Motions {
     pub vectors: Vec<Vec<f64>>,
     /// The unknowns that had best be held for a datum, the best first. Those that others hold already are passed over.
     pub preferred: Vec<usize>,
+}
+
+/// The equations, of unit weight, of three unknowns of one kept block that are weighted, and step together.
+#[derive(Debug, Clone, Copy)]
+pub struct Weighted {
+    /// The first of the unknowns.
+    pub first: usize,
+    /// Observed minus computed.
+    pub constant: Vector3<f64>,
+    /// The partials of the computed by the step, row by row; zero where nothing is observed.
+    pub coefficients: Matrix3<f64>,
+}
+
+impl Weighted {
+    /// Where the unknowns stand.
+    pub(super) fn unknowns(&self) -> Range<usize> {
+        self.first..self.first + 3
+    }
 }
 
 /// A model with everything that is known beforehand.
@@ -96,12 +128,30 @@ impl<M> Problem<M> {
     }
 
     /// Square of (observed - computed) / standard deviation of an unknown; zero unless it is weighted.
-    pub fn prior_square(&self, unknown: usize, value: f64) -> f64 {
+    fn prior_square(&self, unknown: usize, value: f64) -> f64 {
         if self.is_weighted(unknown) {
             ((self.prior[unknown] - value) / self.sd[unknown]).powi(2)
         } else {
             0.0
         }
+    }
+}
+
+impl<M: Model> Problem<M> {
+    /// Weighted sum of squares of observed minus computed unknowns, of some of them.
+    pub fn prior_sum_of_squares(&self, values: &[f64], of: Range<usize>) -> f64 {
+        let plain = |range: Range<usize>| range.map(|i| self.prior_square(i, values[i])).sum::<f64>();
+        let (mut sum, mut from) = (0.0, of.start);
+        for own in self.weighted(values).iter().filter(|own| of.contains(&own.first)) {
+            sum += plain(from..own.first) + own.constant.norm_squared();
+            from = own.unknowns().end;
+        }
+        sum + plain(from..of.end)
+    }
+
+    /// See [`Model::weighted`].
+    pub(super) fn weighted(&self, values: &[f64]) -> Vec<Weighted> {
+        self.model.weighted(values, &self.prior, &self.sd)
     }
 
     /// The equations of the unknowns themselves at the given values. A fixed or held unknown has an equation of its own,
@@ -113,11 +163,11 @@ impl<M> Problem<M> {
         let right = (0..values.len())
             .map(|i| if self.is_weighted(i) { weight[i] * (self.prior[i] - values[i]) } else { 0.0 })
             .collect();
-        Prior { weight, right }
+        let mut prior = Prior { weight, right, between: vec![] };
+        self.weighted(values).iter().for_each(|own| add_weighted(&mut prior, own, held));
+        prior
     }
-}
 
-impl<M: Model> Problem<M> {
     /// The unknowns after a step.
     pub(super) fn advanced(&self, unknowns: &[f64], step: &[f64]) -> Vec<f64> {
         let mut values = unknowns.to_vec();
@@ -195,8 +245,10 @@ impl<'a, M: Model> Linearized<'a, M> {
             rows.map(decrease).sum::<f64>()
         });
         let priors = step.iter().zip(&prior.weight).zip(&prior.right);
+        let between = prior.between.iter().map(|&(i, j, weight)| 2.0 * weight * step[i] * step[j]);
         observed.iter().chain(&tied).sum::<f64>()
             + priors.map(|((x, weight), right)| x * (2.0 * right - weight * x)).sum::<f64>()
+            - between.sum::<f64>()
     }
 }
 
@@ -242,6 +294,20 @@ impl<M: Model> Linearized<'_, M> {
         if let Some(reweighting) = self.reweighting {
             reweighting.apply(constant, parts);
         }
+    }
+}
+
+/// Puts the equations of three unknowns that step together in the place of those of each; none is of a held one.
+fn add_weighted(prior: &mut Prior, own: &Weighted, held: &[usize]) {
+    let mut coefficients = own.coefficients;
+    let is_held = own.unknowns().map(|unknown| held.contains(&unknown)).collect::<Vec<_>>();
+    for k in (0..3).filter(|&k| is_held[k]) {
+        coefficients.column_mut(k).fill(0.0);
+    }
+    let (normal, right) = (coefficients.tr_mul(&coefficients), coefficients.tr_mul(&own.constant));
+    for i in (0..3).filter(|&i| !is_held[i]) {
+        (prior.weight[own.first + i], prior.right[own.first + i]) = (normal[(i, i)], right[i]);
+        prior.between.extend((0..i).map(|j| (own.first + i, own.first + j, normal[(i, j)])));
     }
 }
 

@@ -208,7 +208,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// The same of values that are prepared already.
     pub(super) fn objective_at(&self, unknowns: &[f64], prepared: &M::Prepared) -> f64 {
         let residuals = self.problem.residuals_at(self.pool, prepared);
-        self.observed_sum(&residuals) + self.problem.prior_sum_of_squares(unknowns)
+        self.observed_sum(&residuals) + self.problem.prior_sum_of_squares(unknowns, 0..unknowns.len())
     }
 
     /// The observations' part of it.
@@ -245,7 +245,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.seconds.form += seconds * factor.formation_share;
         self.seconds.factor += seconds * (1.0 - factor.formation_share);
         let sum_of_squares = match self.options.loss {
-            None => factor.sum_of_squares + self.problem.prior_sum_of_squares(&unknowns),
+            None => factor.sum_of_squares + self.problem.prior_sum_of_squares(&unknowns, 0..unknowns.len()),
             Some(_) => self.objective(&unknowns),
         };
         self.formations += 1;
@@ -281,11 +281,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
         let residuals = problem.residuals(self.pool, &unknowns);
         if let Some((last, _)) = end.last {
-            let sum_of_squares = self.observed_sum(&residuals) + problem.prior_sum_of_squares(&unknowns);
+            let sum_of_squares =
+                self.observed_sum(&residuals) + problem.prior_sum_of_squares(&unknowns, 0..unknowns.len());
             self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, &unknowns)?;
         }
         let cofactors = match end.basis {
-            Some(basis) if self.options.covariance => Some(self.cofactors(basis)?),
+            Some(basis) if self.options.covariance => Some(self.cofactors(basis, &end.unknowns)?),
             _ => None,
         };
         let (cofactors, prior_redundancy) = cofactors.unzip();
@@ -325,14 +326,18 @@ impl<'a, M: Model> Run<'a, '_, M> {
         })
     }
 
-    /// Cofactors, and the redundancy number of each unknown as an observation of itself.
-    fn cofactors(&mut self, basis: Basis<'a, M>) -> Result<(Cofactors, Vec<f64>), AdjustError> {
+    /// Cofactors, and the redundancy number of each unknown as an observation of itself; `values` are those of the basis.
+    fn cofactors(
+        &mut self,
+        basis: Basis<'a, M>,
+        values: &[f64],
+    ) -> Result<(Cofactors, Vec<f64>), AdjustError> {
         let Basis { equations, prior, factor } = basis;
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Invert, self.problem.layout().locals());
         let found = self.problem.system.invert(self.pool, factor, &equations, &prior, &mut between);
         let Inversion { mut cofactors, inversion_share, .. } = unless_stopped(found)?;
-        let prior_redundancy = self.problem.finish_cofactors(&mut cofactors, &self.datum);
+        let prior_redundancy = self.problem.finish_cofactors(&mut cofactors, &self.datum, values);
         let seconds = start.elapsed().as_secs_f64();
         self.seconds.invert = seconds * inversion_share;
         self.seconds.cofactors = seconds * (1.0 - inversion_share);

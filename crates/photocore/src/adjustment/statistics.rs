@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
+use nalgebra::Matrix3;
 use rayon::ThreadPool;
 
-use super::problem::{Model, Problem};
+use super::problem::{Model, Problem, Weighted};
 use crate::normals::Cofactors;
 
 /// What an adjustment counts.
@@ -60,8 +61,17 @@ impl<M> Problem<M> {
     }
 
     /// Redundancy number of each unknown as an observation of itself, 1 - w q; zero unless it is weighted. The cofactors of
-    /// fixed and held unknowns, which stand in the normal equations with unit weight, are set to zero on the way.
-    pub(super) fn finish_cofactors(&self, cofactors: &mut Cofactors, held: &[usize]) -> Vec<f64> {
+    /// fixed and held unknowns, which stand in the normal equations with unit weight, are set to zero on the way; `values` are those at
+    /// which these were formed.
+    pub(super) fn finish_cofactors(
+        &self,
+        cofactors: &mut Cofactors,
+        held: &[usize],
+        values: &[f64],
+    ) -> Vec<f64>
+    where
+        M: Model,
+    {
         let mut redundancy = vec![0.0; self.sd.len()];
         self.for_diagonal(cofactors, |unknown, q| {
             if self.is_weighted(unknown) {
@@ -70,7 +80,26 @@ impl<M> Problem<M> {
                 *q = 0.0;
             }
         });
+        self.stepping_together(cofactors, &self.weighted(values), &mut redundancy);
         redundancy
+    }
+
+    /// The redundancy numbers of weighted unknowns that step together, of equations a of unit weight: 1 - a Q a^T.
+    fn stepping_together(&self, cofactors: &Cofactors, weighted: &[Weighted], redundancy: &mut [f64]) {
+        let layout = self.layout();
+        let (mut weighted, mut start) = (weighted.iter().peekable(), 0);
+        for kept in 0..layout.kept() {
+            let (range, width) = (layout.kept_range(kept), layout.kept_dim(kept));
+            while let Some(own) = weighted.next_if(|own| own.first < range.end) {
+                let first = start + (own.first - range.start) * (width + 1);
+                let q = Matrix3::from_fn(|i, j| cofactors.kept[first + i * width + j]);
+                let shares = (own.coefficients * q * own.coefficients.transpose()).diagonal();
+                for (k, unknown) in own.unknowns().enumerate().filter(|&(_, i)| self.is_weighted(i)) {
+                    redundancy[unknown] = 1.0 - shares[k];
+                }
+            }
+            start += width * width;
+        }
     }
 
     /// Hands out the cofactor of every unknown.
@@ -140,10 +169,5 @@ impl<M> Problem<M> {
             let pairs = residuals[range.clone()].iter().zip(&self.observation_sd[range]);
             pairs.map(|(v, sd)| (v / sd).powi(2)).sum()
         })
-    }
-
-    /// Weighted sum of squares of observed minus computed unknowns.
-    pub fn prior_sum_of_squares(&self, values: &[f64]) -> f64 {
-        values.iter().enumerate().map(|(unknown, &value)| self.prior_square(unknown, value)).sum()
     }
 }

@@ -80,9 +80,9 @@ impl Bundle {
     /// The motions of a free network about the central photo, whose pose is held first, and for the scale the coordinate of another
     /// in which the two are farthest apart.
     pub(super) fn rigid_motions(&self, unknowns: &[f64]) -> Option<Motions> {
-        let (central, part) = self.central_photo().filter(|_| !self.placed)?;
         let placed = self.placed(&unknowns[self.of_stations()]);
         let photos = &placed.photos;
+        let (central, part) = self.central_photo()?;
         let origin = photos[central].orientation.centre();
         let mut vectors = vec![vec![0.0; unknowns.len()]; MOTIONS];
         for (point, &at) in self.coordinates(unknowns).enumerate() {
@@ -193,6 +193,12 @@ impl Assembled {
             [0, 1, 2].map(|k| (first + k, partials.column(k).norm()))
         };
         let carriers = points.chain(photos).flat_map(lengths).collect();
-        (Datum { carriers, left: if inner.scale { vec![] } else { vec![SCALE] } }, reference)
+        let left = if inner.scale { vec![] } else { vec![SCALE] };
+        (Datum { carriers, left, relative: false }, reference)
+    }
+
+    /// The datum in which cofactors are relative to some unknowns, scale staying as it is.
+    pub(super) fn relative(&self, carriers: Vec<(usize, f64)>) -> Datum {
+        Datum { carriers, left: vec![SCALE], relative: true }
     }
 }

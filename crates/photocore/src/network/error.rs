@@ -18,6 +18,29 @@ pub enum NetworkError {
     /// A photo names a camera that is not there.
     #[error("photo {0} names a camera that is not there")]
     NoCamera(usize),
+    /// There is no photo of this index.
+    #[error("there is no photo {0}")]
+    NoPhoto(usize),
+    /// There is no point of this index.
+    #[error("there is no point {0}")]
+    NoPoint(usize),
+    /// There is no camera of this index.
+    #[error("there is no camera {0}")]
+    CameraIndex(usize),
+    /// The point took no part in the adjustment.
+    #[error("point {0} was left out of the adjustment")]
+    LeftOut(usize),
+    /// Partials that are not those of functions of the unknowns.
+    #[error("{numbers} partials are not rows of {unknowns}, as many as there are unknowns")]
+    Partials {
+        /// How many unknowns there are.
+        unknowns: usize,
+        /// How many partials.
+        numbers: usize,
+    },
+    /// The state is not that of an adjustment of this network.
+    #[error("the adjusted state is not of this network")]
+    State,
     /// A camera has more or fewer standard deviations than parameters.
     #[error("camera {0} has not as many standard deviations as parameters")]
     CameraDeviations(usize),

@@ -55,6 +55,7 @@
 
 mod cameras;
 pub mod commons;
+mod covariance;
 mod datum;
 mod error;
 mod model;
@@ -66,6 +67,7 @@ mod problem;
 mod screening;
 mod solution;
 mod start;
+mod weighted_angles;
 
 use std::ops::ControlFlow;
 
@@ -77,13 +79,16 @@ use crate::normals::Ordering;
 
 pub use cameras::AdjustedCamera;
 pub use commons::{AdjustedCommon, Common, CommonKind};
+pub use covariance::{Covariances, NetworkDatum, Of, State};
 pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError};
 pub use mounts::Mount;
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
+pub(crate) use precision::median;
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+pub(crate) use start::meet;
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
@@ -277,10 +282,7 @@ impl Network {
             let reached = before.as_ref().map(|(_, reached)| reached);
             let assembled = pool.install(|| self.assemble(options, screened, reached))?;
             let problem = &assembled.problem;
-            let needed = problem.system.memory();
-            if let Some(available) = options.memory.filter(|&available| needed > available) {
-                return Err(NetworkError::Memory { needed, available });
-            }
+            assembled.check_memory(options)?;
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
@@ -289,11 +291,16 @@ impl Network {
             let earlier = before.take();
             adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
             if adjusted.collapsed.is_empty() {
+                let mut lost = 0.0;
                 if let Some(inner) = datum {
-                    self.take_to(inner, &options.adjustment, &assembled, &mut adjusted, pool, watch)?;
+                    lost =
+                        self.take_to(inner, &options.adjustment, &assembled, &mut adjusted, pool, watch)?;
                 }
                 let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
-                return Ok(Solution::new(self, options, &assembled, adjusted, collapsed));
+                let mut solution = Solution::new(self, options, &assembled, adjusted, collapsed);
+                solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
+                solution.lost_digits = lost;
+                return Ok(solution);
             }
             adjusted.collapsed.iter().for_each(|&point| left_out[assembled.points[point]] = true);
             let reached = assembled.reached(&adjusted.unknowns, self.points.len());
@@ -301,7 +308,13 @@ impl Network {
         }
     }
 
-    /// Takes an adjusted network to the datum of inner constraints.
+    /// Refuses photos that cannot carry a datum.
+    fn check_carriers(&self, inner: &InnerConstraints) -> Result<(), NetworkError> {
+        let vectors = self.poses == PoseNumbers::Vectors && !inner.photos.is_empty();
+        if vectors { Err(NetworkError::Vectors) } else { Ok(()) }
+    }
+
+    /// Takes an adjusted network to the datum of inner constraints; returns how large a part of its variances may be rounding.
     fn take_to(
         &self,
         inner: &InnerConstraints,
@@ -310,10 +323,8 @@ impl Network {
         adjusted: &mut Adjustment,
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<(), NetworkError> {
-        if self.poses == PoseNumbers::Vectors && !inner.photos.is_empty() {
-            return Err(NetworkError::Vectors);
-        }
+    ) -> Result<f64, NetworkError> {
+        self.check_carriers(inner)?;
         let (datum, reference) = assembled.datum(inner);
         let total = assembled.points.len();
         let mut between = |done| watch(Event::Progress { phase: adjustment::Phase::Invert, done, total });
@@ -321,7 +332,7 @@ impl Network {
         let found = adjustment::in_datum(problem, options, adjusted, &datum, &reference, pool, &mut between)?;
         adjusted.unknowns = found.unknowns;
         adjusted.cofactors = Some(found.cofactors);
-        Ok(())
+        Ok(found.lost)
     }
 
     /// Refuses a network that contradicts itself.

@@ -9,7 +9,7 @@ use super::commons::{CommonState, PlacedCommon};
 use super::mounts::{Mount, Mounted, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::{Image, Point};
-use crate::adjustment::{Model, Motions};
+use crate::adjustment::{Model, Motions, Weighted};
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
     self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
@@ -59,7 +59,7 @@ pub struct Bundle {
     pub order: Vec<usize>,
     /// How many images each photo has.
     pub images_on: Vec<usize>,
-    /// Which photos step by a rotation vector about their own axes: those with free angles.
+    /// Which photos step by a rotation vector about their own axes: those without a fixed angle.
     pub turning: Vec<bool>,
     /// What else was observed.
     pub observations: Vec<TiedObservation>,
@@ -555,6 +555,10 @@ impl Model for Bundle {
         turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
     }
 
+    fn weighted(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Weighted> {
+        self.weighted_angles(values, prior, sd)
+    }
+
     /// Intersects the points anew.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
         let photos = self.of_stations();
@@ -621,6 +625,10 @@ impl Model for Bundle {
     }
 
     fn motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        if self.placed { None } else { self.rigid_motions(unknowns) }
+    }
+
+    fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
         self.rigid_motions(unknowns)
     }
 

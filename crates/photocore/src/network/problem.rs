@@ -16,6 +16,7 @@ use crate::geometry::{
 use crate::normals::{Layout, System, TieRows};
 
 /// A problem, and what its parts are in the network.
+#[derive(Debug)]
 pub(super) struct Assembled {
     pub problem: Problem<Bundle>,
     /// The points that take part, in the order of the model.
@@ -31,6 +32,15 @@ pub(super) struct Reached {
 }
 
 impl Assembled {
+    /// Refuses what takes more memory than it may.
+    pub fn check_memory(&self, options: &Options) -> Result<(), NetworkError> {
+        let needed = self.problem.system.memory();
+        match options.memory {
+            Some(available) if needed > available => Err(NetworkError::Memory { needed, available }),
+            _ => Ok(()),
+        }
+    }
+
     /// Takes over adjusted unknowns; `count` is the number of all points.
     pub fn reached(&self, unknowns: &[f64], count: usize) -> Reached {
         let model = &self.problem.model;
@@ -114,11 +124,10 @@ impl Network {
         std::array::from_fn(|k| if turning(k) { near[k] } else { photo.observed[k] })
     }
 
-    /// Whether a photo's attitude may step by a rotation vector: its angles are all free. Those that are weighted stay unknowns
-    /// themselves, so that their weights stand in the diagonal; a fixed one keeps its bits.
+    /// Whether a photo's attitude steps by a rotation vector: a fixed angle keeps its bits.
     fn turns(&self, photo: usize) -> bool {
-        let free = self.photos[photo].sd[3..].iter().all(|sd| sd.is_infinite());
-        free && matches!(self.poses, PoseNumbers::Angles(_))
+        let fixed = self.photos[photo].sd[3..].contains(&0.0);
+        !fixed && matches!(self.poses, PoseNumbers::Angles(_))
     }
 
     /// The problem of the points that take part, from the initial values on or from those reached.

@@ -8,7 +8,7 @@ use super::model::{Owner, Placed};
 use super::problem::Assembled;
 use super::{
     AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
-    Point, UnitVariance,
+    Point, State, UnitVariance,
 };
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
 use crate::geometry::{AttitudeNumbers, Matrix3, Orientation, PoseNumbers};
@@ -115,6 +115,10 @@ pub struct Solution {
     pub degrees_of_freedom: i64,
     /// Variance of unit weight; None where there are no degrees of freedom.
     pub variance_of_unit_weight: Option<f64>,
+    /// Where the adjustment has ended: what covariances are computed from, and other datums.
+    pub state: State,
+    /// About how large a part of the variances rounding may be, in a datum that they were taken to; zero otherwise.
+    pub lost_digits: f64,
     /// Status, iterations, counts, operations and times.
     pub adjustment: Adjustment,
 }
@@ -162,6 +166,14 @@ impl Solution {
             weak_commons: adjustment.weak.iter().filter_map(|&unknown| of_common(problem, unknown)).collect(),
             datum: adjustment.datum.iter().filter_map(of_photo).collect(),
             dropped: dropped.clone(),
+            state: State {
+                unknowns: vec![],
+                held: adjustment.datum.clone(),
+                collapsed: collapsed.clone(),
+                ordering: adjustment.ordering,
+                datum: None,
+            },
+            lost_digits: 0.0,
             collapsed,
             sums_of_squares,
             degrees_of_freedom,
@@ -169,6 +181,7 @@ impl Solution {
             adjustment,
         };
         solution.find_behind(assembled, &unknowns);
+        solution.state.unknowns = unknowns;
         solution.adjustment.cofactors = None;
         solution.adjustment.release_observations();
         solution
@@ -394,7 +407,7 @@ fn sums_of_squares(
     observations: &[Option<AdjustedObservation>],
 ) -> SumsOfSquares {
     let stations = problem.model.of_stations();
-    let squares = |range: Range<usize>| range.map(|i| problem.prior_square(i, unknowns[i])).sum::<f64>();
+    let squares = |range: Range<usize>| problem.prior_sum_of_squares(unknowns, range);
     let rows = problem.layout().rows();
     let of_images = &problem.observation_sd[..rows * problem.model.images.len()];
     SumsOfSquares {

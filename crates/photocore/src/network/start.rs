@@ -97,7 +97,7 @@ fn along(ray: &Ray, distance: f64) -> Vector3 {
 
 /// The position nearest to all rays, in front of every camera: sum of (I - d d^T)(P - O) = 0. None when the rays are parallel or
 /// meet behind a camera.
-fn meet(rays: &[Ray]) -> Option<Vector3> {
+pub fn meet(rays: &[Ray]) -> Option<Vector3> {
     let first = rays.first()?.origin;
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for ray in rays {

@@ -36,14 +36,16 @@ pub struct GroupRows<'a> {
     pub common: &'a mut [f64],
 }
 
-/// Weights of the unknowns themselves: equations `x_i = constant_i` of the given weight. Both have the length of the
+/// Weights of the unknowns themselves: equations `x_i = constant_i` of the given weight. The first two have the length of the
 /// vector of unknowns.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Prior {
     /// Weight w of each unknown; 0 leaves it free.
     pub weight: Vec<f64>,
     /// Weight times constant, w l.
     pub right: Vec<f64>,
+    /// Weights between unknowns i > j of one kept block: (i, j, w), ascending.
+    pub between: Vec<(usize, usize, f64)>,
 }
 
 impl Prior {

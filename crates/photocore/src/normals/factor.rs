@@ -15,7 +15,7 @@ use super::front::Front;
 use super::layout::Layout;
 use super::panels::{Handover, Panels, lock};
 use super::stack::Stack;
-use super::symbolic::{Supernode, Symbolic};
+use super::symbolic::Supernode;
 use super::system::System;
 use super::tie_equations::TieEquations;
 use super::watch::{Between, Control, Stopped, watched};
@@ -29,7 +29,7 @@ pub struct Factor {
     /// Diagonal of the normal equations before any elimination, in the order of elimination.
     diagonal: Vec<f64>,
     /// Lost pivots, in the order of elimination.
-    lost: Vec<usize>,
+    pub(super) lost: Vec<usize>,
     /// Pivots that may be nothing but rounding.
     doubtful: Vec<usize>,
     /// Sum of squares of the right-hand sides of all equations (priors not counted).
@@ -286,6 +286,11 @@ impl<E: Equations> Formation<'_, E> {
             front.right[column] += self.prior.right[unknown];
             front.panel[column * (front.height + 1)] += weight + self.damping * front.diagonal[column];
             front.diagonal[column] *= 1.0 + self.damping;
+            let between = &self.prior.between;
+            let own = between.partition_point(|&(i, ..)| i < unknown);
+            for &(_, other, weight) in between[own..].iter().take_while(|&&(i, ..)| i == unknown) {
+                front.panel[(column - (unknown - other)) * front.height + column] += weight;
+            }
         }
     }
 }
@@ -355,7 +360,7 @@ impl Factor {
     }
 
     /// The unknowns that take part in a vector over the unknowns that are not local, in the order of elimination.
-    fn taking_part(&self, layout: &Layout, mut vector: Vec<f64>) -> Vec<usize> {
+    pub(super) fn taking_part(&self, layout: &Layout, mut vector: Vec<f64>) -> Vec<usize> {
         self.scale(&mut vector);
         let largest = vector.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         let shares = self.unknowns(layout).zip(&vector);
@@ -400,7 +405,7 @@ impl Factor {
     }
 
     /// Takes each unknown in units of what its equations alone determine.
-    fn scale(&self, vector: &mut [f64]) {
+    pub(super) fn scale(&self, vector: &mut [f64]) {
         for (value, &diagonal) in vector.iter_mut().zip(&self.diagonal) {
             *value *= if diagonal > 0.0 && diagonal.is_finite() { diagonal.sqrt() } else { 1.0 };
         }
@@ -426,16 +431,11 @@ impl Factor {
     }
 
     /// L^-T e: the combination of unknowns that a pivot stands for.
-    fn combination(&self, pivot: usize) -> Vec<f64> {
+    pub(super) fn combination(&self, pivot: usize) -> Vec<f64> {
         let mut x = vec![0.0; self.right.len()];
         x[pivot] = 1.0;
         self.solve_backward(&mut x);
         x
-    }
-
-    /// The combinations of unknowns that the equations do not determine, if any.
-    pub fn deficiency(&self) -> Option<Deficiency<'_>> {
-        (!self.lost.is_empty()).then_some(Deficiency { factor: self })
     }
 
     /// x := L^-T x.
@@ -457,46 +457,4 @@ impl Factor {
             x[first..first + s.width].copy_from_slice(&own[..s.width]);
         }
     }
-}
-
-/// Unknowns that the equations do not determine.
-#[derive(Debug)]
-pub struct Deficiency<'a> {
-    factor: &'a Factor,
-}
-
-impl Deficiency<'_> {
-    /// How many combinations of unknowns are not determined.
-    pub fn defect(&self) -> usize {
-        self.factor.lost.len()
-    }
-
-    /// For each of them the kept blocks it moves (the border is the block after the last), ascending: the blocks that take
-    /// at least a hundredth of the largest share in a null vector, each unknown in units of what its equations alone determine.
-    pub fn blocks(&self) -> Vec<Vec<usize>> {
-        let symbolic = &*self.factor.panels.symbolic;
-        let vectors = self.factor.lost.iter().map(|&pivot| {
-            let mut vector = self.factor.combination(pivot);
-            self.factor.scale(&mut vector);
-            blocks_moved(symbolic, &vector)
-        });
-        vectors.collect()
-    }
-
-    /// For each of them the unknowns that it moves, ascending: those that take at least a tenth of the largest share.
-    pub fn unknowns(&self, layout: &Layout) -> Vec<Vec<usize>> {
-        let Factor { lost, .. } = self.factor;
-        lost.iter().map(|&pivot| self.factor.taking_part(layout, self.factor.combination(pivot))).collect()
-    }
-}
-
-fn blocks_moved(symbolic: &Symbolic, vector: &[f64]) -> Vec<usize> {
-    let share = |position: usize| {
-        vector[symbolic.range(position)].iter().fold(0.0, |most: f64, value| most.max(value.abs()))
-    };
-    let largest = (0..symbolic.blocks()).map(share).fold(0.0, f64::max);
-    let moved = (0..symbolic.blocks()).filter(|&position| share(position) >= 0.01 * largest);
-    let mut blocks: Vec<usize> = moved.map(|position| symbolic.block(position)).collect();
-    blocks.sort_unstable();
-    blocks
 }

@@ -9,7 +9,7 @@
 //! 3. [`System::factor`]: the normal equations formed, the local blocks reduced out and the rest factored (block Cholesky on dense
 //!    panels), front by front;
 //! 4. [`System::solve`], and [`System::solve_for`] for any other right-hand sides;
-//! 5. [`System::invert`]: the selected inverse, and cofactors of everything.
+//! 5. [`System::invert`]: the selected inverse, and cofactors of everything; [`System::reduce`] those of any linear functions.
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -28,7 +28,7 @@
 //! // Three local and two kept unknowns; the first local one is held at zero by an equation of its own.
 //! let layout = Layout::new(1, 1, &[1, 1], vec![0, 2, 4, 6], vec![0, 1, 0, 1, 0, 1])?;
 //! let system = System::new(layout, Ordering::Auto);
-//! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5] };
+//! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5], between: vec![] };
 //! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
 //! let mut go_on = |_| ControlFlow::Continue(());
 //! let factor = system.factor(&pool, &Differences, &prior, 0.0, &mut go_on).continue_value().expect("not stopped");
@@ -38,12 +38,14 @@
 //! ```
 
 mod cofactors;
+mod deficiency;
 mod dense;
 mod dissection;
 mod equation_block;
 mod equations;
 mod factor;
 mod front;
+mod functions;
 mod graph;
 mod incidence;
 mod invert;
@@ -52,6 +54,7 @@ mod memory;
 mod minimum_degree;
 mod ordering;
 mod panels;
+mod products;
 mod selected;
 mod solve;
 mod solve_for;
@@ -67,8 +70,10 @@ mod watch;
 mod workspace;
 
 pub use cofactors::Cofactors;
+pub use deficiency::Deficiency;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
-pub use factor::{Deficiency, Factor};
+pub use factor::Factor;
+pub use functions::{Function, Functions};
 pub use graph::Graph;
 pub use invert::Inversion;
 pub use layout::{Layout, LayoutError, Tie};

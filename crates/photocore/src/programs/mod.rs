@@ -1,6 +1,9 @@
 //! The photogrammetric models beside the network.
 
 pub mod comparator;
+pub mod first_values;
+pub mod relative_orientation;
 pub mod resection;
+mod sampling;
 pub mod similarity;
 pub mod stellar;

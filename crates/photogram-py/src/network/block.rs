@@ -2,13 +2,14 @@
 
 use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
-use photocore::geometry::{self, PoseNumbers};
+use photocore::geometry::PoseNumbers;
 use photocore::network::{Camera, Network, Options, Photo, Start, UnitVariance};
 use pyo3::prelude::*;
 
 use super::solution::BlockSolution;
 use super::{BlockError, adjusted, failure, images, points};
 use crate::arrays::{check_lengths, indices, rows};
+use crate::camera::named;
 use crate::commons::{CommonRow, MountRow, common, mount};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
 use crate::observations::{Group, observations};
@@ -23,8 +24,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 type CameraRow = (String, Vec<f64>, Vec<f64>);
 
 fn camera((model, parameters, sd): CameraRow) -> PyResult<Camera> {
-    let camera = geometry::Camera::named(&model, &parameters).ok_or_else(|| unknown("camera", &model))?;
-    Ok(Camera { camera, sd })
+    Ok(Camera { camera: named(&model, &parameters)?, sd })
 }
 
 #[pyfunction]

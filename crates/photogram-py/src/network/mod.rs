@@ -2,6 +2,7 @@
 
 mod block;
 mod collection;
+mod first_values;
 mod solution;
 
 use numpy::PyReadonlyArrayDyn;
@@ -32,6 +33,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("CollectionError", module.py().get_type::<CollectionError>())?;
     block::register(module)?;
     collection::register(module)?;
+    first_values::register(module)?;
     solution::register(module)
 }
 
@@ -97,6 +99,12 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::CameraDeviations(_)
         | Failure::CommonDeviations(_)
         | Failure::Mount(_)
+        | Failure::NoPhoto(_)
+        | Failure::NoPoint(_)
+        | Failure::CameraIndex(_)
+        | Failure::LeftOut(_)
+        | Failure::Partials { .. }
+        | Failure::State
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors

@@ -76,7 +76,7 @@ impl ObservationModel for Attitude {
 }
 
 /// v = Log(computed^T observed), and Jl = Jr^-1(-v): a turn of the computed by a small vector about its own axes takes Jl times it away.
-pub(super) fn misalignment(computed: &Matrix3, observed: &Matrix3) -> (Vector3, Matrix3) {
+pub(in super::super) fn misalignment(computed: &Matrix3, observed: &Matrix3) -> (Vector3, Matrix3) {
     let residual = rotation_angle_axis(&computed.tr_mul(observed));
     (residual, right_jacobian_inverse(&-residual))
 }

@@ -15,6 +15,7 @@ use super::commons::{Common, CommonKind};
 use crate::geometry::Matrix3;
 
 pub use adjusted::{AdjustedObservation, KindSums};
+pub(super) use attitude::misalignment;
 pub use precision::Precision;
 pub(super) use rows::{CommonSite, PhotoSite, PointSite};
 pub use rows::{Rows, Sites};

@@ -250,7 +250,8 @@ impl Solution {
         let prior_redundancy = adjustment.prior_redundancy.take();
         let residuals = std::mem::take(&mut adjustment.residuals);
         let redundancy = adjustment.redundancy.take();
-        let sum_of_squares = problem.sum_of_squares(&residuals) + problem.prior_sum_of_squares(&unknowns);
+        let sum_of_squares =
+            problem.sum_of_squares(&residuals) + problem.prior_sum_of_squares(&unknowns, 0..unknowns.len());
         let border = layout.border_range();
         let missing = || vec![f64::NAN; border.len() * border.len()];
         Self {

@@ -194,6 +194,15 @@ pub fn orient(
     }
 }
 
+/// The seven parameters by least squares with equal weights, in closed form where all control is full.
+///
+/// # Errors
+/// Control that does not determine the parameters, or a mirror image.
+pub fn closed_form(stations: &[Station]) -> Result<Similarity, SimilarityError> {
+    determinacy::check_counts(stations)?;
+    Ok(start::choose(stations, Start::ClosedForm)?.similarity)
+}
+
 /// Adjusts by the engine; after the cycles of the bulletin only for cofactors and statistics.
 fn adjust(
     stations: &[Station],

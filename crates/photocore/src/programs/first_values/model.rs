@@ -1,0 +1,188 @@
+//! A model: photos and points in one frame, and the intersection of its rays.
+
+use super::{FirstValues, Search, Source};
+use crate::geometry::{Matrix3, Pose, Ray, Vector3};
+use crate::network::{median, meet};
+use crate::programs::similarity::Similarity;
+
+/// Rays of a point must meet at this angle, radians: below it their point says little along them.
+const LEAST_ANGLE: f64 = 0.01;
+/// An image fits within this multiple of the standard deviation that the median of all says, and of its own.
+const FITS: f64 = 6.0;
+const FITS_OWN: f64 = 4.0;
+/// Pairs of rays that are tried where not all rays of a point meet, at the most.
+const PAIRS: usize = 45;
+/// The length of a vector with two components of standard deviation 1 has this median.
+pub(super) const MEDIAN_LENGTH: f64 = 1.1774;
+
+/// Photos and points in one frame.
+#[derive(Debug, Clone)]
+pub struct Model {
+    pub poses: Vec<Option<(Pose, Source)>>,
+    pub points: Vec<Option<Vector3>>,
+    /// The images that do not fit.
+    pub aside: Vec<bool>,
+    /// Angle within which an image fits, radians.
+    pub tolerance: f64,
+    /// Whether control belongs to it.
+    pub object: bool,
+}
+
+impl Model {
+    /// No photo and no point.
+    pub fn empty(given: &FirstValues) -> Self {
+        Self {
+            poses: vec![None; given.photos.len()],
+            points: vec![None; given.points.len()],
+            aside: vec![false; given.sightings.len()],
+            tolerance: 0.0,
+            object: false,
+        }
+    }
+
+    /// Given poses and control.
+    pub fn of_known(search: &Search<'_>) -> Self {
+        let mut model = Self::empty(search.given);
+        model.object = true;
+        for (pose, known) in model.poses.iter_mut().zip(&search.given.photos) {
+            *pose = known.pose.map(|pose| (pose, Source::Given));
+        }
+        model.intersect(search);
+        model
+    }
+
+    /// Number of its photos.
+    pub fn count(&self) -> usize {
+        self.poses.iter().flatten().count()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.poses.iter().all(Option::is_none)
+    }
+
+    /// Whether control or observed positions say where it is.
+    pub fn is_anchored(&self, search: &Search<'_>) -> bool {
+        let held = |sd: &f64| sd.is_finite();
+        search.given.points.iter().any(|point| point.sd.iter().any(held))
+            || search.given.photos.iter().any(|photo| photo.position.is_some())
+    }
+
+    fn ray(&self, search: &Search<'_>, image: usize) -> Option<Ray> {
+        let sighting = &search.given.sightings[image];
+        let (pose, _) = self.poses[sighting.photo]?;
+        Some(Ray { origin: pose.position, direction: pose.attitude * sighting.direction })
+    }
+
+    /// The rays of a point, with their images.
+    fn rays(&self, search: &Search<'_>, point: usize) -> Vec<(usize, Ray)> {
+        search.of_point[point].iter().filter_map(|&image| Some((image, self.ray(search, image)?))).collect()
+    }
+
+    fn fits(&self, search: &Search<'_>, at: &Vector3, (image, ray): &(usize, Ray)) -> bool {
+        misfit(ray, at) <= self.tolerance.max(FITS_OWN * search.given.sightings[*image].sd)
+    }
+
+    /// Intersects all points anew: first to see how well rays meet, then with those that fit.
+    pub fn intersect(&mut self, search: &Search<'_>) {
+        if self.tolerance == 0.0 {
+            self.tolerance = f64::INFINITY;
+            (0..self.points.len()).for_each(|point| self.place(search, point));
+            self.narrow(search);
+        }
+        (0..self.points.len()).for_each(|point| self.place(search, point));
+    }
+
+    /// Takes what fits from the median of all.
+    pub fn narrow(&mut self, search: &Search<'_>) {
+        let sizes = self.misfits(search).into_iter().map(|(_, misfit)| misfit).collect();
+        self.tolerance = median(sizes).map_or(0.0, |middle| FITS * middle / MEDIAN_LENGTH);
+    }
+
+    /// Images of points that have a place, and by what angle they miss it; those set aside are left out.
+    pub fn misfits(&self, search: &Search<'_>) -> Vec<(usize, f64)> {
+        let of = |image: usize| {
+            let point = self.points[search.given.sightings[image].point]?;
+            Some((image, misfit(&self.ray(search, image)?, &point)))
+        };
+        (0..self.aside.len()).filter(|&image| !self.aside[image]).filter_map(of).collect()
+    }
+
+    /// Puts a point where its rays meet; control of the object stays where it is. Rays that do not fit are set aside.
+    pub fn place(&mut self, search: &Search<'_>, point: usize) {
+        let rays = self.rays(search, point);
+        let control = search.given.points[point].position().filter(|_| self.object);
+        let all: Vec<Ray> = rays.iter().map(|(_, ray)| *ray).collect();
+        let met = || {
+            let at = meet(&all).filter(|at| rays.iter().all(|ray| self.fits(search, at, ray)));
+            at.or_else(|| self.consensus(search, &rays))
+        };
+        let placed = control.or_else(met);
+        for ray in &rays {
+            let fits = placed.is_some_and(|at| self.fits(search, &at, ray));
+            self.aside[ray.0] = !fits && (rays.len() > 1 || control.is_some());
+        }
+        self.points[point] = placed.filter(|_| control.is_some() || widest(&all) > LEAST_ANGLE);
+    }
+
+    /// Where most rays meet, of three or more: pairs propose places.
+    fn consensus(&self, search: &Search<'_>, rays: &[(usize, Ray)]) -> Option<Vector3> {
+        if rays.len() < 3 {
+            return None;
+        }
+        let fitting = |at: &Vector3| -> Vec<Ray> {
+            rays.iter().filter(|ray| self.fits(search, at, ray)).map(|(_, ray)| *ray).collect()
+        };
+        let pairs = (0..rays.len()).flat_map(|i| (0..i).map(move |j| [i, j])).take(PAIRS);
+        let places = pairs.filter_map(|pair| meet(&pair.map(|k| rays[k].1)));
+        let best = places.map(|at| fitting(&at)).max_by_key(Vec::len).filter(|best| best.len() > 1)?;
+        meet(&best)
+    }
+
+    /// Carries it by a similarity from object (control) to this model.
+    pub fn carried(&self, similarity: &Similarity) -> Self {
+        let mut carried = self.clone();
+        let attitude = |a: &Matrix3| similarity.rotation.tr_mul(a);
+        for (pose, _) in carried.poses.iter_mut().flatten() {
+            let position = similarity.control_at(&pose.position);
+            *pose = Pose { position, attitude: attitude(&pose.attitude) };
+        }
+        carried.points.iter_mut().flatten().for_each(|point| *point = similarity.control_at(point));
+        carried
+    }
+
+    /// Counts it from its first photo, in bases to the farthest one; that photo.
+    pub fn count_from_first_photo(&mut self) -> usize {
+        let Some((first, (origin, _))) =
+            self.poses.iter().enumerate().find_map(|(k, pose)| Some((k, (*pose)?)))
+        else {
+            return 0;
+        };
+        let others = self.poses.iter().enumerate().skip(first + 1).filter_map(|(_, pose)| *pose);
+        let base = others.map(|(pose, _)| (pose.position - origin.position).norm()).next().unwrap_or(1.0);
+        let to_first = Similarity {
+            rotation: origin.attitude,
+            scale: if base > 0.0 { base } else { 1.0 },
+            shift: Vector3::zeros(),
+            control_centre: Vector3::zeros(),
+            model_centre: origin.position,
+        };
+        *self = self.carried(&to_first);
+        first
+    }
+}
+
+/// The angle by which a ray misses a point, radians; more than 1 behind the photo.
+pub(super) fn misfit(ray: &Ray, point: &Vector3) -> f64 {
+    let to = point - ray.origin;
+    let length = to.norm();
+    if length > 0.0 { (to / length - ray.direction).norm() } else { 2.0 }
+}
+
+/// The largest angle between two rays.
+fn widest(rays: &[Ray]) -> f64 {
+    let angles = rays
+        .iter()
+        .enumerate()
+        .flat_map(|(i, a)| rays[..i].iter().map(move |b| a.direction.cross(&b.direction).norm()));
+    angles.fold(0.0, f64::max)
+}

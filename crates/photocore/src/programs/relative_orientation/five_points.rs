@@ -1,0 +1,162 @@
+//! Relative orientation from five points: the essential matrix (Nister 2004) by the action matrix of its cubic equations (Stewenius,
+//! Engels and Nister, ISPRS Journal 60, 2006).
+//!
+//! Five equations u1^T E u2 = 0 leave E = x E1 + y E2 + z E3 + E4. Ten cubic equations hold for x, y, z: det E = 0 and
+//! E E^T E - 1/2 tr(E E^T) E = 0. Eliminating the ten monomials of degree three leaves products with x of the ten lower ones: a matrix
+//! whose real eigenvalues are x.
+
+use nalgebra::{SMatrix, SVector, Schur};
+
+use crate::geometry::{Matrix3, Vector3};
+
+/// Monomials in x, y, z by their exponents: ten of degree three, then ten below. The first six are x times the first six of the lower.
+const EXPONENTS: [[usize; 3]; 20] = [
+    [3, 0, 0],
+    [2, 1, 0],
+    [2, 0, 1],
+    [1, 2, 0],
+    [1, 1, 1],
+    [1, 0, 2],
+    [0, 3, 0],
+    [0, 2, 1],
+    [0, 1, 2],
+    [0, 0, 3],
+    [2, 0, 0],
+    [1, 1, 0],
+    [1, 0, 1],
+    [0, 2, 0],
+    [0, 1, 1],
+    [0, 0, 2],
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [0, 0, 0],
+];
+/// The imaginary part of an eigenvalue, relative to its size, up to which it counts as real: two that fall together come out as a pair.
+const NOT_REAL: f64 = 1e-3;
+/// Steps of the decompositions at the most.
+const STEPS: usize = 1000;
+
+/// Coefficients of a polynomial of degree three at the most.
+type Polynomial = [f64; 20];
+
+/// Where a product of monomials stands.
+const PLACE: [[[usize; 4]; 4]; 4] = places();
+
+const fn places() -> [[[usize; 4]; 4]; 4] {
+    let mut places = [[[0; 4]; 4]; 4];
+    let mut index = 0;
+    while index < 20 {
+        let [i, j, k] = EXPONENTS[index];
+        places[i][j][k] = index;
+        index += 1;
+    }
+    places
+}
+
+/// The product of two polynomials whose degrees sum to three at the most.
+fn product(a: &Polynomial, b: &Polynomial) -> Polynomial {
+    let mut sum = [0.0; 20];
+    for (p, left) in EXPONENTS.iter().zip(a).filter(|(_, value)| **value != 0.0) {
+        for (q, right) in EXPONENTS.iter().zip(b).filter(|(_, value)| **value != 0.0) {
+            sum[PLACE[p[0] + q[0]][p[1] + q[1]][p[2] + q[2]]] += left * right;
+        }
+    }
+    sum
+}
+
+/// a + f b
+fn plus(a: &Polynomial, f: f64, b: &Polynomial) -> Polynomial {
+    std::array::from_fn(|k| a[k] + f * b[k])
+}
+
+/// Every essential matrix E with u1^T E u2 = 0 for five pairs of rays (in the axes of the first and of the second photo): up to ten.
+pub fn five_points(pairs: &[[Vector3; 2]; 5]) -> Vec<Matrix3> {
+    let Some(basis) = null_space(pairs) else { return vec![] };
+    let entry = |i: usize, j: usize| -> Polynomial {
+        let mut linear = [0.0; 20];
+        (0..4).for_each(|k| linear[16 + k] = basis[k][(i, j)]);
+        linear
+    };
+    let e: [[Polynomial; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
+    let equations = constraints(&e);
+    let (left, right) = (equations.fixed_columns::<10>(0), equations.fixed_columns::<10>(10));
+    let Some(reduced) = left.into_owned().lu().solve(&right.into_owned()) else { return vec![] };
+    let action = action_matrix(&reduced);
+    roots(&action)
+        .into_iter()
+        .filter_map(|root| {
+            let v = eigenvector(&action, root)?;
+            let found = (v[6] * basis[0] + v[7] * basis[1] + v[8] * basis[2]) / v[9] + basis[3];
+            let size = found.norm();
+            (size.is_finite() && size > 0.0).then(|| found / size)
+        })
+        .collect()
+}
+
+/// Four matrices that span what the five equations leave.
+fn null_space(pairs: &[[Vector3; 2]; 5]) -> Option<[Matrix3; 4]> {
+    let mut equations = SMatrix::<f64, 9, 9>::zeros();
+    for (row, [first, second]) in pairs.iter().enumerate() {
+        (0..9).for_each(|k| equations[(row, k)] = first[k / 3] * second[k % 3]);
+    }
+    let rows = equations.try_svd(false, true, f64::EPSILON, STEPS)?.v_t?;
+    Some(std::array::from_fn(|k| Matrix3::from_fn(|i, j| rows[(5 + k, 3 * i + j)])))
+}
+
+/// det E = 0 and E E^T E - 1/2 tr(E E^T) E = 0.
+fn constraints(e: &[[Polynomial; 3]; 3]) -> SMatrix<f64, 10, 20> {
+    let sum = |terms: [Polynomial; 3]| plus(&plus(&terms[0], 1.0, &terms[1]), 1.0, &terms[2]);
+    let square = |i: usize, j: usize| sum(std::array::from_fn(|k| product(&e[i][k], &e[j][k])));
+    let mut squares: [[Polynomial; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| square(i, j)));
+    let trace = sum([squares[0][0], squares[1][1], squares[2][2]]);
+    (0..3).for_each(|i| squares[i][i] = plus(&squares[i][i], -0.5, &trace));
+    let cubic = |i: usize, j: usize| sum(std::array::from_fn(|k| product(&squares[i][k], &e[k][j])));
+    let minor = |a: usize, b: usize| plus(&product(&e[1][a], &e[2][b]), -1.0, &product(&e[1][b], &e[2][a]));
+    let determinant = sum([
+        product(&e[0][0], &minor(1, 2)),
+        product(&e[0][1], &minor(2, 0)),
+        product(&e[0][2], &minor(0, 1)),
+    ]);
+    let rows: Vec<Polynomial> =
+        (0..9).map(|k| cubic(k / 3, k % 3)).chain(std::iter::once(determinant)).collect();
+    SMatrix::from_fn(|row, column| rows[row][column])
+}
+
+/// Multiplication by x of the ten lower monomials, modulo the equations.
+fn action_matrix(reduced: &SMatrix<f64, 10, 10>) -> SMatrix<f64, 10, 10> {
+    let mut action = SMatrix::<f64, 10, 10>::zeros();
+    for row in 0..6 {
+        action.set_row(row, &-reduced.row(row));
+    }
+    // x x, x y, x z, x 1
+    for (row, column) in [(6, 0), (7, 1), (8, 2), (9, 6)] {
+        action[(row, column)] = 1.0;
+    }
+    action
+}
+
+fn roots(action: &SMatrix<f64, 10, 10>) -> Vec<f64> {
+    if !action.iter().all(|value| value.is_finite()) {
+        return vec![];
+    }
+    let Some(schur) = Schur::try_new(*action, f64::EPSILON, STEPS) else { return vec![] };
+    let values = schur.complex_eigenvalues();
+    values.iter().filter(|value| value.im.abs() <= NOT_REAL * (1.0 + value.re.abs())).map(|v| v.re).collect()
+}
+
+/// The monomials that belong to a root, by inverse iteration.
+fn eigenvector(action: &SMatrix<f64, 10, 10>, root: f64) -> Option<SVector<f64, 10>> {
+    let near = root + 1e-10 * (1.0 + root.abs());
+    let factors = (action - SMatrix::<f64, 10, 10>::identity() * near).lu();
+    let mut vector = SVector::<f64, 10>::repeat(1.0);
+    for _ in 0..3 {
+        vector = factors.solve(&vector)?;
+        let size = vector.norm();
+        if !size.is_finite() || size == 0.0 {
+            return None;
+        }
+        vector /= size;
+    }
+    Some(vector)
+}

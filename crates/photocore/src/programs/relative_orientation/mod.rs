@@ -1,0 +1,148 @@
+//! Relative orientation: the pose of one photo in the axes of another, from the rays of common points alone.
+//!
+//! The first photo stands at the origin, its attitude is the identity, and the base has length 1. Samples of five points give essential
+//! matrices ([`five_points`]), samples of four the poses of a homography, the rival where the scene is a plane. Each is judged by the
+//! median of what the pairs of rays miss each other by, those that meet behind a photo (u3 > 0) missing altogether; least squares comes
+//! after (`first_values`).
+//!
+//! ```
+//! use photocore::geometry::{Pose, Vector3, rotation};
+//! use photocore::programs::relative_orientation::relative_orientation;
+//!
+//! let second = Pose { position: Vector3::new(1.0, 0.0, 0.0), attitude: rotation([0.1, -0.2, 0.3]).transpose() };
+//! let point = |k: usize| Vector3::new((k % 4) as f64 - 1.0, (k / 4) as f64 - 1.0, -4.0 - (k * k % 5) as f64);
+//! let pairs: Vec<[Vector3; 2]> =
+//!     (0..12).map(point).map(|p| [p.normalize(), second.sight(&p).normalize()]).collect();
+//! let best = &relative_orientation(&pairs)[0];
+//! assert!((best.oriented.base - second.position).norm() < 1e-6);
+//! assert!((best.oriented.attitude - second.attitude).norm() < 1e-6);
+//! ```
+
+mod five_points;
+mod planar;
+
+pub use five_points::five_points;
+pub use planar::over_plane;
+
+use super::sampling::Samples;
+use crate::geometry::{Matrix3, Vector3};
+use crate::network::median;
+
+/// Samples that are drawn: with a third of the pairs wrong, one in eight has none of them.
+const SAMPLES: usize = 80;
+/// Pairs by which a pose is judged at the most, evenly taken.
+const JUDGES: usize = 120;
+/// A rival stays that fits at most this much worse,
+const RIVAL: f64 = 3.0;
+/// unless its direction cosines are as near as this to those of a better one.
+const SAME: f64 = 0.02;
+/// Rivals at the most.
+const MOST: usize = 3;
+/// Steps of a decomposition at the most.
+const STEPS: usize = 1000;
+
+/// The pose of the second photo in the axes of the first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Oriented {
+    /// From the first projection centre to the second, of unit length.
+    pub base: Vector3,
+    /// A, second photo to first.
+    pub attitude: Matrix3,
+}
+
+/// A pose, and how well it fits.
+#[derive(Debug, Clone, Copy)]
+pub struct Candidate {
+    /// The pose.
+    pub oriented: Oriented,
+    /// Median of the angles by which pairs of rays miss each other, radians.
+    pub misfit: f64,
+}
+
+impl Oriented {
+    /// Distances along two rays to where they pass each other, in bases.
+    pub fn distances(&self, [first, second]: &[Vector3; 2]) -> [f64; 2] {
+        let turned = self.attitude * second;
+        let normal = first.cross(&turned);
+        let square = normal.norm_squared();
+        [self.base.cross(&turned).dot(&normal) / square, self.base.cross(first).dot(&normal) / square]
+    }
+
+    /// The angle by which two rays miss each other, radians; 1 where they meet behind a photo.
+    pub fn misfit(&self, pair: &[Vector3; 2]) -> f64 {
+        let [first, second] = pair;
+        let turned = self.attitude * second;
+        let (in_first, in_second) = (self.base.cross(&turned), first.cross(&self.base));
+        let size = (in_first.norm_squared() + in_second.norm_squared()).sqrt();
+        if size == 0.0 || self.distances(pair).iter().any(|&distance| distance < 0.0) {
+            return 1.0;
+        }
+        first.dot(&in_first).abs() / size
+    }
+
+    /// The angle at which two rays meet, radians.
+    pub fn angle(&self, [first, second]: &[Vector3; 2]) -> f64 {
+        first.angle(&(self.attitude * second))
+    }
+
+    fn score(&self, pairs: &[[Vector3; 2]]) -> f64 {
+        median(pairs.iter().map(|pair| self.misfit(pair)).collect()).unwrap_or(1.0)
+    }
+
+    fn is_like(&self, other: &Self) -> bool {
+        (self.attitude - other.attitude).amax() < SAME && (self.base - other.base).amax() < 5.0 * SAME
+    }
+}
+
+/// Poses of the second photo that explain pairs of unit rays, each in the axes of its photo: the best, and rivals that fit nearly as
+/// well (two over a plane). None with fewer than six pairs, or where no pose has half of them in front.
+pub fn relative_orientation(pairs: &[[Vector3; 2]]) -> Vec<Candidate> {
+    if pairs.len() < 6 {
+        return vec![];
+    }
+    let step = pairs.len().div_ceil(JUDGES);
+    let judges: Vec<[Vector3; 2]> = pairs.iter().step_by(step).copied().collect();
+    let mut samples = Samples::new(pairs.len());
+    let mut found: Vec<Candidate> = Vec::new();
+    for _ in 0..SAMPLES {
+        let of_five = samples.draw::<5>().map(|k| pairs[k]);
+        let of_four = samples.draw::<4>().map(|k| pairs[k]);
+        let spatial = five_points(&of_five).into_iter().filter_map(|e| in_front(&e, &of_five));
+        let all: Vec<Oriented> = spatial.chain(over_plane(&of_four)).collect();
+        let judged = all.into_iter().map(|oriented| Candidate { oriented, misfit: oriented.score(&judges) });
+        found.extend(judged.filter(|candidate| candidate.misfit < 0.5));
+        found = rivals(found);
+    }
+    found
+}
+
+/// The best, and what is unlike it and fits nearly as well.
+fn rivals(mut found: Vec<Candidate>) -> Vec<Candidate> {
+    found.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    let Some(best) = found.first().map(|candidate| candidate.misfit) else { return found };
+    let mut kept: Vec<Candidate> = Vec::new();
+    for candidate in found {
+        let another = !kept.iter().any(|other| other.oriented.is_like(&candidate.oriented));
+        if another && kept.len() < MOST && candidate.misfit <= RIVAL * best {
+            kept.push(candidate);
+        }
+    }
+    kept
+}
+
+/// Of the four poses of an essential matrix, E = [b]x A, the one that has most of the pairs in front of both photos.
+fn in_front(e: &Matrix3, pairs: &[[Vector3; 2]]) -> Option<Oriented> {
+    let svd = e.try_svd(true, true, f64::EPSILON, STEPS)?;
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let upright = |m: Matrix3| if m.determinant() < 0.0 { -m } else { m };
+    let turn = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let base = Vector3::from(u.column(2));
+    let all = [turn, turn.transpose()].into_iter().flat_map(|turn| {
+        let attitude = upright(u * turn * v_t);
+        [base, -base].map(|base| Oriented { base, attitude })
+    });
+    let count = |oriented: &Oriented| {
+        pairs.iter().filter(|pair| oriented.distances(pair).iter().all(|&distance| distance > 0.0)).count()
+    };
+    all.max_by_key(count)
+}

@@ -1,0 +1,260 @@
+"""First values: poses of photos whose positions and attitudes are not known, from everything that is.
+
+The search is that of the core (`photocore::programs::first_values`); `docs/first-values.md` says what it does
+in which order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.adjustment.known import Cartesian, Known
+from photogram.arguments.types import Bools, Floats
+from photogram.errors import AdjustmentError, InputError
+from photogram.messages import Message, listed
+from photogram.network.attitudes import Attitudes
+from photogram.network.block import Block
+from photogram.network.directions import direction_deviations, image_directions
+from photogram.network.observations import Distance
+
+__all__ = ["FirstValues", "first_values"]
+
+NEEDED = 4
+"""Known points of a photo that is resected."""
+IN_COMMON = 3
+"""What a model must have in common with what is known."""
+SOURCES = {
+    "given": "given",
+    "resected": "resected from known points",
+    "observed": "from observed positions and attitudes",
+    "oriented": "oriented relative to each other",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class FirstValues:
+    """First values of a block of P photos, n points and m images.
+
+    Attributes
+    ----------
+    block
+        The block with initial values for all photos that could be started; NaN stays where they could not.
+        What was given stays as it was; weighted values are observed as before.
+    sources
+        Where the pose of each started photo comes from: `given`, `resected`, `observed` or `oriented`.
+    missing
+        The photos that could not be started, each with the reason.
+    point_positions
+        (n, 3) where the rays of points meet, as in the block; NaN where they do not.
+    set_aside
+        (m,) whether an image does not fit the poses: a wrong point, or a poor ray.
+    misfit
+        Median of the angles between observed and computed directions, radians; NaN without any.
+    first_photo
+        The photo that is the origin, with a base of length 1 (or scale from observed distances), where no
+        control, pose or observed position gives a datum; None where something does.
+    messages
+        The same in sentences.
+    """
+
+    block: Block
+    sources: dict[str, str]
+    missing: dict[str, str]
+    point_positions: Floats
+    set_aside: Bools
+    misfit: float
+    first_photo: str | None
+    messages: list[Message]
+
+    def usable(self) -> Block:
+        """Return the block of the started photos, without images that were set aside: ready to adjust.
+
+        Raises
+        ------
+        InputError
+            Observations of photos that could not be started.
+        """
+        block = self.block
+        kept = np.array([photo in self.sources for photo in block.photo_ids])
+        images = kept[block.image_photos] & ~self.set_aside
+        places = np.cumsum(kept) - 1
+        of_photos = {
+            name: None if getattr(block, name) is None else getattr(block, name)[kept]
+            for name in (
+                "photo_positions",
+                "photo_attitudes",
+                "principal_distances",
+                "photo_cameras",
+                "photo_position_sd",
+                "photo_attitude_sd",
+                "photo_positions_observed",
+                "photo_attitudes_observed",
+            )
+        }
+        return block.replace(
+            photo_ids=[photo for photo in block.photo_ids if photo in self.sources],
+            image_photos=places[block.image_photos[images]],
+            image_points=block.image_points[images],
+            image_xy=block.image_xy[images],
+            image_sd=block.image_sd[images],
+            **of_photos,
+        )
+
+
+def first_values(block: Block) -> FirstValues:
+    """Find initial positions and attitudes of photos.
+
+    Photos whose position or attitude is NaN in the block are started from what is known: rays are intersected
+    where poses are given, photos with four known points are resected, observed positions and attitudes
+    (:class:`photogram.network.observations.Position`, `Attitude`) give poses, and photos of which nothing but
+    images is known are oriented relative to each other, chained, and carried onto control, given poses or
+    observed positions by a similarity. Every step is a consensus, so that wrong points are borne; a robust
+    adjustment ends it. Refraction and unknowns of cameras are left out.
+
+    Parameters
+    ----------
+    block
+        Photos with NaN for what is not known. A position without an attitude, or an observed one with a
+        standard deviation, serves as an observed position; so does an attitude.
+
+    Returns
+    -------
+    The block with initial values, and how each photo came by them. Photos that could not be started are named
+    with the reason.
+
+    Raises
+    ------
+    InputError
+        What is no block.
+    AdjustmentError
+        No photo could be started; the message says why.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from photogram import adjust, first_values, simulate
+    >>> block = simulate(strips=2, photos_per_strip=4).block
+    >>> unknown = block.replace(photo_positions=np.nan, photo_attitudes=np.nan,
+    ...                         photo_position_sd=np.inf, photo_attitude_sd=np.inf)
+    >>> started = first_values(unknown)
+    >>> len(started.sources), started.missing
+    (8, {})
+    >>> adjust(started.block).status
+    'converged'
+    """
+    if not isinstance(block, Block):
+        raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    axes = Cartesian.of(block)
+    known = Known.of(block, axes)
+    positions, attitudes, how, points, aside, first, misfit = _photocore.find_first_values(
+        known.positions,
+        known.attitudes,
+        known.observed_positions,
+        known.observed_attitudes,
+        known.points,
+        known.point_sd,
+        block.image_photos,
+        block.image_points,
+        image_directions(block),
+        direction_deviations(block),
+        threads=0,
+    )
+    names = block.photo_ids
+    missing = {photo: _reason(*why) for photo, why in zip(names, how, strict=True) if why[0] not in SOURCES}
+    sources = {photo: why[0] for photo, why in zip(names, how, strict=True) if why[0] in SOURCES}
+    if not sources:
+        raise AdjustmentError(f"no photo could be started: {_reasons(missing)}")
+    if first is not None:
+        scale = _scale(block, points)
+        positions, points = positions * scale, points * scale
+    return FirstValues(
+        block=_started(block, axes, positions, attitudes, how),
+        sources=sources,
+        missing=missing,
+        point_positions=axes.from_cartesian(points),
+        set_aside=aside,
+        misfit=np.nan if misfit is None else misfit,
+        first_photo=None if first is None else names[first],
+        messages=_messages(block, sources, missing, aside, None if first is None else names[first]),
+    )
+
+
+def _started(
+    block: Block, axes: Cartesian, positions: Floats, attitudes: Floats, how: list[tuple[str, int, int]]
+) -> Block:
+    """Fill in what was found; what was given stays, and weighted values are observed as they were."""
+    found = np.array([why[0] in SOURCES and why[0] != "given" for why in how])
+    new_positions, new_attitudes = block.photo_positions.copy(), block.photo_attitudes.copy()
+    if found.any():
+        new_positions[found] = axes.from_cartesian(positions[found])
+        matrices = axes.to_local(attitudes[found], new_positions[found])
+        form = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+        new_attitudes[found] = Attitudes(matrices).values(form)  # type: ignore[arg-type]
+    changes: dict[str, Floats] = {}
+    for name, values in (("position", new_positions), ("attitude", new_attitudes)):
+        given, sd = getattr(block, f"photo_{name}s"), getattr(block, f"photo_{name}_sd")
+        fixed = (sd == 0) & np.isfinite(given)
+        changes[f"photo_{name}s"] = np.where(fixed, given, values)
+        if getattr(block, f"photo_{name}s_observed") is None and np.isfinite(sd).any():
+            changes[f"photo_{name}s_observed"] = np.where(np.isfinite(sd), given, np.nan)
+    return block.replace(**changes)
+
+
+def _scale(block: Block, points: Floats) -> float:
+    """Observed distances over those between the points found; 1 without any."""
+    place = {name: row for row, name in enumerate(block.point_ids)}
+    ratios = [
+        each.length / float(np.linalg.norm(points[place[each.first]] - points[place[each.second]]))
+        for each in block.observations
+        if isinstance(each, Distance)
+    ]
+    known = [ratio for ratio in ratios if np.isfinite(ratio)]
+    return float(np.median(known)) if known else 1.0
+
+
+def _reason(kind: str, count: int, photos: int) -> str:
+    if kind == "points":
+        return f"{count} points in common with started photos and control, {NEEDED} needed"
+    if kind == "misfit":
+        return f"no position shows most of its {count} known points where they are"
+    if count < IN_COMMON:
+        return (
+            f"its model of {photos} photos has {count} points or positions in common with what is known,"
+            f" {IN_COMMON} needed"
+        )
+    return (
+        f"what its model of {photos} photos has in common with what is known ({count} points or positions) is"
+        " on one line, or does not agree"
+    )
+
+
+def _reasons(missing: dict[str, str]) -> str:
+    by_reason: dict[str, list[str]] = {}
+    for photo, reason in missing.items():
+        by_reason.setdefault(reason, []).append(photo)
+    return "; ".join(f"{listed(photos)}: {reason}" for reason, photos in by_reason.items())
+
+
+def _messages(
+    block: Block, sources: dict[str, str], missing: dict[str, str], aside: Bools, first: str | None
+) -> list[Message]:
+    counts = {source: sum(own == source for own in sources.values()) for source in SOURCES}
+    parts = [f"{count} {SOURCES[source]}" for source, count in counts.items() if count]
+    messages = [Message(f"{len(sources)} of {len(block.photo_ids)} photos have a pose: {', '.join(parts)}")]
+    if missing:
+        messages.append(Message(f"not started: {_reasons(missing)}"))
+    if first is not None:
+        messages.append(
+            Message(f"nothing gives a datum: coordinates are counted from the photo {first}, in bases")
+        )
+    if aside.any():
+        points = sorted({block.point_ids[point] for point in block.image_points[aside]})
+        messages.append(
+            Message(f"{int(aside.sum())} images do not fit and were set aside: points {listed(points)}")
+        )
+    if block.refraction is not None:
+        messages.append(Message("refraction was left out of the first values"))
+    return messages

@@ -1,0 +1,295 @@
+"""Hints: what may be wrong with data that do not fit, found by trying; nothing is ever corrected.
+
+The verdict is the ratio of the misfit m of images under a hypothesis to that as given
+(:mod:`photogram.adjustment.regression`); `docs/hints.md` has the table of hypotheses and the limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from photogram.adjustment.hypotheses import TURNS, Hypothesis, attitude_readings, hypotheses
+from photogram.adjustment.regression import (
+    LEAST,
+    MOST,
+    control_misfit,
+    eligible,
+    given_points,
+    misfits,
+    regressions,
+    spread,
+    view,
+)
+from photogram.adjustment.resection import Observed, solve
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import AdjustmentError, OutOfMemoryError
+from photogram.messages import Message, listed
+from photogram.network.block import Block, checked
+from photogram.network.directions import image_directions, without_lenses
+from photogram.network.geometry import rotation_matrix
+from photogram.network.observations import Distance
+from photogram.network.rays import Rays
+from photogram.results.result import Result
+
+__all__ = ["Verdict", "hinted", "hints", "verdicts", "with_hints"]
+
+SUSPICION = 0.35
+"""Misfit m above which photos are looked at more closely."""
+PASSES, PASSES_ROUGH, ROUGH = 0.2, 0.3, 0.1
+"""What the misfit must fall to in the median, where it is then below ROUGH; else poses are rough starts."""
+EACH = 0.5
+"""What it must fall to on each photo that does not fit as it is."""
+AS_GOOD = 1.5
+"""Another hypothesis is as good when its misfit is below so many times the least."""
+CLEARLY = 5.0
+"""So many times nearer to the resected attitudes must those of a rival reading be."""
+BAD = 5.0
+"""Sigma0 above which an adjustment that has converged is doubted."""
+BAR_FACTOR, BAR_WITHIN = 1000.0, 0.05
+"""A distance in millimetres among metres."""
+
+
+class Verdict:
+    """Hypotheses that pass, the best first; several where it cannot be told which.
+
+    Attributes
+    ----------
+    names
+        Of the hypotheses.
+    text
+        The hint.
+    """
+
+    def __init__(self, passing: list[tuple[float, Hypothesis]], given: float, photos: str) -> None:
+        passing.sort(key=lambda each: each[0])
+        least = passing[0][0]
+        best = [each for misfit, each in passing if misfit <= AS_GOOD * least]
+        self.names = [each.name for each in best]
+        where = f" (on {photos})" if photos else ""
+        fall = f"images would miss their places by {least:.2g} of their spread and not by {given:.2g}"
+        if len(best) == 1:
+            self.text = f"probably {best[0].text}{where}: {fall}"
+        else:
+            rivals = "; or ".join(each.text for each in best)
+            self.text = f"it cannot be told which of these is so{where}: {rivals}: {fall}"
+
+
+def hints(block: Block) -> list[Message]:
+    """Look for mistakes in the conventions of data: units, axes, signs, angles.
+
+    Parameters
+    ----------
+    block
+        A block whose photos have positions and attitudes, be they rough.
+
+    Returns
+    -------
+    Sentences that each name a mistake that would explain why images do not fit; none where they do, or where
+    no single mistake explains it. Nothing is corrected.
+
+    Raises
+    ------
+    InputError
+        What is no block, or has photos without a pose.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from photogram import hints, simulate
+    >>> block = simulate(strips=2, photos_per_strip=4).block
+    >>> hints(block)
+    []
+    >>> down = block.replace(image_xy=block.image_xy * [1, -1])
+    >>> print(hints(down)[0])  # doctest: +ELLIPSIS
+    probably y of the images has the wrong sign: it is counted down, not up: images would miss ...
+    """
+    block = without_lenses(checked(block))
+    with np.errstate(all="ignore"):
+        found = [Message(verdict.text) for verdict in verdicts(block)]
+        return [*found, *_latitudes(block), *(_readings(block) if not found else []), *_bars(block)]
+
+
+def hinted(error: AdjustmentError, block: Block) -> AdjustmentError:
+    """Return an error with the hints of its block in its text."""
+    if isinstance(error, OutOfMemoryError):
+        return error
+    error.args = ("\n".join([str(error), *(f"  hint: {hint}" for hint in hints(block))]), *error.args[1:])
+    return error
+
+
+def with_hints(result: Result) -> Result:
+    """Return a result, with hints among its messages where it has not converged or images fit badly."""
+    variance = result.variance_of_unit_weight
+    fits = variance is None or variance <= BAD**2
+    if (result.converged and fits) or result.loss is not None:
+        return result
+    found = hints(result.block)
+    return replace(result, messages=[*found, *result.messages]) if found else result
+
+
+def verdicts(block: Block) -> list[Verdict]:
+    """Return what the comparison of images with predictions says; see :func:`hints`."""
+    photos = eligible(block)
+    if not len(photos):
+        return []
+    seen = misfits(view(block, photos), photos)
+    if np.median(seen) <= SUSPICION:
+        worst = photos[np.argsort(-seen)][:MOST]
+        single = list(_single(block, np.sort(worst[np.sort(-seen)[:MOST] < -SUSPICION])))
+        return single or _of_control(view(block, spread(photos, MOST)), spread(photos, MOST))
+    chosen = spread(photos, MOST)
+    looked = view(block, chosen)
+    passing = _passing(looked, chosen)
+    return [Verdict(passing, float(np.median(misfits(looked, chosen))), "")] if passing else []
+
+
+def _passing(looked: Block, photos: Indices) -> list[tuple[float, Hypothesis]]:
+    """Return hypotheses under which photos fit, with the misfit that is left."""
+    seen = regressions(looked, photos)
+    passing: dict[str, tuple[float, Hypothesis]] = {}
+    for hypothesis in hypotheses(looked, seen):
+        left = misfits(hypothesis.block, photos)
+        ratio, median = left / seen.misfit, float(np.median(left))
+        limit = PASSES_ROUGH if median > ROUGH else PASSES
+        each = (ratio < EACH) | (np.maximum(left, seen.misfit) < SUSPICION)
+        if np.median(ratio) < limit and each.all() and median < SUSPICION:
+            found = (median, hypothesis)
+            passing[hypothesis.name] = min(
+                passing.get(hypothesis.name, found), found, key=lambda each: each[0]
+            )
+    return list(passing.values())
+
+
+def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
+    """Try what makes given points fit, where rays meet well but not there."""
+    given = control_misfit(looked)
+    if not given_points(looked)[looked.image_points].any() or given <= SUSPICION:
+        return []
+    passing = []
+    for hypothesis in hypotheses(looked):
+        left = control_misfit(hypothesis.block)
+        fits = left < given * (PASSES_ROUGH if left > ROUGH else PASSES) and left < SUSPICION
+        if fits and np.median(misfits(hypothesis.block, photos)) < SUSPICION:
+            passing.append((left, hypothesis))
+    return [Verdict(passing, given, "")] if passing else []
+
+
+def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
+    """Try photos one by one, the others being right."""
+    by_names: dict[tuple[str, ...], tuple[list[tuple[float, Hypothesis]], float, list[str]]] = {}
+    for photo in photos.tolist():
+        own = np.array([photo])
+        looked = view(block, own)
+        given = float(misfits(looked, own)[0])
+        of_photo = looked.image_photos == photo
+        passing = []
+        for name, (turn, text) in TURNS.items():
+            turned = np.where(
+                of_photo[:, np.newaxis], looked.image_xy @ np.array(turn, dtype=np.float64), looked.image_xy
+            )
+            changed = looked.replace(image_xy=turned)
+            left = float(misfits(changed, own)[0])
+            if left < PASSES * given and left < SUSPICION:
+                passing.append((left, Hypothesis(name, text, changed)))
+        if passing:
+            names = tuple(sorted(each.name for _, each in passing))
+            by_names.setdefault(names, (passing, given, []))[2].append(block.photo_ids[photo])
+    for passing, given, photo_ids in by_names.values():
+        where = f"photos {listed(photo_ids)}" if len(photo_ids) > 1 else f"photo {photo_ids[0]}"
+        yield Verdict(passing, given, where)
+
+
+def _latitudes(block: Block) -> list[Message]:
+    """Latitudes beyond the poles are certain."""
+    if block.spheroid is None:
+        return []
+    return [
+        Message(f"latitudes of the {what} are beyond 90 degrees: longitude and latitude are exchanged")
+        for what, positions in (("photos", block.photo_positions), ("points", block.point_positions))
+        if (np.abs(positions[:, 1]) > np.pi / 2).any()
+    ]
+
+
+def _readings(block: Block) -> list[Message]:
+    """Compare given attitudes with resected ones: mistakes in small angles, which images hardly show."""
+    if block.spheroid is not None:
+        return []
+    known = given_points(block)
+    counts = np.bincount(block.image_photos[known[block.image_points]], minlength=len(block.photo_ids))
+    photos = spread(np.flatnonzero(counts >= LEAST), MOST)
+    resected = {photo: found for photo in photos.tolist() if (found := _resected(block, photo)) is not None}
+    if len(resected) < 2:
+        return []
+    rows = np.array(list(resected))
+    turned = np.array(list(resected.values()))
+    own = _apart(Rays.of(block).cameras[rows], turned)
+    rivals = sorted(
+        (_apart(matrices[rows], turned), text) for text, matrices in attitude_readings(block).values()
+    )
+    (least, text), (second, _) = rivals[:2]
+    if CLEARLY * least > min(own, second):
+        return []
+    return [
+        Message(
+            f"probably {text}: attitudes would differ from resected ones by {np.degrees(least):.2g} degrees"
+            f" and not by {np.degrees(own):.2g}"
+        )
+    ]
+
+
+def _resected(block: Block, photo: int) -> Floats | None:
+    """(3, 3) attitude, photo to object, from the points that are given."""
+    rows = np.flatnonzero((block.image_photos == photo) & given_points(block)[block.image_points])
+    points = block.image_points[rows]
+    count = len(rows)
+    # As a camera without distortion would have them.
+    distance = -float(block.camera_scales()[photo])
+    directions = image_directions(block)[rows]
+    observed = Observed(
+        block.point_positions[points],
+        np.zeros((count, 3)),
+        distance * directions[:, :2] / directions[:, 2:],
+        block.image_sd[rows],
+        distance,
+        [block.point_ids[point] for point in points],
+    )
+    try:
+        pose = solve(observed, limit=1e-2, max_iterations=50).pose
+    except AdjustmentError:
+        return None
+    found: Floats = rotation_matrix(pose[np.newaxis, 3:])[0].T
+    return found
+
+
+def _apart(given: Floats, found: Floats) -> float:
+    """Rms angle between attitudes, radians."""
+    trace = np.einsum("pij,pij->p", given, found)
+    return float(np.sqrt((np.arccos(np.clip((trace - 1) / 2, -1, 1)) ** 2).mean()))
+
+
+def _bars(block: Block) -> list[Message]:
+    """Compare observed distances with those between points: millimetres for metres, all alike."""
+    bars = [each for each in block.observations if isinstance(each, Distance)]
+    if not bars:
+        return []
+    place = {name: row for row, name in enumerate(block.point_ids)}
+    rays = Rays.of(block)
+    positions = rays.axes.positions(block.point_positions)
+    positions = np.where(given_points(block)[:, np.newaxis], positions, rays.intersect().positions)
+    ratios = np.array(
+        [
+            each.length / np.linalg.norm(positions[place[each.first]] - positions[place[each.second]])
+            for each in bars
+        ]
+    )
+    for factor, text in (
+        (BAR_FACTOR, "in millimetres, all else in metres"),
+        (1 / BAR_FACTOR, "in metres, all else in millimetres"),
+    ):
+        if (np.abs(ratios / factor - 1) < BAR_WITHIN).all():
+            names = listed([each.name for each in bars])
+            return [Message(f"probably observed distances are {text}: {names} are {factor:g} times too long")]
+    return []

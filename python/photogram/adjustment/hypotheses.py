@@ -1,0 +1,281 @@
+"""What may be wrong with given data, each as the block that would have been meant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.adjustment.regression import Regression, given_points
+from photogram.arguments.types import Floats
+from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.block import Block
+
+__all__ = ["FOOT", "TURNS", "Hypothesis", "attitude_readings", "hypotheses", "image_hypothesis"]
+
+FOOT = 0.3048
+"""Metres; the survey foot differs by two millionths."""
+_TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])
+_HALF_TURN = np.pi / 2
+_BEYOND = 1e4
+"""Radians: no angle that was meant is larger after it was turned into degrees once more."""
+
+TURNS: dict[str, tuple[list[list[float]], str]] = {
+    "y down": ([[1, 0], [0, -1]], "y of the images has the wrong sign: it is counted down, not up"),
+    "c or kappa": (
+        [[-1, 0], [0, -1]],
+        "the principal distance has the wrong sign, or kappa is wrong by 180 degrees",
+    ),
+    "mirrored": (
+        [[-1, 0], [0, 1]],
+        "x of the images has the wrong sign: the photos are mirrored, as diapositives read from behind",
+    ),
+    "exchanged": ([[0, 1], [1, 0]], "x and y of the images are exchanged"),
+    "exchanged and turned": (
+        [[0, -1], [-1, 0]],
+        "x and y of the images are exchanged, and have the wrong signs",
+    ),
+    "kappa + 90": ([[0, -1], [1, 0]], "kappa is too large by 90 degrees, or the images were turned"),
+    "kappa - 90": ([[0, 1], [-1, 0]], "kappa is too small by 90 degrees, or the images were turned"),
+}
+"""V, observed = V predicted, and what brings it about."""
+
+PIXELS = 8.0
+"""Images so many times too large, or more, are in another unit; less is a principal distance."""
+_SCALED, _SHIFTED = 0.15, 0.25
+"""A scale further from 1, a shift of a larger part of half of the format are no matter of rough poses."""
+_ALIKE = 0.05
+"""Scatter of the scale over photos, relative, and of the shift, in halves of the format, at the most."""
+_CORNER = 0.5
+"""The middle of all images is further from the origin than this part of half of their extent."""
+_WIDEST, _FINEST = 4.0, 10.0
+"""Half of the extent of images, in principal distances, beyond which they are wider than a camera's, and what
+its inverse may be at the most,"""
+_SCALES = 60
+"""with so many steps in between."""
+_EXPLAINED = 0.2
+"""e, what a regression leaves, at the most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A mistake that may have been made.
+
+    Attributes
+    ----------
+    name
+        In a word or two.
+    text
+        In a sentence, without its full stop.
+    block
+        What was meant.
+    """
+
+    name: str
+    text: str
+    block: Block
+
+
+def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
+    """Propose mistakes for a block; `seen` says how its images and their predictions differ."""
+    yield from _turned(block)
+    composed = None if seen is None else image_hypothesis(block, seen)
+    if composed is not None:
+        yield composed
+    else:
+        yield from _of_format(block)
+    yield from _attitudes(block)
+    yield from _positions(block)
+
+
+def _turned(block: Block) -> Iterator[Hypothesis]:
+    for name, (turn, text) in TURNS.items():
+        # predicted = V' observed
+        yield Hypothesis(
+            name, text, block.replace(image_xy=block.image_xy @ np.array(turn, dtype=np.float64))
+        )
+
+
+def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
+    """Propose another unit, origin or sense of images, from what photos have in common; else None."""
+    half = np.ptp(block.image_xy, axis=0).max() / 2
+    scale, shift = float(np.median(seen.scale)), np.median(seen.shift, axis=0)
+    turn = np.round(np.median(seen.turn, axis=0))
+    alike = (
+        np.median(seen.rest) < _EXPLAINED
+        and seen.scale.std() < _ALIKE * scale
+        and np.abs(seen.shift - shift).max() < 4 * _ALIKE * half
+        and np.abs(seen.turn - turn).max() < _SHIFTED
+    )
+    scaled, shifted = abs(scale - 1) > _SCALED, np.abs(shift).max() > _SHIFTED * half
+    if not alike or not (scaled or shifted) or not given_points(block).any():
+        return None
+    meant = block.image_xy - (shift if shifted else 0.0)
+    meant = meant @ turn / (scale if scaled else 1.0)
+    names, parts = [], []
+    if scaled and max(scale, 1 / scale) >= PIXELS:
+        names.append("unit")
+        parts.append(
+            f"images are {scale:.4g} times too large for the principal distance: pixels given for millimetres"
+            f" (of {1 / scale:.4g} mm)"
+            if scale > 1
+            else f"images are {1 / scale:.4g} times too small for the principal distance: another unit"
+        )
+    elif scaled:
+        names.append("principal distance")
+        parts.append(
+            f"the principal distance should be {scale:.4g} times the given one (another unit, or that of"
+            " another format)"
+        )
+    if shifted:
+        names.append("origin")
+        parts.append(
+            f"images are counted from ({-shift[0]:+.4g}, {-shift[1]:+.4g}), a corner and not the middle of"
+            " the format"
+        )
+    for name, (matrix, text) in TURNS.items():
+        if np.array_equal(turn, matrix):
+            names.append(name)
+            parts.append(text)
+    return Hypothesis(", ".join(names), "; ".join(parts), block.replace(image_xy=meant))
+
+
+def _of_format(block: Block) -> Iterator[Hypothesis]:
+    """Propose a corner for the origin, and pixels, from how far images reach: where few points are given."""
+    lowest, highest = block.image_xy.min(axis=0), block.image_xy.max(axis=0)
+    middle, half = (lowest + highest) / 2, float((highest - lowest).max() / 2)
+    distance = float(block.camera_scales().max())
+    corner, pixels = bool(np.abs(middle).min() > _CORNER * half), half > _WIDEST * distance
+    if not (corner or pixels):
+        return
+    scales = np.ones(1)
+    if pixels:
+        scales = np.geomspace(half / (_WIDEST * distance), _FINEST * half / distance, _SCALES)
+    shift = middle if corner else np.zeros(2)
+    for turn, sense in (([1.0, 1.0], ""), ([1.0, -1.0], ", and y is counted down, not up")):
+        meant = (block.image_xy - shift) * turn
+        names = ["unit"] * pixels + ["origin"] * corner + ["y down"] * bool(sense)
+        where = "a corner and not the middle of the format"
+        for scale in scales.tolist():
+            unit = f"images are pixels (of about {1 / scale:.2g} mm)" if pixels else "images are"
+            counted = f"{', ' if pixels else ' '}counted from {where}" if corner else ""
+            text = unit + counted + sense
+            yield Hypothesis(", ".join(names), text, block.replace(image_xy=meant / scale))
+
+
+def attitude_readings(block: Block) -> dict[str, tuple[str, Floats]]:
+    """(P, 3, 3) attitudes, photo to object, by rival readings of the same three numbers, with their texts."""
+    numbers = block.photo_attitudes
+    own: Representation = "omega_phi_kappa"
+    other: Representation = "omega_phi_kappa_photo_to_ground"
+    meant, said = "photo-to-ground", "ground-to-photo"
+    if block.photo_to_ground:
+        own, other, meant, said = other, own, said, meant
+
+    def read(representation: Representation, values: Floats) -> Floats:
+        return Attitudes.of(representation, values).matrices
+
+    flipped = numbers * [1.0, -1.0, 1.0]
+    found = {
+        "radians for degrees": (
+            "angles were given in radians and read as degrees",
+            read(own, np.degrees(numbers)),
+        ),
+        "degrees for radians": (
+            "angles were given in degrees and read as radians",
+            read(own, np.radians(numbers)),
+        ),
+        "gon": ("angles were given in gon and read as degrees", read(own, 0.9 * numbers)),
+        "sense": (f"angles are {meant}, not {said}", read(other, numbers)),
+        "phi-omega-kappa": (
+            "the angles omega, phi, kappa are those of phi-omega-kappa (phi primary)",
+            read("phi_omega_kappa", numbers[:, [1, 0, 2]]),
+        ),
+        "sign of phi": ("phi has the wrong sign", read(own, flipped)),
+        "sign of kappa": ("kappa has the wrong sign, as yaw has", read(own, numbers * [1.0, 1.0, -1.0])),
+    }
+    if np.abs(numbers).max() > _BEYOND:
+        del found["radians for degrees"]
+    return found
+
+
+def _with_matrices(block: Block, matrices: Floats) -> Block:
+    form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    return block.replace(photo_attitudes=Attitudes(matrices).values(form))
+
+
+def _attitudes(block: Block) -> Iterator[Hypothesis]:
+    for name, (text, matrices) in attitude_readings(block).items():
+        yield Hypothesis(name, text, _with_matrices(block, matrices))
+
+
+def _positions(block: Block) -> Iterator[Hypothesis]:
+    positions, points = block.photo_positions, block.point_positions
+    known = bool(given_points(block).any())
+
+    def moved(name: str, text: str, of_photos: Floats, of_points: Floats | None = None) -> Hypothesis:
+        own = points if of_points is None else of_points
+        return Hypothesis(name, text, block.replace(photo_positions=of_photos, point_positions=own))
+
+    unit = block.linear_unit
+    heights = [1.0, 1.0, FOOT]
+    yield moved(
+        "feet in heights of photos",
+        "heights of the photos are in feet, all else in metres",
+        positions * heights,
+    )
+    if known:
+        yield moved(
+            "feet in heights of points",
+            "heights of the points are in feet, all else in metres",
+            positions,
+            points * heights,
+        )
+    if block.spheroid is not None:
+        yield from _geographic(block, moved)
+        return
+    yield moved("X and Y of photos", "X and Y of the photos are exchanged", positions[:, [1, 0, 2]])
+    rotation = _to_photo(block)
+    # R = F A' in the axes of computer vision, A' in those of the photo
+    for axes, of_axes in (("x right, y down, z forward", _TO_VISION), ("x right, y up, z back", np.eye(3))):
+        yield moved(
+            "t for C",
+            f"positions of the photos are translations t of x = R X + t ({axes}), not projection centres"
+            " C = -R't",
+            -np.einsum("pji,pj->pi", rotation, positions @ of_axes),
+        )
+    if known:
+        yield moved(
+            "feet in positions of photos",
+            f"positions of the photos are in feet, those of the points in metres (in {unit} here)",
+            positions * FOOT,
+        )
+        yield moved(
+            "feet in points",
+            f"positions of the points are in feet, those of the photos in metres (in {unit} here)",
+            positions,
+            points * FOOT,
+        )
+        yield moved(
+            "X and Y of points", "X and Y of the points are exchanged", positions, points[:, [1, 0, 2]]
+        )
+
+
+def _to_photo(block: Block) -> Floats:
+    """(P, 3, 3) M, object to photo."""
+    form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    matrices: Floats = Attitudes.of(form, block.photo_attitudes).matrices.transpose(0, 2, 1)
+    return matrices
+
+
+def _geographic(block: Block, moved: Callable[..., Hypothesis]) -> Iterator[Hypothesis]:
+    exchanged = [1, 0, 2]
+    for name, photos, points in (
+        ("photos", block.photo_positions[:, exchanged], None),
+        ("points", block.photo_positions, block.point_positions[:, exchanged]),
+    ):
+        changed = photos if points is None else points
+        if not (np.abs(changed[:, 1]) > _HALF_TURN).any():
+            text = f"longitude and latitude of the {name} are exchanged"
+            yield moved(f"longitude and latitude of {name}", text, photos, points)

@@ -1,0 +1,180 @@
+"""Observed images against those predicted from the given poses, points and camera: what a mistake looks like.
+
+(x, y) observed = R2 (x, y) predicted + t,     R2 = k V,  V orthogonal,  k = sqrt|det R2|
+m = rms(observed - predicted) / rms(observed - mean),     e = rms(residual of this) / rms(observed - mean)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.network.block import Block
+from photogram.network.rays import Rays
+
+__all__ = [
+    "LEAST",
+    "MOST",
+    "Regression",
+    "control_misfit",
+    "eligible",
+    "given_points",
+    "misfits",
+    "regressions",
+    "spread",
+    "view",
+]
+
+LEAST = 6
+"""Known or intersected points of a photo that is looked at."""
+MOST = 12
+"""Photos that are looked at closely,"""
+SCANNED = 200
+"""and those of a larger block among which one that does not fit is looked for."""
+_UNKNOWN = 1e6
+"""The misfit of a photo of which nothing can be predicted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Regression:
+    """Observed on predicted images of k photos.
+
+    Attributes
+    ----------
+    misfit
+        (k,) m.
+    scale
+        (k,) k.
+    turn
+        (k, 2, 2) V.
+    shift
+        (k, 2) t, millimetres.
+    rest
+        (k,) e.
+    """
+
+    misfit: Floats
+    scale: Floats
+    turn: Floats
+    shift: Floats
+    rest: Floats
+
+
+def view(block: Block, photos: Indices) -> Block:
+    """Return what it takes to compare some photos: their points with all images of those, nothing weighted.
+
+    Of points whose positions are given the images on other photos are left out.
+    """
+    chosen = np.isin(block.image_photos, photos)
+    seen = np.zeros(len(block.point_ids), dtype=bool)
+    seen[block.image_points[chosen]] = True
+    seen &= ~given_points(block)
+    images = chosen | seen[block.image_points]
+    return block.replace(
+        image_photos=block.image_photos[images],
+        image_points=block.image_points[images],
+        image_xy=block.image_xy[images],
+        image_sd=block.image_sd[images],
+        photo_position_sd=np.inf,
+        photo_attitude_sd=np.inf,
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
+        point_sd=np.inf,
+        observations=(),
+        refraction=None,
+    )
+
+
+def given_points(block: Block) -> Bools:
+    """(n,) whether the position of a point is given, held or not."""
+    return np.asarray(np.isfinite(block.point_positions).all(axis=1))
+
+
+def predictions(block: Block) -> Floats:
+    """(m, 2) images in millimetres, predicted from given poses and points; NaN where a point has no place.
+
+    Points that are not given stand where the rays meet.
+    """
+    rays = Rays.of(block)
+    positions = rays.axes.positions(block.point_positions)
+    unknown = ~given_points(block)
+    if unknown.any():
+        positions = np.where(unknown[:, np.newaxis], rays.intersect().positions, positions)
+    residuals, _ = rays.residuals(positions[block.image_points])
+    predicted: Floats = block.image_xy - residuals
+    return predicted
+
+
+def misfits(block: Block, photos: Indices) -> Floats:
+    """(k,) m of some photos; very large where too few of their points have a place."""
+    predicted = predictions(block)
+    return np.array([_misfit(block, predicted, photo) for photo in photos])
+
+
+def control_misfit(block: Block) -> float:
+    """M of all images of given points together; very large where there are too few."""
+    rows = np.flatnonzero(given_points(block)[block.image_points])
+    if len(rows) < LEAST:
+        return _UNKNOWN
+    found = _relative(block.image_xy[rows] - predictions(block)[rows], block.image_xy[rows])
+    return found if np.isfinite(found) else _UNKNOWN
+
+
+def _misfit(block: Block, predicted: Floats, photo: int) -> float:
+    rows = _rows(block, predicted, photo)
+    if len(rows) < LEAST:
+        return _UNKNOWN
+    found = _relative(block.image_xy[rows] - predicted[rows], block.image_xy[rows])
+    return found if np.isfinite(found) else _UNKNOWN
+
+
+def _rows(block: Block, predicted: Floats, photo: int) -> Indices:
+    found: Indices = np.flatnonzero((block.image_photos == photo) & np.isfinite(predicted).all(axis=1))
+    return found
+
+
+def _relative(residuals: Floats, observed: Floats) -> float:
+    """Rms of residuals in that of the observed about their mean; not finite where these are one."""
+    return float(np.sqrt((residuals**2).sum() / ((observed - observed.mean(axis=0)) ** 2).sum()))
+
+
+def regressions(block: Block, photos: Indices) -> Regression:
+    """Regress the images of some photos, each of which has enough points."""
+    predicted = predictions(block)
+    rows = [_rows(block, predicted, photo) for photo in photos]
+    each = [_regressed(block.image_xy[own], predicted[own]) for own in rows]
+    scale, turn, shift, rest = zip(*each, strict=True)
+    return Regression(
+        misfit=np.array([_misfit(block, predicted, photo) for photo in photos]),
+        scale=np.array(scale),
+        turn=np.array(turn),
+        shift=np.array(shift),
+        rest=np.array(rest),
+    )
+
+
+def _regressed(observed: Floats, predicted: Floats) -> tuple[float, Floats, Floats, float]:
+    """Return k, V, t and e."""
+    if len(observed) < LEAST:
+        return np.nan, np.full((2, 2), np.nan), np.full(2, np.nan), _UNKNOWN
+    design = np.column_stack([predicted, np.ones(len(predicted))])
+    solved = np.linalg.lstsq(design, observed, rcond=None)[0]
+    linear = solved[:2].T
+    left, _, right = np.linalg.svd(linear)
+    rest = _relative(observed - design @ solved, observed)
+    return float(np.sqrt(abs(np.linalg.det(linear)))), left @ right, solved[2], rest
+
+
+def spread(photos: Indices, most: int) -> Indices:
+    """Return so many of some photos at the most, evenly taken."""
+    return photos[np.unique(np.linspace(0, len(photos) - 1, min(most, len(photos))).round().astype(np.int64))]
+
+
+def eligible(block: Block) -> Indices:
+    """Return photos with enough points that are given or on two photos; of many, some."""
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    usable = (given_points(block) | (rays > 1))[block.image_points]
+    counts = np.bincount(block.image_photos[usable], minlength=len(block.photo_ids))
+    return spread(np.flatnonzero(counts >= LEAST), SCANNED)

@@ -1,0 +1,208 @@
+"""The part of the report, and of the JSON document, on cameras that an adjustment has calibrated."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from photogram.results.calibration import Calibration, ParameterTest, calibrations
+from photogram.results.distortion import DistortionCurve, distortion_curve
+from photogram.results.lens_field import LensField, lens_field
+from photogram.results.result import Result
+from photogram.show.sections import Section
+
+__all__ = ["calibration_members", "calibration_sections"]
+
+LISTED = 20
+"""Cameras that a report describes in full; the table of cameras and the JSON document have all."""
+RADII = 9
+"""Radii of a curve in the report."""
+
+
+def calibration_sections(result: Result) -> list[Section]:
+    """Return a titled section for each camera with unknown parameters."""
+    found = calibrations(result)
+    sections = [_section(result, each) for each in found[:LISTED]]
+    if len(found) > LISTED:
+        sections.append(
+            ("More cameras", [f"{len(found) - LISTED}; the table of cameras and the JSON document have all"])
+        )
+    return sections
+
+
+def _section(result: Result, found: Calibration) -> Section:
+    camera = found.camera
+    lines = [
+        f"model {camera.camera.model} ({camera.camera.direction}), {camera.photos} photos,"
+        f" {camera.images} images",
+        "",
+        *_parameter_lines(result, found),
+        *_group_lines(found),
+        *_correlation_lines(found),
+    ]
+    curve = distortion_curve(result, camera)
+    if curve is not None:
+        lines += ["", *_curve_lines(curve, str(camera.camera.unit))]
+    field = lens_field(result, camera)
+    if field is not None:
+        lines += ["", _field_line(field, str(camera.camera.unit))]
+    remarks = found.remarks()
+    return f"Calibration of {camera.name}", [*lines, *([""] if remarks else []), *remarks]
+
+
+def _parameter_lines(result: Result, found: Calibration) -> list[str]:
+    law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
+    heads = ("value", "sd", "change", f"t ({law})", "probability", "R", "redundancy", "gain")
+    lines = [f"{'parameter':<16}" + "".join(f"{head:>15}" for head in heads) + "  verdict"]
+    for each in found.parameters:
+        name = f"{each.name} {each.unit}".strip()
+        cells = (
+            f"{each.value:>15.8g}",
+            f"{each.sd:>15.3g}",
+            f"{each.change:>15.4g}",
+            f"{each.test_value:>15.2f}",
+            f"{each.probability:>15.4f}",
+            f"{each.multiple_correlation:>15.5f}",
+            f"{each.redundancy:>15.3f}" if 0 < each.given_sd < math.inf else f"{'free':>15}",
+            f"{each.gain:>15.4g}",
+        )
+        lines.append(f"{name:<16}{''.join(cells)}  {_verdict(each)}")
+    return lines
+
+
+def _verdict(each: ParameterTest) -> str:
+    words = ["significant" if each.significant else "not significant"]
+    if not each.is_lens:
+        words = ["differs from the given value" if each.significant else "as given"]
+    if not each.separable:
+        words.append("not separable")
+    if each.from_prior:
+        words.append("from its prior")
+    return ", ".join(words)
+
+
+def _group_lines(found: Calibration) -> list[str]:
+    if not found.groups:
+        return []
+    lines = ["", f"{'terms together':<31}{'F':>15}{'probability':>15}"]
+    return lines + [
+        f"{', '.join(each.names):<31}{each.test_value:>15.2f}{each.probability:>15.4f}"
+        f"  {'significant' if each.significant else 'not significant'}"
+        for each in found.groups
+    ]
+
+
+def _correlation_lines(found: Calibration) -> list[str]:
+    if not found.correlations:
+        return ["", "no two parameters are correlated by more than 0.95"]
+    return ["", "correlated by more than 0.95:"] + [
+        f"  {each.first} and {each.second}: {each.coefficient:.4f}" for each in found.correlations
+    ]
+
+
+def _curve_lines(curve: DistortionCurve, unit: str) -> list[str]:
+    factor, written = (1000.0, "um") if unit == "mm" else (1.0, "px")
+    added = "measured" if curve.direction == "backward" else "ideal"
+    lines = [
+        f"radial distortion in {written}, added to {added} coordinates, over the {added} radius up to"
+        f" {curve.observed:.4g} {unit};",
+        "sd of the mapping: of curve and principal distance together",
+        f"balanced: zero at {curve.balanced_at:.4g} {unit}, where the principal distance is"
+        f" {curve.balanced_distance:.7g} {unit}",
+        f"{f'radius {unit}':>15}{'distortion':>15}{'sd':>15}{'sd of mapping':>15}{'balanced':>15}{'sd':>15}",
+    ]
+    inside = np.flatnonzero(curve.radii <= curve.observed * (1 + 1e-9))
+    for k in np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int)).tolist():
+        values = (
+            curve.values[k],
+            curve.sd[k],
+            curve.sd_mapping[k],
+            curve.balanced[k],
+            curve.sd_balanced[k],
+        )
+        lines.append(
+            f"{curve.radii[k]:>15.4f}" + "".join(f"{factor * float(value):>15.3f}" for value in values)
+        )
+    return lines
+
+
+def _field_line(field: LensField, unit: str) -> str:
+    factor, written = (1000.0, "um") if unit == "mm" else (1.0, "px")
+    at = field.largest
+    x, y = field.positions[at]
+    (dx, dy), (sx, sy) = field.vectors[at], np.sqrt(np.diag(field.covariances[at]))
+    return (
+        f"{', '.join(field.names)}: at the most {factor * dx:.3f} and {factor * dy:.3f} {written} (sd"
+        f" {factor * sx:.3f} and {factor * sy:.3f}), at x {x:.4g}, y {y:.4g} {unit}"
+    )
+
+
+def calibration_members(result: Result) -> list[dict[str, Any]]:
+    """Return what the JSON document says of each camera with unknown parameters."""
+    return [_member(result, each) for each in calibrations(result)]
+
+
+def _member(result: Result, found: Calibration) -> dict[str, Any]:
+    curve, field = distortion_curve(result, found.camera), lens_field(result, found.camera)
+    return {
+        "camera": found.camera.name,
+        "parameters": [
+            {
+                "name": each.name,
+                "unit": each.unit,
+                "value": each.value,
+                "sd": each.sd,
+                "change": each.change,
+                "test_value": each.test_value,
+                "probability": each.probability,
+                "significant": each.significant,
+                "multiple_correlation": each.multiple_correlation,
+                "from_prior": each.from_prior,
+                "gain": each.gain,
+            }
+            for each in found.parameters
+        ],
+        "groups": [
+            {
+                "names": list(each.names),
+                "test_value": each.test_value,
+                "probability": each.probability,
+                "significant": each.significant,
+            }
+            for each in found.groups
+        ],
+        "correlations": [
+            {"first": each.first, "second": each.second, "coefficient": each.coefficient}
+            for each in found.correlations
+        ],
+        "removable": found.removable,
+        "remarks": found.remarks(),
+        "distortion": None if curve is None else _curve_member(curve),
+        "field": None if field is None else _field_member(field),
+    }
+
+
+def _field_member(field: LensField) -> dict[str, Any]:
+    return {
+        "terms": list(field.names),
+        "position": field.positions.tolist(),
+        "vector": field.vectors.tolist(),
+        "covariance": field.covariances.tolist(),
+    }
+
+
+def _curve_member(curve: DistortionCurve) -> dict[str, Any]:
+    return {
+        "direction": curve.direction,
+        "observed_radius": curve.observed,
+        "balanced_at": curve.balanced_at,
+        "balanced_distance": curve.balanced_distance,
+        "radius": curve.radii.tolist(),
+        "distortion": curve.values.tolist(),
+        "sd": curve.sd.tolist(),
+        "sd_of_mapping": curve.sd_mapping.tolist(),
+        "balanced": curve.balanced.tolist(),
+        "balanced_sd": curve.sd_balanced.tolist(),
+    }

@@ -1,0 +1,228 @@
+"""Hints: every mistake of the specification made on purpose, and good data that get none."""
+
+import mistakes
+import numpy as np
+import pytest
+
+from example_scripts import load
+from photogram import InputError, RankError, Spheroid, adjust, hints, simulate
+from photogram.adjustment.hints import verdicts
+from photogram.adjustment.regression import eligible, regressions, spread, view
+from photogram.giant import Project, check
+from photogram.network.observations import Distance
+
+IDENTITY = [[1, 0], [0, 1]]
+Y_DOWN, TURNED, MIRRORED = [[1, 0], [0, -1]], [[-1, 0], [0, -1]], [[-1, 0], [0, 1]]
+EXCHANGED, QUARTER = [[0, 1], [1, 0]], [[0, -1], [1, 0]]
+
+TABLE = {
+    "none": ((1.00, IDENTITY, 0.007, 0.04), (1.01, IDENTITY, 0.03, 0.19)),
+    "pixels": ((166, Y_DOWN, 0.007, None), (169, Y_DOWN, 0.03, None)),
+    "y down": ((1.00, Y_DOWN, 0.007, 1.5), (1.01, Y_DOWN, 0.03, 1.4)),
+    "sign of c": ((1.00, TURNED, 0.007, 2.1), (1.01, TURNED, 0.03, 2.0)),
+    "mirrored": ((1.00, MIRRORED, 0.007, 1.6), (1.01, MIRRORED, 0.03, 1.4)),
+    "x, y exchanged": ((1.00, EXCHANGED, 0.007, 1.5), (1.01, EXCHANGED, 0.03, 1.5)),
+    "kappa + 90": ((1.00, QUARTER, 0.007, 1.5), (1.01, QUARTER, 0.03, 1.4)),
+    "degrees as radians": ((0.01, None, 0.95, 41), (0.3, None, 0.25, 9.6)),
+    "radians as degrees": ((1.01, IDENTITY, 0.014, 0.10), (0.9, None, 0.07, 2.7)),
+    "photo-to-ground": ((1.02, IDENTITY, 0.026, 0.21), (0.9, None, 0.08, 2.7)),
+    "feet": ((3.4, IDENTITY, 0.03, 1.3), (3.3, IDENTITY, 0.06, 0.74)),
+    "feet in heights": ((3.3, IDENTITY, 0.02, 0.74), (2.8, IDENTITY, 0.08, 1.6)),
+    "t in photo axes": ((1.1, TURNED, 0.08, 3.3), (0.8, TURNED, 0.18, 3.3)),
+    "X, Y exchanged": ((1.0, IDENTITY, 0.06, 2.0), (0.85, IDENTITY, 0.10, 2.0)),
+}
+"""k, V, e, m of the specification on aerial.json and selfcal.json, the median of five photos."""
+
+LOOKED_AT = {"aerial": [0, 1, 2, 3, 4], "selfcal": [0, 1, 9, 10, 11]}
+"""The first five in the alphabet."""
+
+
+@pytest.mark.parametrize("network", LOOKED_AT)
+@pytest.mark.parametrize("mistake", TABLE)
+def test_the_table_of_the_specification(network, mistake):
+    block = mistakes.mistakes(mistakes.golden(network), mistakes.HALF[network])[mistake]
+    photos = np.array(LOOKED_AT[network])
+    seen = regressions(view(block, photos), photos)
+    scale, turn, rest, misfit = TABLE[mistake][network == "selfcal"]
+    assert np.median(seen.scale) == pytest.approx(scale, rel=0.08, abs=0.05)
+    assert np.median(seen.rest) == pytest.approx(rest, rel=0.08, abs=0.006)
+    if turn is not None:
+        assert np.array_equal(np.round(np.median(seen.turn, axis=0)), turn)
+    if misfit is not None:
+        assert np.median(seen.misfit) == pytest.approx(misfit, rel=0.08, abs=0.006)
+
+
+NAMED = {
+    "pixels": "unit, origin, y down",
+    "corner": "origin, y down",
+    "y down": "y down",
+    "sign of c": "c or kappa",
+    "mirrored": "mirrored",
+    "x, y exchanged": "exchanged",
+    "kappa + 90": "kappa + 90",
+    "kappa - 90": "kappa - 90",
+    "degrees as radians": "degrees for radians",
+    "feet": "feet in positions of photos",
+    "feet in heights": "feet in heights of photos",
+    "t": "t for C",
+    "t in photo axes": "t for C",
+    "X, Y exchanged": "X and Y of photos",
+    "principal distance": "principal distance",
+    "control in feet": "feet in points",
+    "control, X and Y": "X and Y of points",
+}
+
+
+@pytest.mark.parametrize("network", LOOKED_AT)
+@pytest.mark.parametrize("mistake", NAMED)
+def test_mistakes_are_named(network, mistake):
+    block = mistakes.mistakes(mistakes.golden(network), mistakes.HALF[network])[mistake]
+    found = verdicts(block)
+    assert [verdict.names for verdict in found] == [[NAMED[mistake]]]
+    (hint,) = hints(block)
+    assert str(hint).startswith("probably ")
+
+
+@pytest.mark.parametrize(
+    ("mistake", "said"),
+    [
+        ("radians as degrees", "angles were given in radians and read as degrees"),
+        ("photo-to-ground", "angles are photo-to-ground, not ground-to-photo"),
+        ("gon", "angles were given in gon and read as degrees"),
+        ("sign of phi", "phi has the wrong sign"),
+    ],
+)
+def test_readings_of_angles_in_convergent_photos(mistake, said):
+    block = mistakes.mistakes(mistakes.golden("selfcal"), mistakes.HALF["selfcal"])[mistake]
+    (hint,) = hints(block)
+    assert said in str(hint)
+
+
+def test_small_angles_hide_what_they_mean():
+    """Near the vertical the sign of phi and the order of angles cannot be told, and nothing is said."""
+    made = mistakes.mistakes(mistakes.golden("aerial"), mistakes.HALF["aerial"])
+    assert hints(made["sign of phi"]) == hints(made["phi-omega-kappa"]) == []
+
+
+@pytest.mark.parametrize("network", LOOKED_AT)
+def test_start_values_without_mistakes(network):
+    assert hints(mistakes.golden(network)) == []
+
+
+# Blocks whose points are intersected from the poses that are wrong
+
+
+def aerial(seed, **options):
+    block = simulate(strips=2, photos_per_strip=5, seed=seed, **options).block
+    return block.replace(
+        photo_position_sd=np.inf,
+        photo_attitude_sd=np.inf,
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
+    )
+
+
+FROM_RAYS = {
+    "pixels": "unit, origin, y down",
+    "corner": "origin, y down",
+    "y down": "y down",
+    "sign of c": "c or kappa",
+    "mirrored": "mirrored",
+    "x, y exchanged": "exchanged",
+    "degrees as radians": "degrees for radians",
+    "t in photo axes": "t for C",
+}
+
+
+@pytest.mark.parametrize("mistake", FROM_RAYS)
+@pytest.mark.parametrize("control", ["perimeter", "none"])
+def test_intersected_points(mistake, control):
+    block = mistakes.mistakes(aerial(5, control=control, tilt=0.03), [120.0, 120.0])[mistake]
+    found = verdicts(block)
+    assert [verdict.names for verdict in found] == [[FROM_RAYS[mistake]]]
+
+
+def test_good_blocks_get_no_hints():
+    for seed in range(12):
+        assert hints(aerial(seed, relief=float(20 + 50 * seed))) == []
+    geographic = simulate(strips=2, photos_per_strip=4, spheroid=Spheroid.wgs84(), seed=1).block
+    assert hints(geographic) == []
+
+
+def test_a_single_photo():
+    block = aerial(7)
+    xy = block.image_xy.copy()
+    xy[block.image_photos == 4] *= [-1, 1]
+    (hint,) = hints(block.replace(image_xy=xy))
+    assert "photos are mirrored" in str(hint)
+    assert f"(on photo {block.photo_ids[4]})" in str(hint)
+
+
+def test_longitude_and_latitude():
+    block = simulate(strips=2, photos_per_strip=4, spheroid=Spheroid.wgs84(), seed=1).block
+    free = {"photo_position_sd": np.inf, "photo_positions_observed": None}
+    exchanged = block.replace(photo_positions=block.photo_positions[:, [1, 0, 2]], **free)
+    found = " ".join(str(hint) for hint in hints(exchanged))
+    assert "longitude and latitude" in found
+    assert "exchanged" in found
+
+
+def test_scale_bars_in_millimetres():
+    block = aerial(8)
+    known = np.flatnonzero(np.isfinite(block.point_positions).all(axis=1))[:3]
+    names, places = [block.point_ids[k] for k in known], block.point_positions[known]
+    lengths = [float(np.linalg.norm(places[k + 1] - places[k])) for k in range(2)]
+    pairs = list(zip(names, names[1:], lengths, strict=False))
+    good = [Distance(p, q, length, sd=1.0) for p, q, length in pairs]
+    wrong = [Distance(p, q, 1000 * length, sd=1.0) for p, q, length in pairs]
+    assert hints(block.replace(observations=good)) == []
+    (hint,) = hints(block.replace(observations=wrong))
+    assert "observed distances are in millimetres, all else in metres" in str(hint)
+
+
+# Where hints are told
+
+
+def test_adjustments_that_fail_tell_hints():
+    block = aerial(9)
+    down = block.replace(image_xy=block.image_xy * [1, -1])
+    result = adjust(down)
+    assert not result.converged
+    assert "y of the images has the wrong sign" in str(result.messages[0])
+    with pytest.raises(
+        RankError, match=r"do not intersect\n  hint: probably the principal distance"
+    ) as raised:
+        adjust(block.replace(principal_distances=-block.principal_distances))
+    assert raised.value.points
+
+
+def test_good_adjustments_look_for_none(monkeypatch):
+    def looked(_block):
+        raise AssertionError
+
+    monkeypatch.setattr("photogram.adjustment.hints.hints", looked)
+    assert adjust(aerial(9)).converged
+
+
+def test_the_check_of_a_project_tells_them():
+    block = aerial(10)
+    feet = block.replace(photo_positions=block.photo_positions / 0.3048)
+    found = [each.text for each in check(Project.from_block(feet)).findings if each.kind == "convention"]
+    assert len(found) == 1
+    assert "positions of the photos are in feet" in found[0]
+
+
+def test_the_example(capsys):
+    example = load("hints")
+    example.main()
+    said = capsys.readouterr().out
+    assert "no mistake:\n    nothing\n" in said
+    assert said.count("    probably ") == 6
+    assert "nothing\n" not in said.split("pixels from", 1)[1]
+
+
+def test_what_is_no_block():
+    with pytest.raises(InputError, match="block is not a Block"):
+        hints("block")
+    assert len(spread(np.arange(100), 12)) == 12
+    assert len(eligible(aerial(1))) == 10

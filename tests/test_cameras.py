@@ -1,0 +1,270 @@
+"""Cameras with unknown parameters in blocks: what may be given, and what has become of them."""
+
+import copy
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+from example_scripts import load
+from photogram import Block, Camera, InputError, RankError, adjust, predict
+from photogram.checks.rays import Rays
+from photogram.giant import Project
+from photogram.network.geometry import project
+
+FREE = np.inf
+
+
+@pytest.fixture(scope="module")
+def example():
+    return load("self_calibration")
+
+
+@pytest.fixture(scope="module")
+def block(example):
+    return example.measured()
+
+
+@pytest.fixture(scope="module")
+def result(block):
+    return adjust(block)
+
+
+def test_a_camera_is_found_from_its_principal_distance_alone(example, result):
+    assert result.converged
+    camera = result.cameras[0]
+    assert (camera.name, camera.photos, camera.images) == ("24 mm lens", 12, int(result.used_images.sum()))
+    rows = camera.estimated
+    errors = (camera.values - example.TRUTH.values)[rows]
+    covariance = camera.covariance[np.ix_(rows, rows)]
+    form = errors @ np.linalg.solve(covariance, errors)
+    assert form < 26.1  # chi-square of 8, 0.1 percent
+    assert 0.85 < np.sqrt(result.variance_of_unit_weight) < 1.15
+    weights = result.redundancy.sum() + result.point_redundancy[result.used_points].sum()
+    assert weights == pytest.approx(result.degrees_of_freedom)
+    np.testing.assert_allclose(camera.sd[rows] ** 2, np.diag(covariance))
+    assert (camera.information[rows] * np.diag(camera.cofactors)[rows] > 1).all()
+
+
+def test_a_camera_for_each_photo_and_one_that_is_held(block, result):
+    own = [example_camera(block, "own"), example_camera(block, "shared")]
+    cameras = [
+        *own,
+        block.cameras[0].replace(parameters=result.cameras[0].camera.parameters, sd=0.0, name="held"),
+    ]
+    of = ["own", *["shared"] * 8, *["held"] * 3]
+    mixed = adjust(block.replace(cameras=cameras, photo_cameras=of))
+    assert mixed.converged
+    assert [each.photos for each in mixed.cameras] == [1, 8, 3]
+    assert not mixed.cameras[2].sd.any()
+    for each in mixed.cameras[:2]:
+        apart = each.values - result.cameras[0].values
+        assert (np.abs(apart) < 5 * np.hypot(each.sd, result.cameras[0].sd) + 1e-12).all()
+    assert mixed.photo_covariances.shape == (12, 6, 6)
+    assert mixed.photo_corrections.shape == (len(mixed.iterations), 12, 6)
+    moved = block.photo_positions + mixed.photo_corrections[:, :, :3].sum(axis=0)
+    np.testing.assert_allclose(moved, mixed.photo_positions, atol=1e-9)
+
+
+def example_camera(block, name):
+    return block.cameras[0].replace(name=name)
+
+
+def test_photos_with_cameras_of_their_own_need_no_indices(block):
+    cameras = [Camera("perspective", {"c": -24.3}, sd=0.5, unit="mm") for _ in block.photo_ids]
+    given = block.replace(cameras=cameras, photo_cameras=None)
+    assert given.photo_cameras.tolist() == list(range(12))
+    assert given.camera_names[:2] == ["camera 1", "camera 2"]
+    table = adjust(given).camera_table()
+    assert len(table) == 12
+    assert table["sd_given"].tolist() == [0.5] * 12
+
+
+def test_weights_count(block):
+    """Weights that hold a camera are as if it was held; their redundancy numbers are those of priors."""
+    truth = adjust(block).cameras[0].camera
+    tight = adjust(block.replace(cameras=[truth.replace(sd={"c": 1e-7, "K1": FREE})]))
+    held = adjust(block.replace(cameras=[truth.replace(sd={"K1": FREE})]))
+    np.testing.assert_allclose(tight.point_positions, held.point_positions, atol=1e-9)
+    c, k1 = (truth.names.index(name) for name in ("c", "K1"))
+    assert tight.cameras[0].redundancy[c] < 1e-5
+    assert tight.cameras[0].redundancy[k1] == 0
+    assert tight.degrees_of_freedom == held.degrees_of_freedom
+    loose = adjust(block.replace(cameras=[truth.replace(sd={"c": 10.0})]))
+    assert loose.cameras[0].redundancy[c] > 0.999
+
+
+def test_principal_distances_are_perspective_cameras_that_are_held(small_block):
+    distance = float(small_block.principal_distances[0])
+    camera = Camera("perspective", {"c": distance})
+    same = small_block.replace(principal_distances=None, cameras=[camera])
+    ours, theirs = adjust(same), adjust(small_block)
+    np.testing.assert_array_equal(ours.point_positions, theirs.point_positions)
+    np.testing.assert_array_equal(ours.photo_covariances, theirs.photo_covariances)
+    assert theirs.cameras == ()
+    assert ours.cameras[0].given.is_held
+    # What takes only such cameras takes these.
+    np.testing.assert_array_equal(Rays.of(same).directions(), Rays.of(small_block).directions())
+
+
+def test_what_takes_no_lens_says_so(block, tmp_path):
+    with pytest.raises(InputError, match="checks: 24 mm lens has the model brown"):
+        Rays.of(block).directions()
+    with pytest.raises(InputError, match="GIANT files: 24 mm lens has the model brown"):
+        Project.from_block(block)
+
+
+def test_predictions_know_the_lens(result):
+    from photogram.adjustment.prediction import at_adjusted, computed_images
+
+    plan = at_adjusted(result)
+    # Residuals are those of corrected coordinates.
+    np.testing.assert_allclose(
+        plan.image_xy - computed_images(plan), result.residuals[result.used_images], atol=1.5e-4
+    )
+    predicted = predict(plan)
+    sd = np.sqrt(np.diag(result.cameras[0].cofactors))
+    np.testing.assert_allclose(predicted.cameras[0].sd, sd, rtol=1e-4, atol=1e-20)
+
+
+def test_pixels_are_named(example, block):
+    pixels = 1000 / 6
+    xy = block.image_xy * [pixels, -pixels] + [3000, 2000]
+    camera = Camera("radial", {"f": 25 * pixels, "cx": 3000, "cy": 2000}, sd=FREE)
+    given = block.replace(cameras=[camera], image_xy=xy, image_sd=np.array(0.2))
+    assert given.image_unit == "px"
+    result = adjust(given)
+    assert result.converged
+    assert "residual_x_px" in result.image_table()
+    report = result.report()
+    assert "rms of image residuals" in report
+    assert "um" not in report.split("Iterations")[0].replace("number", "").replace("sum", "")
+    document = json.loads(result.to_json())
+    assert document["units"]["residual_px"] == "px"
+    assert "residual_px" in document["observations"][0]
+    assert document["cameras"][0]["image_unit"] == "px"
+    f = result.cameras[0]
+    assert abs(f.value("f") - 24.3 * pixels) < 0.01 * f.value("f")
+
+
+def test_tables_name_cameras(block):
+    photos = {
+        "photo": block.photo_ids,
+        **dict(zip("XYZ", block.photo_positions.T, strict=True)),
+        **dict(zip(("omega_deg", "phi_deg", "kappa_deg"), np.degrees(block.photo_attitudes).T, strict=True)),
+        "camera": ["a", "b"] * 6,
+    }
+    images = {
+        "photo": [block.photo_ids[i] for i in block.image_photos],
+        "point": [block.point_ids[i] for i in block.image_points],
+        "x_px": block.image_xy[:, 0],
+        "y_px": block.image_xy[:, 1],
+    }
+    cameras = [Camera("brown", {"c": -25.0}, name=name, unit="px") for name in "ab"]
+    made = Block.from_tables(photos, images, cameras=cameras, image_sd=1.0)
+    assert made.photo_cameras.tolist() == [0, 1] * 6
+    assert made.image_unit == "px"
+    for wrong, match in (
+        ({"principal_distance": -24.0}, "both given"),
+        ({"image_sd": None}, "sd_x_px"),
+        ({"cameras": ()}, "no column principal_distance_mm"),
+    ):
+        with pytest.raises(InputError, match=match):
+            Block.from_tables(photos, images, **{"cameras": cameras, "image_sd": 1.0} | wrong)
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"model": "barrel"}, "a camera is one of"),
+        ({"model": 5}, "a camera is one of"),
+        ({"parameters": {}}, "c must be given"),
+        ({"parameters": {"c": 0.0}}, "c of the camera .* is zero"),
+        ({"parameters": {"c": -24.0, "k1": 0.0}}, "brown has no k1, but c, xp"),
+        ({"parameters": {"c": np.nan}}, "not a finite number"),
+        ({"parameters": [1.0]}, "no mapping"),
+        ({"sd": -1.0}, "no standard deviation"),
+        ({"sd": {"f": 1.0}}, "brown has no f"),
+        ({"sd": {"r0": 1.0}}, "r0 of the camera .* is a constant"),
+        ({"unit": "inch"}, "unit"),
+        ({"name": 5}, "name"),
+    ],
+)
+def test_cameras_that_cannot_be(given, match):
+    with pytest.raises(InputError, match=match):
+        Camera(**{"model": "brown", "parameters": {"c": -24.0}} | given)
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"cameras": ()}, "photo_cameras is given, but no cameras"),
+        ({"cameras": (), "photo_cameras": None}, "principal_distances"),
+        ({"principal_distances": np.full(12, -24.0)}, "both given"),
+        ({"cameras": "lens"}, "holds what is no Camera"),
+        ({"cameras": 5}, "no list"),
+        ({"photo_cameras": [0] * 11}, "11 rows, but there are 12 photos"),
+        ({"photo_cameras": [1] * 12}, "there is no camera 1"),
+        ({"photo_cameras": ["lens"] * 12}, "there is no camera 'lens'"),
+        ({"photo_cameras": [0.5] * 12}, "there is no camera 0.5"),
+        ({"photo_cameras": 1.5}, "no list of cameras"),
+        ({"cameras": [Camera("brown", {"c": -1.0})] * 2, "photo_cameras": None}, "which photo has which"),
+        ({"cameras": [Camera("brown", {"c": -1.0}, name="x")] * 2}, "more than once"),
+        (
+            {"cameras": [Camera("brown", {"c": -1.0}), Camera("brown", {"c": -1.0}, unit="px")]},
+            "one unit",
+        ),
+    ],
+)
+def test_blocks_whose_cameras_cannot_be(block, given, match):
+    with pytest.raises(InputError, match=match):
+        block.replace(**given)
+
+
+def test_cameras_are_copied_pickled_and_used_alone():
+    camera = Camera("brown", {"c": -24.0, "K1": -1e-4}, sd={"c": FREE})
+    for same in (pickle.loads(pickle.dumps(camera)), copy.deepcopy(camera), camera.replace()):
+        np.testing.assert_array_equal(same.values, camera.values)
+        np.testing.assert_array_equal(same.deviations, camera.deviations)
+    assert (camera.unit, camera.direction, camera.scale) == ("mm", "backward", 24.0)
+    assert [camera.unit_of(name) for name in ("c", "K1", "K2", "P1", "b1")] == [
+        "mm",
+        "mm^-2",
+        "mm^-4",
+        "mm^-1",
+        "",
+    ]
+    u = np.array([[0.1, 0.2, -1.0], [-0.3, 0.1, -2.0]])
+    xy = camera.project(u)
+    np.testing.assert_allclose(camera.rays(xy), u / np.linalg.norm(u, axis=1, keepdims=True), atol=1e-14)
+    ideal = project(u, np.zeros((2, 3)), np.zeros((2, 3)), [-24.0, -24.0])
+    r2 = (xy**2).sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(xy * (1 - 1e-4 * r2), ideal, atol=1e-12)
+    with pytest.raises(InputError, match="u has the shape"):
+        camera.project(np.zeros((2, 2)))
+
+
+def test_what_is_not_determined_names_the_camera(small_block):
+    """Vertical photos, no control: a longer principal distance is a greater flying height."""
+    camera = Camera(
+        "brown", {"c": float(small_block.principal_distances[0])}, sd={"r0": 0.0, "b1": FREE, "c": FREE}
+    )
+    seen = np.flatnonzero(small_block.image_photos == 0)
+    single = small_block.replace(
+        principal_distances=None,
+        cameras=[camera.replace(name="unused"), camera.replace(name="flying", sd=0.0)],
+        photo_cameras=np.array([1, 1, 1, 1, 0, 0]),
+        image_photos=np.concatenate([small_block.image_photos[small_block.image_photos < 4], [4, 5]]),
+        image_points=np.concatenate(
+            [small_block.image_points[small_block.image_photos < 4], small_block.image_points[seen[:2]]]
+        ),
+        image_xy=np.concatenate(
+            [small_block.image_xy[small_block.image_photos < 4], [[0.0, 1.0], [1.0, 0.0]]]
+        ),
+        image_sd=np.array(0.01),
+    )
+    with pytest.raises(RankError) as caught:
+        adjust(single)
+    assert caught.value.cameras == ["unused"]
+    assert "unused" in str(caught.value)
