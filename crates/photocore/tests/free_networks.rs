@@ -70,6 +70,8 @@ fn around() -> Network {
         points,
         images,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 

@@ -141,7 +141,7 @@ fn network() -> Network {
     let length = |points: [usize; 2]| {
         let [p, q] = points.map(place);
         let length = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
-        Distance { points, length: length + 0.0005, sd: 0.001 }.into()
+        Distance { points, length: length + 0.0005, sd: 0.001, instrument: None }.into()
     };
     Network {
         space: ObjectSpace::Rectangular,
@@ -152,6 +152,8 @@ fn network() -> Network {
         points: (0..POINTS).map(point).collect(),
         images,
         observations: [[20, 21], [4, 30]].map(length).into(),
+        commons: vec![],
+        mounts: vec![],
     }
 }
 
@@ -460,6 +462,8 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
         points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
         images: vec![],
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     };
     for (photo, [x, y]) in stations.into_iter().enumerate() {
         let pose = [0.0, 0.0, 0.0, x, y, -10.0];
@@ -469,7 +473,7 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
             network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
         }
     }
-    let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1] };
+    let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1], ..Combination::default() };
     assert_eq!(adjust(&network, TIGHT).unwrap_err(), NetworkError::Undetermined(vec![combination]));
     // A weight is enough.
     network.cameras[1].sd = vec![0.1];

@@ -32,6 +32,12 @@ impl Transformation {
         for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
             self.block(layout.local_range(local), layout.local_range(local), block, &mut cancelled);
         }
+        for &pair in layout.pairs() {
+            let [rows, columns] = pair.map(|block| layout.kept_range(block as usize));
+            if let Some(range) = layout.pair(pair) {
+                self.block(rows, columns, &mut cofactors.pairs[range], &mut cancelled);
+            }
+        }
         let border = layout.border_range();
         let (mut own, mut tied) = (&mut cofactors.kept[..], &mut cofactors.kept_border[..]);
         for kept in 0..layout.kept() {

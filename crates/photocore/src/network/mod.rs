@@ -40,6 +40,8 @@
 //!     points: corners.map(|coordinates| Point { coordinates, sd: [0.02; 3] }).to_vec(),
 //!     images,
 //!     observations: vec![],
+//!     commons: vec![],
+//!     mounts: vec![],
 //! };
 //! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
 //! let solution = network.adjust(&Options::default(), &pool, &mut |_| ControlFlow::Continue(()))?;
@@ -52,10 +54,12 @@
 //! ```
 
 mod cameras;
+pub mod commons;
 mod covariance;
 mod datum;
 mod error;
 mod model;
+mod mounts;
 mod neighbourhood;
 pub mod observations;
 mod precision;
@@ -74,9 +78,11 @@ use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
 pub use cameras::AdjustedCamera;
+pub use commons::{AdjustedCommon, Common, CommonKind};
 pub use covariance::{Covariances, NetworkDatum, Of, State};
-pub use datum::InnerConstraints;
+pub use datum::{InnerConstraints, Minimum};
 pub use error::{Combination, NetworkError};
+pub use mounts::Mount;
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub(crate) use precision::median;
@@ -167,6 +173,10 @@ pub struct Network {
     pub images: Vec<Image>,
     /// What else was observed.
     pub observations: Vec<Observation>,
+    /// Unknowns that observations, and the photos of rigs, have in common.
+    pub commons: Vec<Common>,
+    /// Which photos are on a frame with others.
+    pub mounts: Vec<Mount>,
 }
 
 /// What the variance of unit weight is based on (GIANT guide, Appendix E).
@@ -206,6 +216,8 @@ pub struct Options {
     pub hold_unused: bool,
     /// Bytes that the adjustment may take (see [`crate::normals::System::memory`]); None for any number.
     pub memory: Option<usize>,
+    /// What to hold where nothing else gives a datum; None for what is best held.
+    pub minimum: Option<Minimum>,
 }
 
 impl Default for Options {
@@ -218,6 +230,7 @@ impl Default for Options {
             start: Start::default(),
             hold_unused: false,
             memory: None,
+            minimum: None,
         }
     }
 }
@@ -347,8 +360,14 @@ impl Network {
                 return Err(NetworkError::CameraConstant { camera: index, parameter: known[free].0 });
             }
         }
+        for (index, common) in self.commons.iter().enumerate() {
+            if common.sd.len() != common.kind.unknowns().len() {
+                return Err(NetworkError::CommonDeviations(index));
+            }
+        }
+        self.check_mounts()?;
         for (index, observation) in self.observations.iter().enumerate() {
-            let checked = observation.check(self.points.len(), self.photos.len());
+            let checked = observation.check(self.points.len(), self.photos.len(), &self.commons);
             checked.map_err(|fault| NetworkError::Observation { index, kind: observation.kind(), fault })?;
         }
         let cartesian = self.space == ObjectSpace::Rectangular && self.refraction.is_none();

@@ -114,6 +114,8 @@ fn adjust_collection(
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     };
     let options = Options {
         adjustment: AdjustmentOptions {
@@ -127,6 +129,7 @@ fn adjust_collection(
         start: Start::Given,
         hold_unused: true,
         memory,
+        minimum: None,
     };
     let solution = adjusted(py, &network, &options, threads, progress)?;
     solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| match error {

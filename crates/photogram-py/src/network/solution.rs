@@ -5,8 +5,10 @@ use photocore::network::{AdjustedCamera, AdjustedPhoto, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::block_network::BlockState;
 use super::{FailureRow, failure};
 use crate::arrays::{squares, table};
+use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
 use crate::observations::{AdjustedRow, adjusted_row};
 use crate::solution::{
     IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
@@ -211,6 +213,16 @@ solution_class! {
     /// An adjusted block.
     BlockSolution, "block", {
         #[getter]
+        fn state(&self) -> BlockState {
+            BlockState { state: self.solution.state.clone() }
+        }
+
+        #[getter]
+        fn lost_digits(&self) -> f64 {
+            self.solution.lost_digits
+        }
+
+        #[getter]
         fn photo_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
             let (iterations, photos) = (&self.solution.photo_corrections, &self.solution.photos);
             let mut values = Vec::with_capacity(6 * iterations.len() * photos.len());
@@ -251,6 +263,16 @@ solution_class! {
         #[getter]
         fn weak(&self) -> Vec<(usize, usize)> {
             self.solution.weak.clone()
+        }
+
+        #[getter]
+        fn weak_unknowns(&self) -> Vec<(usize, usize)> {
+            self.solution.weak_commons.clone()
+        }
+
+        #[getter]
+        fn adjusted_unknowns(&self) -> Vec<UnknownRow> {
+            self.solution.commons.iter().map(unknown_row).collect()
         }
 
         #[getter]
