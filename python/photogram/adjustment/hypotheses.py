@@ -145,7 +145,7 @@ def _of_format(block: Block) -> Iterator[Hypothesis]:
     """Propose a corner for the origin, and pixels, from how far images reach: where few points are given."""
     lowest, highest = block.image_xy.min(axis=0), block.image_xy.max(axis=0)
     middle, half = (lowest + highest) / 2, float((highest - lowest).max() / 2)
-    distance = float(np.abs(block.principal_distances).max())
+    distance = float(block.camera_scales().max())
     corner, pixels = bool(np.abs(middle).min() > _CORNER * half), half > _WIDEST * distance
     if not (corner or pixels):
         return

@@ -8,7 +8,12 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
 
-__all__ = ["direction_deviations", "image_directions"]
+__all__ = ["direction_deviations", "image_directions", "without_lenses"]
+
+_SIDE = -0.02
+"""u3 of unit directions that are seen well in front of the camera."""
+_SMALL = 1e-6
+"""Radians off the axis, where no lens distorts."""
 
 
 def image_directions(block: Block) -> Floats:
@@ -24,6 +29,45 @@ def image_directions(block: Block) -> Floats:
     for (model, parameters, _), own in zip(cameras, np.split(order, ends[:-1]), strict=True):
         directions[own] = _photocore.camera_rays(model, np.array(parameters), block.image_xy[own])
     return directions
+
+
+def without_lenses(block: Block) -> Block:
+    """Return a block as cameras without distortion would have seen it, in the unit of its images.
+
+    A block that has principal distances is returned as it is. Where most images have no direction (they may
+    be in another unit) lenses are left out, and cameras are everywhere what they are near the axis; else
+    images without a direction in front of the camera are left out.
+    """
+    if not block.cameras or block.photo_cameras is None:
+        return block
+    directions = image_directions(block)
+    seen = directions[:, 2] < _SIDE
+    if 2 * np.count_nonzero(seen) < len(seen):
+        tangents, seen = _near_axis(block), np.ones(len(seen), dtype=bool)
+    else:
+        tangents = -directions[:, :2] / directions[:, 2:]
+    scales = block.camera_scales()
+    return block.replace(
+        cameras=(),
+        photo_cameras=None,
+        principal_distances=-scales,
+        image_photos=block.image_photos[seen],
+        image_points=block.image_points[seen],
+        image_xy=(scales[block.image_photos, np.newaxis] * tangents)[seen],
+        image_sd=block.image_sd[seen],
+    )
+
+
+def _near_axis(block: Block) -> Floats:
+    """(m, 2) tangents -u1/u3, -u2/u3 of images, as if cameras were everywhere what they are near the axis."""
+    tangents = np.empty_like(block.image_xy)
+    of_images = np.asarray(block.photo_cameras)[block.image_photos]
+    for row, camera in enumerate(block.cameras):
+        middle, right, up = camera.project([[0.0, 0.0, -1.0], [_SMALL, 0.0, -1.0], [0.0, _SMALL, -1.0]])
+        linear = np.column_stack([right - middle, up - middle]) / _SMALL
+        own = of_images == row
+        tangents[own] = np.linalg.solve(linear, (block.image_xy[own] - middle).T).T
+    return tangents
 
 
 def direction_deviations(block: Block) -> Floats:
