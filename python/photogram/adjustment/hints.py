@@ -45,6 +45,8 @@ EACH = 0.5
 """What it must fall to on each photo that does not fit as it is."""
 AS_GOOD = 1.5
 """Another hypothesis is as good when its misfit is below so many times the least."""
+SLIGHT = float(np.radians(1.0))
+"""Attitudes that differ from resected ones by less are right."""
 CLEARLY = 5.0
 """So many times nearer to the resected attitudes must those of a rival reading be."""
 BAD = 5.0
@@ -235,7 +237,7 @@ def _readings(block: Block) -> list[Message]:
         (_apart(matrices[rows], turned), text) for text, matrices in attitude_readings(block).values()
     )
     (least, text), (second, _) = rivals[:2]
-    if CLEARLY * least > min(own, second):
+    if own < SLIGHT or CLEARLY * least > min(own, second):
         return []
     return [
         Message(
