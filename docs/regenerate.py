@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import calibration_numbers
 import comparator_numbers
 import stellar_numbers
 
@@ -22,6 +23,7 @@ DOCS = Path(__file__).parent
 PAGES: dict[str, Mapping[str, Callable[[], list[str]]]] = {
     "comparator.md": comparator_numbers.BLOCKS,
     "extending.md": {},
+    "self-calibration.md": calibration_numbers.BLOCKS,
     "stellar-camera.md": stellar_numbers.BLOCKS,
 }
 BLOCK = re.compile(r"(<!-- numbers: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)

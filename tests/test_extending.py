@@ -18,7 +18,7 @@ PACKAGE = [
     if path.suffix in (".py", ".pyi") and path.parent.name != "stellar"
 ]
 """Without the calibration by stars, whose plots have a radial axis."""
-CRATE = [*(ROOT / "crates" / "photocore" / "src").rglob("*.rs")]
+CRATE = [path for path in (ROOT / "crates" / "photocore" / "src").rglob("*.rs") if path.name != "golden.rs"]
 BINDING = [*(ROOT / "crates" / "photogram-py" / "src").rglob("*.rs")]
 EXTENSIONS = {
     "lens": (
@@ -35,7 +35,7 @@ EXTENSIONS = {
         KINDS / "mod.rs",
         "equal_height::EqualHeight;",
         r"EqualHeight|equal.height",
-        CRATE,
+        [*CRATE, *BINDING],
     ),
 }
 """Its file, the file that registers it, the line there, its name, and the sources that do not know it."""

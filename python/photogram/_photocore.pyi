@@ -20,7 +20,7 @@ FoundRow = tuple[
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
-FailureRow = tuple[str, str, list[list[int]], list[int], list[list[int]]]
+FailureRow = tuple[str, str, list[list[int]], list[int], list[list[int]], list[list[int]]]
 """Why a network cannot be adjusted, as in :class:`BlockError`."""
 
 CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
@@ -397,10 +397,10 @@ def refraction_shift(
 class BlockError(Exception):
     """A block that cannot be adjusted.
 
-    `args` is (kind, message, photos, points, cameras): kind is `undetermined points`, `undetermined photos`,
-    `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or `input`;
-    photos and cameras are lists of indices for each undetermined combination of unknowns, points a list of
-    point indices.
+    `args` is (kind, message, photos, points, cameras, unknowns): kind is `undetermined points`, `undetermined
+    photos`, `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or
+    `input`; photos, cameras and common unknowns are lists of indices for each undetermined combination of
+    unknowns, points a list of point indices.
     """
 
 def find_first_values(
@@ -465,7 +465,9 @@ def adjust_block(
     image_xy: _Floats,
     image_sd: _Floats,
     *,
-    observation_groups: list[tuple[str, _Indices, _Floats, _Floats]],
+    observation_groups: list[tuple[str, _Indices, _Indices, _Indices, _Floats, _Floats]],
+    unknowns: list[tuple[str, list[float], list[float], list[float]]],
+    mounts: list[tuple[int, int, int]],
     spheroid: tuple[float, float] | None,
     photo_to_ground: bool,
     refraction: RefractionRow | None,
@@ -504,12 +506,20 @@ def adjust_block(
     image_xy, image_sd
         (m, 2) millimetres.
     observation_groups
-        Observations beside images, each kind with its name, (k, p) indices of points or photos, (k, v) values
-        and (k, r, r) covariance matrices of its r components. Values: `distance` the length, `equal height`
-        the difference, `difference` three components (NaN where not observed), `control` three coordinates,
-        `position` three coordinates and the lever arm, `attitude` two matrices row by row (body to object,
-        body to photo), `relative` a translation and a matrix. Lengths in the unit of the object space, angles
-        in radians.
+        Observations beside images, each kind with its name, (k, p) indices of points, (k, q) of photos and
+        (k, c) of common unknowns (-1 for none), (k, v) values and (k, r, r) covariance matrices of its r
+        components. Values: `distance` the length (unknown: instrument), `equal height` the difference,
+        `difference` three components (NaN where not observed), `control` three coordinates, `on level` the
+        height above it, `on plane` the distance from it, `on plumb line` and `on line` none, `position` three
+        coordinates, the lever arm where it is known and the time (unknowns: lever arm, shift, drift),
+        `attitude` two matrices row by row (body to object; body to photo where that is known; unknown:
+        boresight), `relative` a translation and a matrix, `base` the length (two sensors, -1 for the frame),
+        `prior` none. Lengths in the unit of the object space, angles in radians, times in seconds.
+    unknowns
+        Common unknowns: type (see `UNKNOWNS`), position, rotation matrix row by row, standard deviations.
+    mounts
+        Photos on frames: index of the photo, of the photo that stands for the frame, and of the sensor among
+        the common unknowns.
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground
@@ -685,6 +695,20 @@ class BlockSolution(_NetworkSolution):
         """Photos and their unknowns (0 to 5) held to give a datum.
 
         Empty where observations and weights give one.
+        """
+
+    @property
+    def weak_unknowns(self) -> list[tuple[int, int]]:
+        """The same for common unknowns: unknowns and their components."""
+
+    @property
+    def adjusted_unknowns(
+        self,
+    ) -> list[tuple[list[float], list[float], list[float], list[float], list[float], int]]:
+        """The adjusted common unknowns, in the order in which they were given.
+
+        Change from what was given, position (3), rotation matrix row by row (9), cofactors row by row for
+        rotations about the adjusted axes, redundancy numbers, and the number of observations and images.
         """
 
     @property
@@ -1438,6 +1462,10 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     -------
     (k,) numbers, and whether they are the whole text.
     """
+
+UNKNOWNS: list[tuple[str, list[tuple[str, str]]]]
+"""Types of common unknowns: name, and for each unknown its name and whether it is a `length`, a `speed`, an
+`angle` or a `ratio`."""
 
 CAMERAS: list[str]
 """What the models of cameras are called."""

@@ -66,6 +66,8 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
         points: vec![],
         images: vec![],
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     };
     for (photo, (position, attitude)) in true_photos.iter().enumerate() {
         let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();

@@ -57,6 +57,8 @@ fn block() -> Network {
         points: (0..28).map(point).collect(),
         images,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 

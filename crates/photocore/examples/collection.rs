@@ -48,6 +48,8 @@ pub fn read(text: &str) -> Result<Network, Box<dyn Error>> {
             .collect(),
         images: seen.as_chunks().0.iter().map(image).collect(),
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     })
 }
 

@@ -51,7 +51,9 @@ fn network() -> Network {
         photos: (0..5).map(photo).collect(),
         points: vec![Point { coordinates: [f64::NAN; 3], sd: [f64::INFINITY; 3] }; 16],
         images,
-        observations: vec![Distance { points: [0, 1], length: BAR.0, sd: BAR.1 }.into()],
+        observations: vec![Distance { points: [0, 1], length: BAR.0, sd: BAR.1, instrument: None }.into()],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 

@@ -49,6 +49,8 @@ fn block(photos: Vec<Photo>, places: &[[f64; 3]]) -> Network {
         points: places.iter().map(|&coordinates| Point { coordinates, sd: FREE }).collect(),
         images,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 

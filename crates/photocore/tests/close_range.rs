@@ -73,6 +73,8 @@ fn around(sense: RotationSense, turned: &Matrix3, image_error: f64, error: f64) 
         points,
         images,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 

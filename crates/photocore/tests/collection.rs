@@ -157,6 +157,8 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
         points: (0..points).map(coarse_point).collect(),
         images,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 

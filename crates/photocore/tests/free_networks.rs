@@ -12,7 +12,8 @@ use photocore::geometry::{
     PoseNumbers, RotationSense, Vector3, angle_axis_rotation,
 };
 use photocore::network::{
-    Camera, Image, InnerConstraints, Network, NetworkError, Options, Photo, Point, Solution, Start,
+    Camera, Image, InnerConstraints, Network, NetworkDatum, NetworkError, Of, Options, Photo, Point,
+    Solution, Start,
 };
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -69,6 +70,8 @@ fn around() -> Network {
         points,
         images,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 
@@ -218,6 +221,130 @@ fn inner_constraints_are_those_of_the_pseudo_inverse() {
         };
         assert!((distance(&found) - distance(&minimal)).abs() < 1e-10);
     }
+}
+
+/// Cofactors of every two of photos (position and rotation step) and points, in the order of [`design`].
+fn whole(network: &Network, solution: &Solution, datum: Option<&NetworkDatum>) -> Mat<f64> {
+    let (options, pool) = (options(FINE), pool());
+    let mut go = |_| ControlFlow::Continue(());
+    let covariances = network.covariances(&options, &solution.state, datum, &pool, &mut go).unwrap();
+    let of: Vec<Of> = (0..POINTS).map(Of::Point).chain((0..PHOTOS).map(Of::PhotoStep)).collect();
+    let found = covariances.cofactors(&of, None, &pool, &mut go).unwrap();
+    let count = 3 * POINTS + 6 * PHOTOS;
+    Mat::from_fn(count, count, |i, j| found[i * count + j])
+}
+
+/// The greatest difference of two matrices, relative to their diagonals.
+fn greatest(found: &Mat<f64>, expected: &Mat<f64>) -> f64 {
+    let count = expected.nrows();
+    // What does not move has none.
+    let largest = (0..count).map(|i| expected[(i, i)]).fold(0.0, f64::max);
+    let sd = |i: usize| expected[(i, i)].max(1e-9 * largest).sqrt();
+    let pairs = (0..count).flat_map(|i| (0..count).map(move |j| (i, j)));
+    pairs.map(|(i, j)| (found[(i, j)] - expected[(i, j)]).abs() / sd(i) / sd(j)).fold(0.0, f64::max)
+}
+
+#[test]
+fn cofactors_of_everything_go_over_to_any_datum() {
+    let network = around();
+    let minimal = adjust(&network, FINE).unwrap();
+    let (points, photos): (Vec<usize>, Vec<usize>) = ((0..POINTS).collect(), (0..PHOTOS).collect());
+    let step = |photo: &usize| 3 * POINTS + 6 * photo;
+    // Held: the second photo, and X of the fourth.
+    let held: Vec<usize> = (step(&1)..step(&1) + 6).chain([step(&3)]).collect();
+    let a = design(&network, &minimal);
+    assert!(greatest(&whole(&network, &minimal, None), &dense(&a, &held)) < 1e-8);
+
+    let inner = InnerConstraints { points: points.clone(), photos: photos.clone(), scale: true };
+    let found = in_datum(&network, &inner).unwrap();
+    let carriers: Vec<usize> =
+        (0..3 * POINTS).chain(photos.iter().map(step).flat_map(|first| first..first + 3)).collect();
+    let expected = dense(&design(&network, &found), &carriers);
+    let apart = greatest(&whole(&network, &found, None), &expected);
+    assert!(apart < 1e-8, "{apart:e}");
+
+    // Without adjusting again, from the minimum datum and from yet another one.
+    let mut go = |_| ControlFlow::Continue(());
+    let (options, pool) = (options(FINE), pool());
+    let datum = NetworkDatum::Inner(inner);
+    let two = NetworkDatum::Inner(InnerConstraints { points: vec![3, 7, 9], photos: vec![], scale: true });
+    let by_two = network.in_datum(&options, &minimal.state, &two, &pool, &mut go).unwrap();
+    for from in [&minimal, &by_two] {
+        let there = network.in_datum(&options, &from.state, &datum, &pool, &mut go).unwrap();
+        for (photo, expected) in there.photos.iter().zip(&found.photos) {
+            let position = Vector3::from_column_slice(&photo.pose[..3]);
+            assert!((position - Vector3::from_column_slice(&expected.pose[..3])).amax() < 1e-9);
+            // The same attitude has other angles where it has turned through phi of 90 degrees.
+            let [one, other] = [photo, expected]
+                .map(|photo| NUMBERS.attitude([photo.pose[3], photo.pose[4], photo.pose[5]]));
+            assert!((one - other).amax() < 1e-9);
+        }
+        assert!(greatest(&whole(&network, &there, None), &expected) < 1e-7);
+        for (r, expected) in redundancies(&there).iter().zip(redundancies(&minimal)) {
+            assert!((r - expected).abs() < 1e-9);
+        }
+        assert!(
+            there.variance_of_unit_weight.unwrap() / minimal.variance_of_unit_weight.unwrap() - 1.0 < 1e-9
+        );
+        assert!(there.lost_digits > 0.0 && there.lost_digits < 1e-9, "{:e}", there.lost_digits);
+    }
+}
+
+/// Relative to a photo: what holding it would have given, and for networks that are not free J Q J^T.
+#[test]
+fn cofactors_relative_to_a_photo_are_those_of_holding_it() {
+    let network = around();
+    let found = adjust(&network, FINE).unwrap();
+    let step = |photo: usize| 3 * POINTS + 6 * photo;
+    let relative = whole(&network, &found, Some(&NetworkDatum::RelativeToPhoto(4)));
+    assert!((0..6).all(|k| relative[(step(4) + k, step(4) + k)] == 0.0));
+    // The distance from the held to the other photo in X is held: not of the relative ones, whose scale it gives.
+    let a = design(&network, &found);
+    let (count, g) = (3 * POINTS + 6 * PHOTOS, rigid(&found));
+    let b = Mat::from_fn(6, count, |i, j| if j == step(4) + i { 1.0 } else { 0.0 });
+    let inverse = faer::linalg::solvers::DenseSolveCore::inverse(&(&b * &g).partial_piv_lu());
+    let s = Mat::<f64>::identity(count, count) - &g * inverse * &b;
+    let held: Vec<usize> = (step(1)..step(1) + 6).chain([step(3)]).collect();
+    let expected = &s * dense(&a, &held) * s.transpose();
+    assert!(greatest(&relative, &expected) < 1e-8, "{:e}", greatest(&relative, &expected));
+
+    let mut controlled = network;
+    controlled.points[..4].iter_mut().for_each(|point| point.sd = [0.01; 3]);
+    let found = adjust(&controlled, FINE).unwrap();
+    let (q, g) = (whole(&controlled, &found, None), rigid(&found));
+    let inverse = faer::linalg::solvers::DenseSolveCore::inverse(&(&b * &g).partial_piv_lu());
+    let s = Mat::<f64>::identity(count, count) - &g * inverse * &b;
+    let relative = whole(&controlled, &found, Some(&NetworkDatum::RelativeToPhoto(4)));
+    assert!(greatest(&relative, &(&s * &q * s.transpose())) < 1e-8);
+    let to_points = whole(&controlled, &found, Some(&NetworkDatum::RelativeToPoints(vec![6, 7, 8, 9])));
+    let of_points = |q: &Mat<f64>| (18..30).map(|i| q[(i, i)]).sum::<f64>();
+    assert!(of_points(&to_points) < of_points(&q));
+}
+
+/// How shifts and rotations move points, photos and their axes.
+fn rigid(solution: &Solution) -> Mat<f64> {
+    let mut g = Mat::zeros(3 * POINTS + 6 * PHOTOS, 6);
+    let mut put = |first: usize, at: [f64; 3]| {
+        for k in 0..3 {
+            let turned = Vector3::ith(k, 1.0).cross(&Vector3::from(at));
+            (0..3).for_each(|m| {
+                (g[(first + m, k)], g[(first + m, 3 + k)]) = (f64::from(u8::from(m == k)), turned[m])
+            });
+        }
+    };
+    solution.points.iter().enumerate().for_each(|(i, point)| put(3 * i, point.unwrap().coordinates));
+    for (i, photo) in solution.photos.iter().enumerate() {
+        let [x, y, z, ..] = photo.pose;
+        put(3 * POINTS + 6 * i, [x, y, z]);
+    }
+    for (i, photo) in solution.photos.iter().enumerate() {
+        let [.., omega, phi, kappa] = photo.pose;
+        let attitude = NUMBERS.attitude([omega, phi, kappa]);
+        for k in 0..3 {
+            (0..3).for_each(|m| g[(3 * POINTS + 6 * i + 3 + m, 3 + k)] = attitude[(k, m)]);
+        }
+    }
+    g
 }
 
 #[test]

@@ -67,6 +67,7 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
             points: ends.try_into().unwrap(),
             length: length[0],
             sd: sd("scale bar"),
+            instrument: None,
         })
     };
     let lengths = || between("scale bar").into_iter().zip(rows(&observed["scale bar"]["observed"]));
@@ -96,6 +97,8 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
         points,
         images,
         observations: if bars { lengths().map(bar).collect() } else { vec![] },
+        commons: vec![],
+        mounts: vec![],
     };
     (network, index)
 }

@@ -8,7 +8,8 @@ use std::ops::ControlFlow;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use photocore::normals::{
-    Equations, Factor, GroupRows, Layout, Ordering, Prior, SelectedInverse, Stopped, System, Tie, TieRows,
+    Equations, Factor, Function, GroupRows, Layout, Ordering, Prior, SelectedInverse, Stopped, System, Tie,
+    TieRows,
 };
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -219,6 +220,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     }
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);
+    compare_functions(dense, &system, &factor, &inverse);
     let found = done(system.invert(&pool, factor, dense, &dense.prior, &mut go));
     let (cofactors, selected) = (found.cofactors, found.selected);
     compare_blocks(layout, &selected, &inverse);
@@ -287,6 +289,52 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
         }
         let value = solved[columns.len() * unknowns + i];
         assert_close(value, sum, 1e-9 * largest * columns.len() as f64, "sum of columns");
+    }
+}
+
+/// Cofactors of unknowns and of sums of them, every two of them and one kind with the other.
+fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &Mat<f64>) {
+    let (unknowns, pool) = (system.layout().unknowns(), pool(2));
+    let several: Vec<Function> =
+        (0..unknowns).rev().step_by(unknowns.div_ceil(40)).map(|unknown| vec![(unknown, 1.0)]).collect();
+    // One of them takes an unknown twice, and one takes all.
+    let all: Function =
+        (0..unknowns).map(|unknown| (unknown, 1.0 + unknown as f64 / unknowns as f64)).collect();
+    let few: Vec<Function> = vec![vec![(unknowns - 1, 0.5), (0, -2.0), (0, 1.0)], all];
+    let with: Vec<Function> = several[..several.len().min(5)].to_vec();
+    for (rows, columns) in [
+        (&several, None),
+        (&few, None),
+        (&few, Some(&with)),
+        (&few, Some(&several)),
+        (&several, Some(&few)),
+        (&several, Some(&vec![])),
+    ] {
+        let reduced =
+            done(system.reduce(&pool, dense, &dense.prior, rows, columns.map(Vec::as_slice), &mut go));
+        assert!(system.memory_of(&reduced) >= 8 * rows.len() * columns.map_or(rows.len(), Vec::len));
+        let found = done(system.cofactors_of(&pool, factor, &reduced, &mut go));
+        let others = columns.unwrap_or(rows);
+        assert_eq!(found.len(), rows.len() * others.len());
+        let along = |functions: &[Function]| {
+            let mut dense = Mat::zeros(unknowns, functions.len());
+            for (k, function) in functions.iter().enumerate() {
+                function.iter().for_each(|&(unknown, value)| dense[(unknown, k)] += value);
+            }
+            dense
+        };
+        let (f, g) = (along(rows), along(others));
+        let (qf, qg) = (inverse * &f, inverse * &g);
+        let own = |f: &Mat<f64>, qf: &Mat<f64>, k: usize| -> f64 {
+            (0..unknowns).map(|i| f[(i, k)] * qf[(i, k)]).sum()
+        };
+        let expected = f.transpose() * &qg;
+        for i in 0..rows.len() {
+            for j in 0..others.len() {
+                let scale = (own(&f, &qf, i) * own(&g, &qg, j)).sqrt();
+                assert_close(found[i * others.len() + j], expected[(i, j)], 1e-9 * scale, "function");
+            }
+        }
     }
 }
 
@@ -432,9 +480,20 @@ fn same_bits(plain: Layout) {
         let factor = done(system.factor(&pool, &dense, &dense.prior, 0.0, &mut go));
         let solution = done(system.solve(&pool, &factor, &dense, &dense.prior, 0.0, &mut go));
         let more = done(system.solve_for(&pool, &factor, &dense, &dense.prior, 0.0, &rights, &mut go));
+        let functions: Vec<Function> =
+            (0..dense.layout.unknowns()).step_by(3).map(|unknown| vec![(unknown, 1.0)]).collect();
+        let reduced = done(system.reduce(&pool, &dense, &dense.prior, &functions, None, &mut go));
+        let of_functions = done(system.cofactors_of(&pool, &factor, &reduced, &mut go));
         let cofactors = done(system.invert(&pool, factor, &dense, &dense.prior, &mut go)).cofactors;
-        let numbers =
-            [solution, more, cofactors.local, cofactors.kept, cofactors.border, cofactors.equations];
+        let numbers = [
+            solution,
+            more,
+            of_functions,
+            cofactors.local,
+            cofactors.kept,
+            cofactors.border,
+            cofactors.equations,
+        ];
         numbers.concat().into_iter().map(f64::to_bits).collect::<Vec<u64>>()
     };
     let one = run(1);

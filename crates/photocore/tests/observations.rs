@@ -12,10 +12,12 @@ use photocore::geometry::{
     rotation,
 };
 use photocore::network::observations::{
-    Attitude, Control, Difference, Distance, EqualHeight, Fault, Position, Relative,
+    Attitude, Base, Control, Difference, Distance, EqualHeight, Fault, OnLevel, OnLine, OnPlane, OnPlumbLine,
+    Position, Prior, Quantity, Relative,
 };
 use photocore::network::{
-    Camera, Image, Network, NetworkError, Observation, Options, Photo, Point, Precision, Solution,
+    Camera, Common, CommonKind, Image, Mount, Network, NetworkError, Observation, Options, Photo, Point,
+    Precision, Solution,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -31,8 +33,15 @@ fn noise(index: usize) -> f64 {
     ((index as f64 * 12.9898).sin() * 43758.5453).fract()
 }
 
+/// Point 9 is above point 8, and points 10 to 12 are on a line.
 fn place(k: usize) -> [f64; 3] {
-    [0, 1, 2].map(|i| [500.0, 800.0, 20.0][i] + 1.2 * noise(7 * k + i))
+    let along = |from: usize, way: [f64; 3]| [0, 1, 2].map(|i| place(from)[i] + way[i]);
+    match k {
+        9 => along(8, [0.0, 0.0, 0.7]),
+        11 => along(10, [0.2, -0.4, 0.3]),
+        12 => along(10, [-0.3, 0.6, -0.45]),
+        _ => [0, 1, 2].map(|i| [500.0, 800.0, 20.0][i] + 1.2 * noise(7 * k + i)),
+    }
 }
 
 /// Photos in an arc of 5 m about the object, looking at its middle.
@@ -94,6 +103,8 @@ fn images_alone() -> Network {
         points: (0..POINTS).map(|_| Point { coordinates: [f64::NAN; 3], sd: FREE }).collect(),
         images,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     }
 }
 
@@ -103,7 +114,7 @@ fn difference(a: usize, b: usize) -> Vector3 {
 
 fn distance(a: usize, b: usize) -> Observation {
     let length = difference(a, b).norm() + 1e-3 * noise(a);
-    Distance { points: [a, b], length, sd: 1e-3 }.into()
+    Distance { points: [a, b], length, sd: 1e-3, instrument: None }.into()
 }
 
 /// Every kind at once.
@@ -119,12 +130,13 @@ fn network() -> Network {
     let gnss = |photo: usize, precision: Precision| {
         let antenna = position(&pose(photo)) + attitude(&pose(photo)) * lever_arm;
         let coordinates = std::array::from_fn(|k| antenna[k] + 0.01 * noise(80 + photo + k));
-        Position { photo, coordinates, lever_arm, precision }.into()
+        Position::new(photo, coordinates, lever_arm, precision).into()
     };
     let imu = |photo: usize, precision: Precision| {
         let boresight = rotation([1.5, 0.1, -0.4]);
         let error = rotation([0, 1, 2].map(|k| 1e-3 * noise(90 + 3 * photo + k)));
-        Attitude { photo, attitude: attitude(&pose(photo)) * boresight * error, boresight, precision }.into()
+        let attitude = attitude(&pose(photo)) * boresight * error;
+        Attitude { photo, attitude, boresight: Quantity::Known(boresight), precision }.into()
     };
     let relative = |i: usize, j: usize| {
         let (a, b) = (pose(i), pose(j));
@@ -167,9 +179,183 @@ fn network() -> Network {
         .into(),
         gnss(4, sd(&[0.01, 0.02, 0.01])),
         imu(3, covariance(&[1e-3, 1e-3, 2e-3])),
-        level(9, 8),
+        level(7, 8),
     ];
+    with_commons(&mut network);
     network
+}
+
+/// Common unknowns as they are drawn: numbers of the same in [`Network::commons`].
+const LEVER_ARM: usize = 0;
+const SHIFT: usize = 1;
+const DRIFT: usize = 2;
+const BORESIGHT: usize = 3;
+const INSTRUMENT: usize = 4;
+const LEVEL: usize = 5;
+const PLUMB_LINE: usize = 6;
+const LINE: usize = 7;
+const PLANE: usize = 8;
+const SENSOR: usize = 9;
+/// Photos on frames; that of the last has no images itself.
+const MOUNTED: [usize; 3] = [5, 6, 8];
+const FRAMES: [usize; 3] = [0, 1, 7];
+const ALL: usize = 9;
+
+/// What a common unknown is, without errors.
+fn truth(common: usize) -> Pose {
+    let position = match CommonKind::ALL[common] {
+        CommonKind::LeverArm => [0.1, -0.3, 0.2],
+        CommonKind::Shift => [0.05, -0.02, 0.04],
+        CommonKind::Drift => [0.004, 0.002, -0.003],
+        CommonKind::Instrument => [1.002, 0.003, 0.0],
+        CommonKind::Level => [0.0, 0.0, place(1)[2] + 0.1],
+        CommonKind::PlumbLine => [place(8)[0], place(8)[1], 0.0],
+        CommonKind::Line => place(10),
+        CommonKind::Plane => place(3),
+        CommonKind::Sensor => [0.4, 0.05, -0.1],
+        CommonKind::Boresight => [0.0; 3],
+    };
+    let attitude = match CommonKind::ALL[common] {
+        CommonKind::Boresight => rotation([1.5, 0.1, -0.4]),
+        CommonKind::Line => {
+            let along = Vector3::new(0.2, -0.4, 0.3).normalize();
+            let across = along.cross(&Vector3::z()).normalize();
+            Matrix3::from_columns(&[across, along.cross(&across), along])
+        }
+        CommonKind::Plane => rotation([0.3, -0.6, 0.2]),
+        CommonKind::Sensor => rotation([0.1, -0.2, 0.15]),
+        _ => Matrix3::identity(),
+    };
+    Pose { position: position.into(), attitude }
+}
+
+/// The pose of a photo, on a frame or not.
+fn seen(photo: usize) -> Pose {
+    let own = |k: usize| Pose { position: position(&pose(k)), attitude: attitude(&pose(k)) };
+    match MOUNTED.iter().position(|&mounted| mounted == photo) {
+        None => own(photo),
+        Some(k) => {
+            let (frame, sensor) = (own(FRAMES[k]), truth(SENSOR));
+            Pose {
+                position: frame.position + frame.attitude * sensor.position,
+                attitude: frame.attitude * sensor.attitude,
+            }
+        }
+    }
+}
+
+/// Adds a rig, common unknowns of all types, and what is observed of them.
+fn with_commons(network: &mut Network) {
+    let free = network.photos[0];
+    for k in PHOTOS..ALL {
+        let pose = if MOUNTED.contains(&k) { pose(FRAMES[0]) } else { pose(k).map(|value| value + 0.001) };
+        network.photos.push(Photo { pose, observed: pose, ..free });
+    }
+    for (photo, point) in MOUNTED.iter().flat_map(|&photo| (0..POINTS).map(move |point| (photo, point))) {
+        let u = seen(photo).sight(&place(point).into());
+        let xy = [0, 1].map(|k| PRINCIPAL_DISTANCE * u[k] / u[2] + IMAGE_SD * noise(1500 + 29 * point + k));
+        network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
+    }
+    let mount = |k: usize| Mount { photo: MOUNTED[k], frame: FRAMES[k], sensor: SENSOR };
+    network.mounts = [0, 1, 2].map(mount).to_vec();
+    let infinite = f64::INFINITY;
+    let deviations = |kind: CommonKind| match kind {
+        CommonKind::LeverArm => vec![0.02, 0.03, infinite],
+        CommonKind::Drift => vec![0.002, 0.0, 0.002],
+        CommonKind::Boresight => vec![infinite, 0.003, infinite],
+        CommonKind::Instrument => vec![infinite, 0.001],
+        _ => vec![infinite; kind.unknowns().len()],
+    };
+    let given = |(common, &kind): (usize, &CommonKind)| {
+        let Pose { position, attitude } = truth(common);
+        let small = |first: usize, size: f64| [0, 1, 2].map(|k| size * noise(1600 + 10 * common + first + k));
+        let turns = kind.unknowns().iter().any(|&(_, component, _)| component > 2);
+        let size = if kind == CommonKind::Drift || kind == CommonKind::Instrument { 0.001 } else { 0.01 };
+        let attitude = if turns { attitude * rotation(small(3, 0.02)) } else { attitude };
+        Common {
+            kind,
+            position: (position + Vector3::from(small(0, size))).into(),
+            attitude,
+            sd: deviations(kind),
+        }
+    };
+    network.commons = CommonKind::ALL.iter().enumerate().map(given).collect();
+    network.observations.extend(of_commons());
+}
+
+fn of_commons() -> Vec<Observation> {
+    let error = |size: f64, at: usize| size * noise(1800 + at);
+    let gnss = |photo: usize, time: f64| -> Observation {
+        let Pose { position, attitude } = seen(photo);
+        let antenna = position
+            + attitude * truth(LEVER_ARM).position
+            + truth(SHIFT).position
+            + time * truth(DRIFT).position;
+        Position {
+            photo,
+            coordinates: std::array::from_fn(|k| antenna[k] + error(0.01, 3 * photo + k)),
+            lever_arm: Quantity::Common(LEVER_ARM),
+            shift: Some(SHIFT),
+            drift: Some(DRIFT),
+            time,
+            precision: covariance(&[0.01, 0.02, 0.01]),
+        }
+        .into()
+    };
+    let imu = |photo: usize| -> Observation {
+        let turned = rotation([0, 1, 2].map(|k| error(1e-3, 40 + 3 * photo + k)));
+        Attitude {
+            photo,
+            attitude: seen(photo).attitude * truth(BORESIGHT).attitude * turned,
+            boresight: Quantity::Common(BORESIGHT),
+            precision: covariance(&[1e-3, 2e-3, 1e-3]),
+        }
+        .into()
+    };
+    let measured = |a: usize, b: usize| -> Observation {
+        let length = 1.002 * difference(a, b).norm() + 0.003 + error(1e-3, 80 + a);
+        Distance { points: [a, b], length, sd: 1e-3, instrument: Some(INSTRUMENT) }.into()
+    };
+    let at_level = |point: usize| -> Observation {
+        let difference = place(point)[2] - truth(LEVEL).position.z + error(1e-3, 100 + point);
+        OnLevel { point, level: LEVEL, difference, sd: 1e-3 }.into()
+    };
+    let above = |point: usize| -> Observation {
+        let Pose { position, attitude } = truth(PLANE);
+        let from = Vector3::from(place(point)) - position;
+        let distance = attitude.column(2).dot(&from) + error(1e-3, 120 + point);
+        OnPlane { point, plane: PLANE, distance, sd: 2e-3 }.into()
+    };
+    let plumb = |point: usize| -> Observation {
+        OnPlumbLine { point, line: PLUMB_LINE, precision: covariance(&[1e-3, 2e-3]) }.into()
+    };
+    let aligned =
+        |point: usize| -> Observation { OnLine { point, line: LINE, precision: sd(&[1e-3, 2e-3]) }.into() };
+    let relative = |i: usize, j: usize| -> Observation {
+        let (a, b) = (seen(i), seen(j));
+        let pose = Pose { position: a.sight(&b.position), attitude: a.attitude.transpose() * b.attitude };
+        Relative { photos: [i, j], pose, precision: covariance(&[0.01, 0.02, 0.01, 1e-3, 2e-3, 1e-3]) }.into()
+    };
+    let base = |length: f64| -> Observation { Base { first: None, second: SENSOR, length, sd: 2e-3 }.into() };
+    let precision = covariance(&[0.02, 0.02, 0.03, 0.02, 0.03, 0.02]);
+    let prior: Observation = Prior { common: SENSOR, components: 6, precision }.into();
+    let lists = [
+        [(0, -2.0), (1, -1.5), (2, 0.0), (3, 1.0), (4, 1.5), (6, 2.0)].map(|(k, t)| gnss(k, t)).to_vec(),
+        [0, 2, 4, 5, 8].map(imu).to_vec(),
+        [(0, 3), (1, 4), (5, 13), (2, 8)].map(|(a, b)| measured(a, b)).to_vec(),
+        [1, 4, 7].map(at_level).to_vec(),
+        [0, 1, 3, 5, 13].map(above).to_vec(),
+        [8, 9].map(plumb).to_vec(),
+        [10, 11, 12].map(aligned).to_vec(),
+        vec![
+            relative(2, 5),
+            relative(5, 6),
+            relative(0, 5),
+            base(truth(SENSOR).position.norm() + 1e-3),
+            prior,
+        ],
+    ];
+    lists.concat()
 }
 
 fn options(method: Method, loss: Option<Loss>) -> Options {
@@ -238,12 +424,29 @@ mod dense {
         w.map(|value| value * factor)
     }
 
+    /// Exp of a rotation vector of less than a radian or so, in powers of its square: at zero, too.
+    fn exponential(r: &V) -> M {
+        let square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+        let series = |first: f64| {
+            let term = |rest: C, n: f64| 1.0 - square * rest / ((n + 1.0) * (n + 2.0));
+            [12.0, 10.0, 8.0, 6.0, 4.0, 2.0, 0.0]
+                .into_iter()
+                .fold(C::from(1.0), |rest, n| term(rest, n + first))
+        };
+        let (sine, versine) = (series(1.0), series(2.0) / 2.0);
+        let skew = [[C::from(0.0), r[2], -r[1]], [-r[2], C::from(0.0), r[0]], [r[1], -r[0], C::from(0.0)]];
+        let twice = product(&skew, &skew);
+        std::array::from_fn(|j| {
+            std::array::from_fn(|i| f64::from(u8::from(i == j)) + sine * skew[j][i] + versine * twice[j][i])
+        })
+    }
+
     /// What is computed for all observations, in this order: images, held components, the others.
     pub struct Dense<'a> {
         pub network: &'a Network,
         /// Covariance of everything that is observed.
         pub s: Mat<f64>,
-        /// The unknowns that are not fixed: those of points, then of photos.
+        /// The unknowns that are not fixed: those of points, then of photos, then common ones.
         pub free: Vec<usize>,
     }
 
@@ -256,6 +459,7 @@ mod dense {
             };
             network.images.iter().for_each(|image| blocks.push(diagonal(&image.sd)));
             held(network).for_each(|(_, _, sd)| blocks.push(diagonal(&[sd])));
+            held_commons(network).for_each(|(_, _, sd)| blocks.push(diagonal(&[sd])));
             for observation in &network.observations {
                 blocks.push(match observation.precision() {
                     Precision::Deviations(sd) => diagonal(&sd),
@@ -271,19 +475,53 @@ mod dense {
                 start += block.nrows();
             }
             let fixed_points = network.points.iter().flat_map(|point| point.sd);
-            let all = fixed_points.chain(network.photos.iter().flat_map(|photo| photo.sd));
+            let mounted = |photo: usize| network.mounts.iter().any(|mount| mount.photo == photo);
+            let photo = |(k, photo): (usize, &Photo)| if mounted(k) { [0.0; 6] } else { photo.sd };
+            let all = fixed_points.chain(network.photos.iter().enumerate().flat_map(photo));
+            let all = all.chain(network.commons.iter().flat_map(|common| common.sd.clone()));
             let free = all.enumerate().filter(|&(_, sd)| sd != 0.0).map(|(unknown, _)| unknown).collect();
             Self { network, s, free }
+        }
+
+        /// Where the unknowns of a common one start.
+        pub fn first(&self, common: usize) -> usize {
+            let before = self.network.commons[..common].iter().map(|common| common.sd.len());
+            3 * self.network.points.len() + 6 * self.network.photos.len() + before.sum::<usize>()
+        }
+
+        /// The unknown offsets of a common unknown, its position and its rotation.
+        fn common(&self, x: &[C], i: usize) -> (V, V, M) {
+            let own = &self.network.commons[i];
+            let mut six = [C::from(0.0); 6];
+            for (k, &(_, component, _)) in own.kind.unknowns().iter().enumerate() {
+                six[component] = x[self.first(i) + k];
+            }
+            let [a, b, c, d, e, f] = six;
+            let turned = product(&matrix(&own.attitude), &exponential(&[d, e, f]));
+            let position = std::array::from_fn(|k| own.position[k] + [a, b, c][k]);
+            ([a, b, c], position, turned)
+        }
+
+        /// The pose of a photo.
+        pub fn photo(&self, x: &[C], i: usize) -> (V, M) {
+            let own = |i: usize| -> (V, M) {
+                let own = &x[3 * self.network.points.len() + 6 * i..][..6];
+                let m = product(&about(2, own[5]), &product(&about(1, own[4]), &about(0, own[3])));
+                ([own[0], own[1], own[2]], transposed(&m))
+            };
+            let Some(mount) = self.network.mounts.iter().find(|mount| mount.photo == i) else {
+                return own(i);
+            };
+            let ((centre, a), (_, arm, turn)) = (own(mount.frame), self.common(x, mount.sensor));
+            let arm = times(&a, &arm);
+            (std::array::from_fn(|k| centre[k] + arm[k]), product(&a, &turn))
         }
 
         /// Observed minus computed.
         pub fn residuals(&self, x: &[C]) -> Vec<C> {
             let point = |i: usize| -> V { std::array::from_fn(|k| x[3 * i + k]) };
-            let photo = |i: usize| -> (V, M) {
-                let own = &x[3 * self.network.points.len() + 6 * i..][..6];
-                let m = product(&about(2, own[5]), &product(&about(1, own[4]), &about(0, own[3])));
-                ([own[0], own[1], own[2]], transposed(&m))
-            };
+            let photo = |i: usize| self.photo(x, i);
+            let place = |i: usize| -> V { self.network.commons[i].position.map(C::from) };
             let mut all = vec![];
             for image in &self.network.images {
                 let (centre, a) = photo(image.photo);
@@ -291,11 +529,19 @@ mod dense {
                 all.extend([0, 1].map(|k| image.xy[k] - PRINCIPAL_DISTANCE * u[k] / u[2]));
             }
             all.extend(held(self.network).map(|(unknown, value, _)| value - x[unknown]));
+            all.extend(held_commons(self.network).map(|(common, k, _)| -x[self.first(common) + k]));
             for observation in &self.network.observations {
                 match observation {
                     Observation::Distance(own) => {
                         let d = minus(&point(own.points[1]), &point(own.points[0]));
-                        all.push(own.length - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt());
+                        let s = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+                        all.push(
+                            own.length
+                                - own.instrument.map_or(s, |instrument| {
+                                    let (_, [m, k, _], _) = self.common(x, instrument);
+                                    m * s + k
+                                }),
+                        );
                     }
                     Observation::Difference(own) => {
                         let d = minus(&point(own.points[1]), &point(own.points[0]));
@@ -309,12 +555,52 @@ mod dense {
                     }
                     Observation::Position(own) => {
                         let (centre, a) = photo(own.photo);
-                        let arm = times(&a, &vector(&own.lever_arm));
-                        all.extend((0..3).map(|k| own.coordinates[k] - centre[k] - arm[k]));
+                        let arm = match &own.lever_arm {
+                            Quantity::Known(arm) => vector(arm),
+                            Quantity::Common(common) => self.common(x, *common).1,
+                        };
+                        let arm = times(&a, &arm);
+                        let zero = [C::from(0.0); 3];
+                        let [s, d] =
+                            [own.shift, own.drift].map(|own| own.map_or(zero, |i| self.common(x, i).1));
+                        all.extend(
+                            (0..3).map(|k| own.coordinates[k] - centre[k] - arm[k] - s[k] - own.time * d[k]),
+                        );
                     }
                     Observation::Attitude(own) => {
-                        let computed = product(&photo(own.photo).1, &matrix(&own.boresight));
+                        let boresight = match &own.boresight {
+                            Quantity::Known(boresight) => matrix(boresight),
+                            Quantity::Common(common) => self.common(x, *common).2,
+                        };
+                        let computed = product(&photo(own.photo).1, &boresight);
                         all.extend(logarithm(&product(&transposed(&computed), &matrix(&own.attitude))));
+                    }
+                    Observation::OnLevel(own) => {
+                        all.push(own.difference - (point(own.point)[2] - self.common(x, own.level).1[2]));
+                    }
+                    Observation::OnPlane(own) => {
+                        let (d, _, r) = self.common(x, own.plane);
+                        let from = times(&transposed(&r), &minus(&point(own.point), &place(own.plane)));
+                        all.push(own.distance - (from[2] - d[2]));
+                    }
+                    Observation::OnPlumbLine(own) => {
+                        let (_, at, _) = self.common(x, own.line);
+                        all.extend((0..2).map(|k| at[k] - point(own.point)[k]));
+                    }
+                    Observation::OnLine(own) => {
+                        let (q, _, r) = self.common(x, own.line);
+                        let from = times(&transposed(&r), &minus(&point(own.point), &place(own.line)));
+                        all.extend((0..2).map(|k| q[k] - from[k]));
+                    }
+                    Observation::Base(own) => {
+                        let mut d = self.common(x, own.second).1;
+                        if let Some(first) = own.first {
+                            d = minus(&d, &self.common(x, first).1);
+                        }
+                        all.push(own.length - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt());
+                    }
+                    Observation::Prior(own) => {
+                        all.extend((0..own.components).map(|k| -x[self.first(own.common) + k]));
                     }
                     Observation::Relative(own) => {
                         let ((ci, ai), (cj, aj)) = (photo(own.photos[0]), photo(own.photos[1]));
@@ -355,15 +641,26 @@ mod dense {
         all.filter(|&(_, _, sd)| sd > 0.0 && sd.is_finite())
     }
 
+    /// Common unknowns that are weighted: which, its unknown and its standard deviation.
+    pub fn held_commons(network: &Network) -> impl Iterator<Item = (usize, usize, f64)> {
+        let each = |(i, common): (usize, &Common)| {
+            let sd = common.sd.clone();
+            sd.into_iter().enumerate().map(move |(k, sd)| (i, k, sd))
+        };
+        let all = network.commons.iter().enumerate().flat_map(each);
+        all.filter(|&(_, _, sd)| sd > 0.0 && sd.is_finite())
+    }
+
     pub fn weighted(network: &Network) -> Vec<usize> {
         held(network).map(|(unknown, _, _)| unknown).collect()
     }
 }
 
-/// All unknowns of a solution: points, then photos.
+/// All unknowns of a solution: points, then photos, then common ones.
 fn unknowns(solution: &Solution) -> Vec<f64> {
     let points = solution.points.iter().flat_map(|point| point.expect("takes part").coordinates);
-    points.chain(solution.photos.iter().flat_map(|photo| photo.pose)).collect()
+    let photos = points.chain(solution.photos.iter().flat_map(|photo| photo.pose));
+    photos.chain(solution.commons.iter().flat_map(|common| common.change.clone())).collect()
 }
 
 fn close(found: f64, expected: f64, scale: f64, limit: f64, what: &str) {
@@ -399,10 +696,67 @@ fn every_kind_agrees_with_dense_algebra() {
     };
     for (i, point) in solution.points.iter().enumerate() {
         block(3 * i, point.unwrap().cofactors.as_flattened(), 3);
-        assert_eq!(point.unwrap().rays, PHOTOS);
+        assert_eq!(point.unwrap().rays, PHOTOS + MOUNTED.len());
     }
-    for (i, photo) in solution.photos.iter().enumerate() {
+    for (i, photo) in solution.photos.iter().enumerate().filter(|(i, _)| !MOUNTED.contains(i)) {
         block(3 * POINTS + 6 * i, &photo.cofactors, 6);
+    }
+    // Of common unknowns rotations are those about the own axes; of photos on frames they are in angles.
+    let compare = |by_unknowns: &nalgebra::DMatrix<f64>, found: &nalgebra::DMatrix<f64>| {
+        let all = nalgebra::DMatrix::from_fn(x.len(), x.len(), |i, j| cofactors[(i, j)]);
+        let expected = by_unknowns * all * by_unknowns.transpose();
+        for (i, j) in (0..found.nrows()).flat_map(|i| (0..found.nrows()).map(move |j| (i, j))) {
+            let scale = (expected[(i, i)] * expected[(j, j)]).sqrt();
+            close(found[(i, j)], expected[(i, j)], scale.max(1e-30), 1e-8, "cofactor of several");
+        }
+    };
+    for (i, common) in solution.commons.iter().enumerate() {
+        let kind = network.commons[i].kind;
+        let mut r = Vector3::zeros();
+        for (k, &(_, component, _)) in kind.unknowns().iter().enumerate().filter(|(_, own)| own.1 > 2) {
+            r[component - 3] = common.change[k];
+        }
+        let turns = geometry::angle_axis_with_jacobian(&r).1.transpose();
+        let mut steps = nalgebra::DMatrix::zeros(common.change.len(), x.len());
+        for (row, &(_, component, _)) in kind.unknowns().iter().enumerate() {
+            for (column, &(_, by, _)) in kind.unknowns().iter().enumerate() {
+                let step = match (component.checked_sub(3), by.checked_sub(3)) {
+                    (Some(turn), Some(by)) => turns[(turn, by)],
+                    _ => f64::from(u8::from(row == column)),
+                };
+                steps[(row, dense.first(i) + column)] = step;
+            }
+        }
+        let width = common.change.len();
+        compare(&steps, &nalgebra::DMatrix::from_row_slice(width, width, &common.cofactors));
+    }
+    for photo in MOUNTED {
+        let own = &solution.photos[photo];
+        let at: Vec<C> = x.iter().map(|&value| C::from(value)).collect();
+        let mut steps = nalgebra::DMatrix::zeros(6, x.len());
+        for &unknown in &dense.free {
+            let mut stepped = at.clone();
+            stepped[unknown].im = 1e-100;
+            let (centre, a) = dense.photo(&stepped, photo);
+            let part = |value: C, imaginary: bool| if imaginary { value.im / 1e-100 } else { value.re };
+            let [real, by] = [false, true].map(|part_of| Matrix3::from_fn(|i, j| part(a[j][i], part_of)));
+            let skew = real.transpose() * by;
+            (0..3).for_each(|k| steps[(k, unknown)] = part(centre[k], true));
+            [(2, 1), (0, 2), (1, 0)]
+                .into_iter()
+                .enumerate()
+                .for_each(|(k, (i, j))| steps[(3 + k, unknown)] = skew[(i, j)]);
+        }
+        let mut rates = nalgebra::DMatrix::identity(6, 6);
+        let angles = [own.pose[3], own.pose[4], own.pose[5]];
+        rates.view_mut((3, 3), (3, 3)).copy_from(&AttitudeNumbers::OmegaPhiKappa(SENSE).rates(angles));
+        let found = nalgebra::DMatrix::from_row_slice(6, 6, &own.cofactors);
+        compare(&steps, &(&rates * found * rates.transpose()));
+        let (centre, a) = dense.photo(&at, photo);
+        for i in 0..3 {
+            close(own.pose[i], centre[i].re, 1.0, 1e-9, "position of a photo on a frame");
+            (0..3).for_each(|j| close(attitude(&own.pose)[(i, j)], a[j][i].re, 1.0, 1e-12, "its attitude"));
+        }
     }
 
     // Residuals, redundancy numbers, standardized residuals.
@@ -429,6 +783,12 @@ fn every_kind_agrees_with_dense_algebra() {
         check(residual, share, residual / given.sd[unknown % 3] / share.sqrt());
         total += share;
     }
+    for (common, k, sd) in dense::held_commons(&network) {
+        let own = &solution.commons[common];
+        let (residual, share) = (-own.change[k], own.redundancy[k]);
+        check(residual, share, residual / sd / share.sqrt());
+        total += share;
+    }
     for observation in &solution.observations {
         let own = observation.as_ref().unwrap();
         (0..own.residual.len()).for_each(|k| check(own.residual[k], own.redundancy[k], own.standardized[k]));
@@ -446,11 +806,25 @@ fn every_kind_agrees_with_dense_algebra() {
     close(solution.sums_of_squares.total(), square, square, 1e-9, "sum of squares");
     close(solution.variance_of_unit_weight.unwrap(), square / freedom as f64, 1.0, 1e-9, "variance");
     let names: Vec<&str> = solution.kinds.iter().map(|sums| sums.kind).collect();
-    let kinds = ["control", "distance", "difference", "equal height", "position", "attitude", "relative"];
-    assert_eq!(names, kinds);
+    assert_eq!(names, photocore::network::observations::KINDS);
     let counts: Vec<[usize; 2]> =
         solution.kinds.iter().map(|sums| [sums.observations, sums.components]).collect();
-    assert_eq!(counts, [[2, 6], [2, 2], [2, 5], [2, 2], [2, 6], [2, 6], [1, 6]]);
+    let counted = [
+        [2, 6],
+        [6, 6],
+        [2, 5],
+        [2, 2],
+        [3, 3],
+        [5, 5],
+        [2, 4],
+        [3, 6],
+        [8, 24],
+        [7, 21],
+        [4, 24],
+        [1, 1],
+        [1, 6],
+    ];
+    assert_eq!(counts, counted);
     let by_kind: f64 = solution.kinds.iter().map(|sums| sums.sum_of_squares).sum();
     close(by_kind, solution.sums_of_squares.observations, 1.0, 1e-9, "sum by kind");
 }
@@ -477,7 +851,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn scaled(length: f64) -> Network {
     let mut network = images_alone();
     network.photos[0].sd = [0.0; 6];
-    network.observations = vec![Distance { points: [3, 4], length, sd: 1e-3 }.into()];
+    network.observations = vec![Distance { points: [3, 4], length, sd: 1e-3, instrument: None }.into()];
     network
 }
 
@@ -569,7 +943,7 @@ fn what_cannot_be_is_refused_by_its_index() {
         let expected = move |fault| NetworkError::Observation { index, kind, fault };
         (adjust_with(&network, &Options::default(), 1).expect_err("refused"), expected)
     };
-    let length = |points, length, sd| Distance { points, length, sd }.into();
+    let length = |points, length, sd| Distance { points, length, sd, instrument: None }.into();
     let (found, expected) = refused(4, length([3, POINTS], 1.0, 0.1));
     assert_eq!(found, expected(Fault::NoPoint(POINTS)));
     assert_eq!(found.to_string(), "observation 4, of kind distance, names point 14, which is not there");
@@ -581,8 +955,8 @@ fn what_cannot_be_is_refused_by_its_index() {
     assert_eq!(found, expected(Fault::NotFinite));
     let pose = Pose { position: Vector3::zeros(), attitude: Matrix3::identity() };
     let relative = |photos, precision| Relative { photos, pose, precision }.into();
-    let (found, expected) = refused(1, relative([0, PHOTOS], sd(&[1.0; 6])));
-    assert_eq!(found, expected(Fault::NoPhoto(PHOTOS)));
+    let (found, expected) = refused(1, relative([0, ALL], sd(&[1.0; 6])));
+    assert_eq!(found, expected(Fault::NoPhoto(ALL)));
     let singular = nalgebra::DMatrix::from_element(6, 6, 1.0);
     let (found, expected) = refused(1, relative([0, 1], Precision::Covariance(singular)));
     assert_eq!(found, expected(Fault::Covariance));

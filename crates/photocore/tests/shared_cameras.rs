@@ -11,22 +11,25 @@ use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{self, Bal, ObjectSpace, Perspective, PoseNumbers};
 use photocore::network::observations::Distance;
 use photocore::network::{
-    Camera, Combination, Image, Network, NetworkError, Options, Photo, Point, Solution,
+    Camera, Combination, Image, Network, NetworkError, Of, Options, Photo, Point, Solution,
 };
 use rayon::ThreadPoolBuilder;
 
 const FREE: f64 = f64::INFINITY;
-const PHOTOS: usize = 11;
+const PHOTOS: usize = 14;
 const POINTS: usize = 40;
 const IMAGE_SD: f64 = 0.5;
 const TIGHT: Method = Method::Damped(Stop::Fraction(1e-9));
-/// Two that several photos share, one of one photo, one that is held, and one with a principal distance alone.
-const CAMERA_OF: [usize; PHOTOS] = [0, 1, 0, 1, 0, 1, 0, 2, 3, 4, 4];
+/// Two that several photos share, one of one photo, one that is held, one with a principal distance alone, and a backward one.
+const CAMERA_OF: [usize; PHOTOS] = [0, 1, 0, 1, 0, 1, 0, 2, 3, 4, 4, 5, 5, 5];
 
 /// A number between -1 and 1 for each index, the same on every machine.
 fn noise(index: usize) -> f64 {
     ((index as f64 * 12.9898).sin() * 43758.5453).fract()
 }
+
+/// c, xp, yp, K1, K2, K3, P1, P2, b1, b2 and the radius where it is balanced.
+const BROWN: [f64; 11] = [-1000.0, 3.0, -5.0, -5e-8, 2e-13, 0.0, 1e-6, -2e-6, 3e-4, -2e-4, 300.0];
 
 fn cameras() -> Vec<Camera> {
     let bal = |focal_length, radial| geometry::Camera::from(Bal { focal_length, radial });
@@ -37,6 +40,10 @@ fn cameras() -> Vec<Camera> {
         Camera { camera: bal(900.0, [-0.04, 0.02]), sd: vec![FREE, 0.004, 0.01] },
         Camera::held(bal(950.0, [0.0, 0.02])),
         Camera { camera: Perspective { principal_distance: -1050.0 }.into(), sd: vec![FREE] },
+        Camera {
+            camera: geometry::Camera::named("brown", &BROWN).unwrap(),
+            sd: vec![FREE, FREE, 0.5, FREE, FREE, 0.0, FREE, 1e-6, FREE, FREE, 0.0],
+        },
     ]
 }
 
@@ -51,6 +58,38 @@ fn turned(w: &[C], v: [C; 3]) -> [C; 3] {
         sum = std::array::from_fn(|k| sum[k] + term[k]);
     }
     sum
+}
+
+/// A measured position as the backward camera corrects it.
+fn corrected(camera: &[C], measured: [f64; 2]) -> [C; 2] {
+    let [xp, yp, k1, k2, k3, p1, p2, b1, b2] = std::array::from_fn(|k| camera[1 + k]);
+    let (dx, y) = (measured[0] - xp, measured[1] - yp);
+    let x = dx * (1.0 + b1) + y * b2;
+    let (q, q0) = (x * x + y * y, camera[10] * camera[10]);
+    let r = k1 * (q - q0) + k2 * (q * q - q0 * q0) + k3 * (q * q * q - q0 * q0 * q0);
+    [
+        x + x * r + p1 * (q + 2.0 * x * x) + 2.0 * p2 * x * y,
+        y + y * r + p2 * (q + 2.0 * y * y) + 2.0 * p1 * x * y,
+    ]
+}
+
+/// Observed minus computed.
+fn misclosure(pose: &[C], camera: &[C], point: &[C], measured: [f64; 2]) -> [C; 2] {
+    let (computed, observed) = match camera.len() {
+        11 => (image(pose, &camera[..1], point), corrected(camera, measured)),
+        _ => (image(pose, camera, point), measured.map(C::from)),
+    };
+    [0, 1].map(|k| observed[k] - computed[k])
+}
+
+/// The position whose misclosure is nothing, by steps that shrink with the distortion.
+fn exact(pose: &[C], camera: &[C], point: &[C]) -> [f64; 2] {
+    let mut measured = [0.0; 2];
+    for _ in 0..30 {
+        let left = misclosure(pose, camera, point, measured);
+        measured = [0, 1].map(|k| measured[k] - left[k].re);
+    }
+    measured
 }
 
 /// The image of a point: f or -c, and radial terms or none.
@@ -85,9 +124,9 @@ fn network() -> Network {
     for point in 0..POINTS {
         for photo in (0..PHOTOS).filter(|photo| (photo + point) % 3 > 0) {
             let parameters: Vec<f64> = cameras[CAMERA_OF[photo]].camera.parameters();
-            let exact = image(&complex(&pose(photo)), &complex(&parameters), &complex(&place(point)));
+            let exact = exact(&complex(&pose(photo)), &complex(&parameters), &complex(&place(point)));
             let n = 2 * images.len();
-            let xy = [0, 1].map(|k| exact[k].re + IMAGE_SD * noise(n + k + 7000));
+            let xy = [0, 1].map(|k| exact[k] + IMAGE_SD * noise(n + k + 7000));
             images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
         }
     }
@@ -102,7 +141,7 @@ fn network() -> Network {
     let length = |points: [usize; 2]| {
         let [p, q] = points.map(place);
         let length = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
-        Distance { points, length: length + 0.0005, sd: 0.001 }.into()
+        Distance { points, length: length + 0.0005, sd: 0.001, instrument: None }.into()
     };
     Network {
         space: ObjectSpace::Rectangular,
@@ -113,14 +152,19 @@ fn network() -> Network {
         points: (0..POINTS).map(point).collect(),
         images,
         observations: [[20, 21], [4, 30]].map(length).into(),
+        commons: vec![],
+        mounts: vec![],
     }
+}
+
+fn options(method: Method) -> Options {
+    let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
+    Options { adjustment, ..Options::default() }
 }
 
 fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
     let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
-    let options = Options { adjustment, ..Options::default() };
-    network.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
+    network.adjust(&options(method), &pool, &mut |_| ControlFlow::Continue(()))
 }
 
 /// The same network with full matrices: poses, parameters of all cameras, points; those that are fixed have an equation of their own.
@@ -177,12 +221,12 @@ impl<'a> Dense<'a> {
                 values[k].im = STEP;
                 let (pose, rest) = values.split_at(6);
                 let (camera, point) = rest.split_at(camera.len());
-                let xy = image(pose, camera, point);
+                let misclosure = misclosure(pose, camera, point, each.xy);
                 for row in 0..2 {
                     // What is fixed has its own equation alone.
-                    let partial = if sd[column] == 0.0 { 0.0 } else { xy[row].im / STEP };
+                    let partial = if sd[column] == 0.0 { 0.0 } else { -misclosure[row].im / STEP };
                     a[(2 * i + row, column)] = partial / IMAGE_SD;
-                    left[(2 * i + row, 0)] = (each.xy[row] - xy[row].re) / IMAGE_SD;
+                    left[(2 * i + row, 0)] = misclosure[row].re / IMAGE_SD;
                 }
             }
         }
@@ -298,6 +342,92 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
     assert!((solution.sums_of_squares.total() - total).abs() < 1e-9 * total);
 }
 
+/// Everything with everything, and a part of it with another, from where the adjustment ended.
+#[test]
+fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
+    let network = network();
+    let options = options(TIGHT);
+    let mut go = |_| ControlFlow::Continue(());
+    let in_threads = |threads: usize| ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let pool = in_threads(2);
+    let solution = network.adjust(&options, &pool, &mut go).unwrap();
+    let dense = Dense::new(&network);
+    let (_, q) = dense.adjust();
+    let (_, sd) = dense.observed();
+    let photos = (0..PHOTOS).map(Of::Photo);
+    let of: Vec<Of> = (0..POINTS).map(Of::Point).rev().chain(photos).chain((0..5).map(Of::Camera)).collect();
+    let unknowns = |of: &[Of]| -> Vec<usize> {
+        let own = |of: &Of| match *of {
+            Of::Photo(photo) | Of::PhotoStep(photo) => 6 * photo..6 * photo + 6,
+            Of::Point(point) => dense.point(point),
+            Of::Camera(camera) => dense.camera(camera),
+        };
+        of.iter().flat_map(own).collect()
+    };
+    let covariances = network.covariances(&options, &solution.state, None, &pool, &mut go).unwrap();
+    let all = covariances.cofactors(&of, None, &pool, &mut go).unwrap();
+    let compare = |found: &[f64], rows: &[usize], columns: &[usize]| {
+        assert_eq!(found.len(), rows.len() * columns.len());
+        for (k, value) in found.iter().enumerate() {
+            let (i, j) = (rows[k / columns.len()], columns[k % columns.len()]);
+            let expected = if sd[i] == 0.0 || sd[j] == 0.0 { 0.0 } else { q[(i, j)] };
+            let scale = (q[(i, i)] * q[(j, j)]).sqrt();
+            assert!((value - expected).abs() <= 1e-8 * scale, "{i} {j}: {value:e} {expected:e}");
+        }
+    };
+    compare(&all, &unknowns(&of), &unknowns(&of));
+    // The same bits with any number of threads.
+    let one = in_threads(1);
+    let again = network.covariances(&options, &solution.state, None, &one, &mut go).unwrap();
+    let again = again.cofactors(&of, None, &one, &mut go).unwrap();
+    assert!(all.iter().zip(&again).all(|(a, b)| a.to_bits() == b.to_bits()));
+    // A camera with everything, everything with a camera, a few points with others.
+    for (rows, columns) in [
+        (vec![Of::Camera(0)], of.clone()),
+        (of.clone(), vec![Of::Camera(1)]),
+        (vec![Of::Point(4), Of::Point(30)], vec![Of::Point(30), Of::Photo(7), Of::Point(5)]),
+    ] {
+        let found = covariances.cofactors(&rows, Some(&columns), &pool, &mut go).unwrap();
+        compare(&found, &unknowns(&rows), &unknowns(&columns));
+    }
+    // A distance, as a function.
+    let ends = [Of::Point(3), Of::Point(22)];
+    let [p, r] = [3, 22].map(|point| solution.points[point].unwrap().coordinates);
+    let length = (0..3).map(|k| (r[k] - p[k]).powi(2)).sum::<f64>().sqrt();
+    let direction: Vec<f64> = (0..3).map(|k| (r[k] - p[k]) / length).collect();
+    let partials: Vec<f64> = direction.iter().map(|d| -d).chain(direction.iter().copied()).collect();
+    let found = covariances.propagate(&partials, &ends, &pool, &mut go).unwrap();
+    let places = unknowns(&ends);
+    let pairs = (0..6).flat_map(|i| (0..6).map(move |j| (i, j)));
+    let expected: f64 = pairs.map(|(i, j)| partials[i] * q[(places[i], places[j])] * partials[j]).sum();
+    assert!((found[0] / expected - 1.0).abs() < 1e-8, "{} {expected}", found[0]);
+}
+
+#[test]
+fn what_has_no_cofactors_is_refused() {
+    let network = network();
+    let mut go = |_| ControlFlow::Continue(());
+    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let options = Options { memory: Some(1 << 30), ..options(TIGHT) };
+    let solution = network.adjust(&options, &pool, &mut go).unwrap();
+    let covariances = network.covariances(&options, &solution.state, None, &pool, &mut go).unwrap();
+    let mut refused = |of: Of| covariances.cofactors(&[of], None, &pool, &mut go).unwrap_err();
+    assert_eq!(refused(Of::Photo(PHOTOS)), NetworkError::NoPhoto(PHOTOS));
+    assert_eq!(refused(Of::Point(POINTS)), NetworkError::NoPoint(POINTS));
+    assert_eq!(refused(Of::Camera(5)), NetworkError::CameraIndex(5));
+    let partials = covariances.propagate(&[1.0; 4], &[Of::Point(0)], &pool, &mut go).unwrap_err();
+    assert_eq!(partials, NetworkError::Partials { unknowns: 3, numbers: 4 });
+    let many = vec![Of::Point(0); 4000];
+    let too_many = covariances.cofactors(&many, None, &pool, &mut go).unwrap_err();
+    assert!(matches!(too_many, NetworkError::Memory { needed, .. } if needed > 8 * 12_000 * 12_000));
+    let stopped = covariances.cofactors(&[Of::Point(0)], None, &pool, &mut |_| ControlFlow::Break(()));
+    assert_eq!(stopped.unwrap_err(), NetworkError::Interrupted);
+    let mut other = solution.state;
+    other.unknowns.pop();
+    let found = network.covariances(&options, &other, None, &pool, &mut go).err();
+    assert_eq!(found, Some(NetworkError::State));
+}
+
 /// Without control: what the datum holds are photos, and redundancy numbers add up to the degrees of freedom.
 #[test]
 fn redundancy_numbers_of_a_free_network_add_up() {
@@ -306,8 +436,8 @@ fn redundancy_numbers_of_a_free_network_add_up() {
     network.observations.clear();
     let solution = adjust(&network, Method::TrustRegion(Stop::Decrease(1e-10))).unwrap();
     assert_eq!(solution.datum.len(), 7);
-    let parameters = 3 + 2 + 3 + 1;
-    let weighted = 1 + 2;
+    let parameters = 3 + 2 + 3 + 1 + 9;
+    let weighted = 1 + 2 + 2;
     let unknowns = (6 * PHOTOS + parameters + 3 * POINTS - 7) as i64;
     let expected = (2 * network.images.len() + weighted) as i64 - unknowns;
     assert_eq!(solution.degrees_of_freedom, expected);
@@ -332,6 +462,8 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
         points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
         images: vec![],
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     };
     for (photo, [x, y]) in stations.into_iter().enumerate() {
         let pose = [0.0, 0.0, 0.0, x, y, -10.0];
@@ -341,7 +473,7 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
             network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
         }
     }
-    let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1] };
+    let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1], ..Combination::default() };
     assert_eq!(adjust(&network, TIGHT).unwrap_err(), NetworkError::Undetermined(vec![combination]));
     // A weight is enough.
     network.cameras[1].sd = vec![0.1];

@@ -176,7 +176,7 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
     assert_eq!(found.status, Status::Converged);
     let all = (0..problem.layout().unknowns()).map(|unknown| (unknown, 1.0)).collect();
-    let datum = Datum { carriers: all, left: vec![] };
+    let datum = Datum { carriers: all, left: vec![], relative: false };
     let free = in_datum(&problem, &options(), &found, &datum, &problem.initial, &pool, &mut go).unwrap();
     let a = design(&problem, &free.unknowns);
     let q = pseudo_inverse(&a);
@@ -217,7 +217,11 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
         let problem = network(held);
         let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
         // Carried by three kept points only.
-        let datum = Datum { carriers: (20..26).map(|unknown| (unknown, 1.0)).collect(), left: vec![] };
+        let datum = Datum {
+            carriers: (20..26).map(|unknown| (unknown, 1.0)).collect(),
+            left: vec![],
+            relative: false,
+        };
         in_datum(&problem, &options(), &found, &datum, &problem.initial, &pool, &mut go).unwrap()
     };
     let one = in_datum_of(vec![16, 17, 19]);
@@ -236,7 +240,7 @@ fn too_few_carriers_are_refused() {
     // One point carries shifts, but no rotation about itself; one coordinate of four points no shift along the other.
     for carriers in [vec![16, 17], vec![16, 18, 20, 22]] {
         let carriers = carriers.into_iter().map(|unknown| (unknown, 1.0)).collect();
-        let datum = Datum { carriers, left: vec![] };
+        let datum = Datum { carriers, left: vec![], relative: false };
         let refused = in_datum(&problem, &options(), &found, &datum, &problem.initial, &pool, &mut go);
         assert_eq!(refused.unwrap_err(), DatumError::NotCarried);
     }
@@ -268,7 +272,11 @@ fn what_is_open_is_found_by_trying_and_held() {
         // Two give a datum.
         let (placed, problem) = adjusted(&|problem| problem.sd[24..28].fill(0.5), method);
         assert!(placed.datum.is_empty());
-        let datum = Datum { carriers: (0..40).map(|unknown| (unknown, 1.0)).collect(), left: vec![] };
+        let datum = Datum {
+            carriers: (0..40).map(|unknown| (unknown, 1.0)).collect(),
+            left: vec![],
+            relative: false,
+        };
         let refused = in_datum(&problem, &options(), &placed, &datum, &problem.initial, &pool, &mut go);
         assert_eq!(refused.unwrap_err(), DatumError::NotFree);
     }

@@ -3,6 +3,7 @@
 mod arrays;
 mod attitude;
 mod camera;
+mod commons;
 mod comparator;
 mod distributions;
 mod geometry;
@@ -30,6 +31,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     attitude::register(module)?;
     geometry::register(module)?;
     camera::register(module)?;
+    commons::register(module)?;
     network::register(module)?;
     comparator::register(module)?;
     resection::register(module)?;

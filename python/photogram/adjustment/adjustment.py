@@ -21,6 +21,7 @@ from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
 from photogram.network.observations import observation_rows
 from photogram.network.refracted import check_cameras, remarks
+from photogram.network.rigs import mount_rows
 from photogram.results.iteration import Iteration
 from photogram.results.result import Result
 
@@ -166,7 +167,8 @@ def adjust(
             photo_positions_observed=None,
             photo_attitudes_observed=None,
         )
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids)
+    unknowns = block.unknowns
+    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, unknowns)
     cameras, photo_cameras = block.core_cameras()
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
 
@@ -187,6 +189,8 @@ def adjust(
             block.image_xy,
             block.image_sd,
             observation_groups=[group for _, group in groups],
+            unknowns=[each.row() for each in unknowns],
+            mounts=mount_rows(block.mounts, block.photo_ids, unknowns),
             spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
             photo_to_ground=block.photo_to_ground,
             refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
@@ -287,7 +291,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     messages += behind(block, solution)
     messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
     dropped = {block.point_ids[point] for point, _ in solution.dropped}
-    lost = [each.name for each in block.observations if not each.OF_PHOTOS and dropped.intersection(each.of)]
+    lost = [each.name for each in block.observations if dropped.intersection(each.points)]
     if lost:
         messages.append(Message(f"left out with their points: {listed(lost)}"))
     messages = datum(block, solution) + messages
@@ -315,6 +319,7 @@ def _named(
     photos: list[list[int]],
     points: list[int],
     cameras: list[list[int]],
+    unknowns: list[list[int]],
 ) -> AdjustmentError:
     """Put names to the indices of a failure of the core."""
     point_names = [block.point_ids[i] for i in points]
@@ -324,7 +329,7 @@ def _named(
         text = f"the rays on photos {listed(photo_names)} do not determine the points {listed(point_names)}"
         return RankError(text, photo_names, point_names)
     if kind == "undetermined photos":
-        return _undetermined_photos(block, photos, cameras)
+        return _undetermined_photos(block, photos, cameras, unknowns)
     if kind == "no intersection":
         return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
     if kind == "coarse":
@@ -334,11 +339,18 @@ def _named(
     return AdjustmentError(message)
 
 
-def _undetermined_photos(block: Block, photos: list[list[int]], cameras: list[list[int]]) -> RankError:
-    combinations = [(tuple(of), tuple(by)) for of, by in zip(photos, cameras, strict=True)]
-    concerned = sorted({photo for of, _ in combinations for photo in of})
+def _undetermined_photos(
+    block: Block, photos: list[list[int]], cameras: list[list[int]], unknowns: list[list[int]]
+) -> RankError:
+    combinations = [
+        (tuple(of), tuple(by), tuple(others))
+        for of, by, others in zip(photos, cameras, unknowns, strict=True)
+    ]
+    concerned = sorted({photo for of, *_ in combinations for photo in of})
     names = [block.photo_ids[photo] for photo in concerned]
-    camera_names = [block.camera_names[row] for row in sorted({row for _, by in combinations for row in by})]
+    camera_names = [
+        block.camera_names[row] for row in sorted({row for _, by, _ in combinations for row in by})
+    ]
     points = np.unique(block.image_points[np.isin(block.image_photos, concerned)])
     point_names = [block.point_ids[point] for point in points]
     lines = [f"the observations leave {len(combinations)} combinations of unknowns undetermined:"]
@@ -356,11 +368,13 @@ def _undetermined_photos(block: Block, photos: list[list[int]], cameras: list[li
     return RankError("\n".join(lines), names, point_names, camera_names)
 
 
-def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...]) -> str:
+def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: tuple[int, ...]) -> str:
     """Say what a combination of unknowns moves."""
     of_cameras = listed([block.camera_names[camera] for camera in cameras])
+    others = listed([block.unknowns[row].title for row in unknowns])
     if not photos:
-        return f"the parameters of {of_cameras}"
+        parts = [f"the parameters of {of_cameras}"] if cameras else []
+        return " and ".join([*parts, *([others] if unknowns else [])])
     on = np.unique(block.image_points[np.isin(block.image_photos, photos)])
     moved = (
         f"all {len(photos)} photos together"
@@ -369,5 +383,7 @@ def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...]) -> s
     )
     if cameras:
         moved += f" with the parameters of {of_cameras}"
+    if unknowns:
+        moved += f" with {others}"
     held = f"hold the points {listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
     return f"{moved}, which {held}"

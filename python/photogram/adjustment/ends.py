@@ -27,7 +27,7 @@ def undetermined(
     messages = []
     if error is not None:
         messages.append(Message(f"there are no covariances: {error}"))
-    weak = _unknowns(block, solution.weak, solution.weak_cameras)
+    weak = _unknowns(block, solution.weak, solution.weak_cameras, solution.weak_unknowns)
     if weak:
         messages.append(
             Message(
@@ -54,9 +54,12 @@ def datum(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
 
 
 def _unknowns(
-    block: Block, of_photos: list[tuple[int, int]], of_cameras: Sequence[tuple[int, int]] = ()
+    block: Block,
+    of_photos: list[tuple[int, int]],
+    of_cameras: Sequence[tuple[int, int]] = (),
+    of_others: Sequence[tuple[int, int]] = (),
 ) -> str:
-    """Name photos and their unknowns (0 to 5, then those of a camera of their own), cameras and theirs."""
+    """Name photos and their unknowns (0 to 5, then those of a camera of their own), cameras, common ones."""
     names = [*position_columns(block), *ATTITUDE_COLUMNS]
     parts = [
         f"{names[unknown].removesuffix('_deg')} of"
@@ -72,6 +75,8 @@ def _unknowns(
             f"{block.cameras[camera].names[k]} of {block.camera_names[camera]}"
             for camera, k in [*own, *of_cameras]
         ]
+    common = block.unknowns if of_others else []
+    parts += [f"{common[row].components[k]} of {common[row].title}" for row, k in of_others]
     return "; ".join(parts)
 
 

@@ -158,7 +158,7 @@ def _numbers(which: NDArray[np.bool_]) -> str:
 
 
 def _named(
-    kind: str, message: str, photos: list[list[int]], points: list[int], _cameras: list[list[int]]
+    kind: str, message: str, photos: list[list[int]], points: list[int], *_others: list[list[int]]
 ) -> AdjustmentError:
     """Put a failure of the core into words; photos and points have no names but their numbers, from 0."""
     if kind == "undetermined points":

@@ -18,6 +18,8 @@ from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_ca
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation, observation_rows
 from photogram.network.refraction import Refraction, metres_per_unit
+from photogram.network.rigs import Mount, checked_mounts
+from photogram.network.unknowns import Unknown, different_unknowns
 
 __all__ = ["Block"]
 
@@ -92,6 +94,8 @@ class Block:
     photo_cameras
         (P,) which camera each photo has: an index, or its name; photos with the same one share its unknowns.
         One for all photos; None where there is one camera, or one for each photo.
+    mounts
+        Which photos are on a frame with others, and in which pose (:mod:`photogram.network.rigs`).
 
     Raises
     ------
@@ -125,6 +129,7 @@ class Block:
     observations: Sequence[Observation] = ()
     cameras: Sequence[Camera] = ()
     photo_cameras: Indices | None = None
+    mounts: Sequence[Mount] = ()
 
     def __post_init__(self) -> None:
         for name in ("photo_ids", "point_ids"):
@@ -247,7 +252,8 @@ class Block:
         for row, each in enumerate(self.observations):
             if not isinstance(each, Observation) or not each.KIND:
                 raise InputError(f"observations[{row}] is no observation: {shown(each)}")
-        observation_rows(self.observations, self.point_ids, self.photo_ids)
+        self._set("mounts", checked_mounts(self.mounts, self.photo_ids))
+        observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
 
     def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
         if bad.any():
@@ -263,6 +269,12 @@ class Block:
     def geographic(self) -> bool:
         """Whether positions are longitude, latitude and height."""
         return self.spheroid is not None
+
+    @property
+    def unknowns(self) -> list[Unknown]:
+        """What observations, and photos on frames, have in common, in the order in which it comes."""
+        of_observations = (each for own in self.observations for each in own.unknowns if each is not None)
+        return different_unknowns([*(mount.sensor for mount in self.mounts), *of_observations])
 
     @property
     def image_unit(self) -> str:
@@ -422,10 +434,12 @@ def of_images_alone(block: Block, what: str) -> Block:
     Raises
     ------
     InputError
-        Observations beside images.
+        Observations beside images, photos on frames.
     """
     if block.observations:
         raise InputError(f"{what}: the block has observations beside images, which are not taken there")
+    if block.mounts:
+        raise InputError(f"{what}: the block has photos on frames, which are not taken there")
     return block
 
 

@@ -24,8 +24,9 @@ ImageUnit = Literal["mm", "px"]
 CameraRow = tuple[str, list[float], list[float]]
 """Model, parameters and their standard deviations, as the core takes a camera."""
 
-_GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b"})
-"""Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras."""
+_GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta"})
+"""Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras. Where w and h
+are given, cx and cy are counted from the middle of the picture, and may be missing."""
 
 
 @cache
@@ -122,7 +123,10 @@ class Camera:
     @property
     def scale(self) -> float:
         """What a small angle near the axis is multiplied by: the principal distance, without sign."""
-        return abs(next(self.parameters[name] for name in ("c", "f", "fx") if name in self.parameters))
+        for name in ("c", "f", "fx"):
+            if name in self.parameters:
+                return abs(self.parameters[name])
+        return abs(self.parameters["w"]) / math.tau
 
     def unit_of(self, name: str) -> str:
         """Return the unit of a parameter; nothing for a plain number."""
@@ -153,7 +157,8 @@ class Camera:
 
     def _checked_parameters(self) -> dict[str, float]:
         given = self._named("parameters", self.parameters)
-        missing = [name for name in self.names if name in _GIVEN and name not in given]
+        needed = _GIVEN - ({"cx", "cy"} if "w" in self.names else set())
+        missing = [name for name in self.names if name in needed and name not in given]
         if missing:
             raise InputError(f"parameters of the camera {self.title}: {', '.join(missing)} must be given")
         for name, value in given.items():

@@ -18,6 +18,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.results.cameras import AdjustedCamera
+from photogram.results.distortion import INTERIOR
 from photogram.results.result import Result
 
 __all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "calibrations"]
@@ -32,9 +33,6 @@ FROM_PRIOR = 0.05
 """A weight whose redundancy number is below this determines the parameter, not the images."""
 FAR = 5.0
 """A weighted parameter that has moved by more of its standard deviations a priori is a contradiction."""
-
-INTERIOR = frozenset({"c", "f", "fx", "fy", "xp", "yp", "cx", "cy"})
-"""Compared with their given values; all others with zero."""
 
 
 @dataclass(frozen=True)

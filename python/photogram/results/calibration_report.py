@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram.results.calibration import Calibration, ParameterTest, calibrations
 from photogram.results.distortion import DistortionCurve, distortion_curve
+from photogram.results.lens_field import LensField, lens_field
 from photogram.results.result import Result
 from photogram.show.sections import Section
 
@@ -44,6 +45,9 @@ def _section(result: Result, found: Calibration) -> Section:
     curve = distortion_curve(result, camera)
     if curve is not None:
         lines += ["", *_curve_lines(curve, str(camera.camera.unit))]
+    field = lens_field(result, camera)
+    if field is not None:
+        lines += ["", _field_line(field, str(camera.camera.unit))]
     remarks = found.remarks()
     return f"Calibration of {camera.name}", [*lines, *([""] if remarks else []), *remarks]
 
@@ -124,13 +128,24 @@ def _curve_lines(curve: DistortionCurve, unit: str) -> list[str]:
     return lines
 
 
+def _field_line(field: LensField, unit: str) -> str:
+    factor, written = (1000.0, "um") if unit == "mm" else (1.0, "px")
+    at = field.largest
+    x, y = field.positions[at]
+    (dx, dy), (sx, sy) = field.vectors[at], np.sqrt(np.diag(field.covariances[at]))
+    return (
+        f"{', '.join(field.names)}: at the most {factor * dx:.3f} and {factor * dy:.3f} {written} (sd"
+        f" {factor * sx:.3f} and {factor * sy:.3f}), at x {x:.4g}, y {y:.4g} {unit}"
+    )
+
+
 def calibration_members(result: Result) -> list[dict[str, Any]]:
     """Return what the JSON document says of each camera with unknown parameters."""
     return [_member(result, each) for each in calibrations(result)]
 
 
 def _member(result: Result, found: Calibration) -> dict[str, Any]:
-    curve = distortion_curve(result, found.camera)
+    curve, field = distortion_curve(result, found.camera), lens_field(result, found.camera)
     return {
         "camera": found.camera.name,
         "parameters": [
@@ -165,6 +180,16 @@ def _member(result: Result, found: Calibration) -> dict[str, Any]:
         "removable": found.removable,
         "remarks": found.remarks(),
         "distortion": None if curve is None else _curve_member(curve),
+        "field": None if field is None else _field_member(field),
+    }
+
+
+def _field_member(field: LensField) -> dict[str, Any]:
+    return {
+        "terms": list(field.names),
+        "position": field.positions.tolist(),
+        "vector": field.vectors.tolist(),
+        "covariance": field.covariances.tolist(),
     }
 
 

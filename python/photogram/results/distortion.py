@@ -5,7 +5,8 @@ band s(r) = sigma0 sqrt(J Q J'). What a user measures with includes the principa
 maps a ray to r + dr, which moves by J dk + (r / c) dc; a backward one maps a measured position to the ray
 (r + dr) / c, which moves by (J dk - (r / c) dc) / c: so the band of the mapping is that of (J, r / c) or of
 (J, -r / c) with the block of k and c. Balanced, a part B r that c may take over is subtracted so that the
-curve vanishes at r0: J - r w with w = J(r0) / r0.
+curve vanishes at r0: J - r w with w = J(r0) / r0; the principal distance is then c / (1 + B), c (1 + B) where
+the lens is forward.
 """
 
 from __future__ import annotations
@@ -21,7 +22,11 @@ from photogram.network.cameras import Camera
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 
-__all__ = ["DistortionCurve", "distortion_curve", "largest_radius"]
+__all__ = ["INTERIOR", "DistortionCurve", "distortion_curve", "largest_radius", "own_images"]
+
+DISTANCES = ("c", "f", "fx")
+INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy"})
+"""Principal distance and principal point; all other parameters are terms of the lens."""
 
 BALANCED_AT = 2.0 / 3.0
 """r0, of the largest observed radius."""
@@ -68,14 +73,19 @@ class DistortionCurve:
     observed: float
 
 
-def largest_radius(result: Result, camera: AdjustedCamera) -> float:
-    """Return how far from the principal point images of a camera reach: measured, or ideal where forward."""
+def own_images(result: Result, camera: AdjustedCamera) -> Floats:
+    """Return (k, 2) the images of a camera that took part."""
     block = result.block
     cameras = np.asarray(block.photo_cameras)[block.image_photos]
-    own = result.used_images & (cameras == [each.name for each in result.cameras].index(camera.name))
-    if not own.any():
+    row = [each.name for each in result.cameras].index(camera.name)
+    return np.asarray(block.image_xy[result.used_images & (cameras == row)])
+
+
+def largest_radius(result: Result, camera: AdjustedCamera) -> float:
+    """Return how far from the principal point images of a camera reach: measured, or ideal where forward."""
+    xy = own_images(result, camera)
+    if not len(xy):
         return 0.0
-    xy = block.image_xy[own]
     if _is_backward(camera.camera):
         return float(np.hypot(*(xy - _principal_point(camera.camera)).T).max())
     rays = camera.camera.rays(xy)
@@ -105,7 +115,7 @@ def distortion_curve(
     r0 = BALANCED_AT * observed
     both = np.append(at, r0)
     curve, partials = _radial(camera, terms, both)
-    distance = next(k for k, name in enumerate(camera.names) if name in ("c", "f", "fx"))
+    distance = next(k for k, name in enumerate(camera.names) if name in DISTANCES)
     c = float(camera.values[distance])
     part = curve[-1] / r0
     with_distance = np.column_stack([partials, -both / c if _is_backward(camera.camera) else both / c])
@@ -119,7 +129,7 @@ def distortion_curve(
         balanced=(curve - part * both)[:-1],
         sd_balanced=_deviations(camera, terms, balanced)[:-1],
         balanced_at=r0,
-        balanced_distance=c * (1.0 - part),
+        balanced_distance=c / (1.0 + part) if _is_backward(camera.camera) else c * (1.0 + part),
         observed=observed,
     )
 
@@ -133,7 +143,7 @@ def _deviations(camera: AdjustedCamera, terms: list[int], partials: Floats) -> F
 def _radial(camera: AdjustedCamera, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
     """Return the curve of the radial terms alone, and its partials by these: the curve is linear in them."""
     own = camera.camera
-    keep = {"c", "f", "fx", "fy", "r0", *(camera.names[k] for k in terms)}
+    keep = {"c", "f", "fx", "fy", *own.constants, *(camera.names[k] for k in terms)}
     bare = {name: value if name in keep else 0.0 for name, value in own.parameters.items()}
     largest = radii.max()
 
@@ -159,7 +169,8 @@ def _along(camera: Camera, radii: Floats) -> Floats:
     argument = radii / camera.scale
     across = np.sin(argument) if _is_fisheye(camera) else argument
     back = -np.cos(argument) if _is_fisheye(camera) else zero - 1.0
-    return np.asarray(camera.project(np.column_stack([across, zero, back]))[:, 0] - radii)
+    middle = camera.project([[0.0, 0.0, -1.0]])[0, 0]
+    return np.asarray(camera.project(np.column_stack([across, zero, back]))[:, 0] - middle - radii)
 
 
 def _ideal(camera: Camera, rays: Floats) -> Floats:

@@ -75,6 +75,7 @@ def _document(result: Result) -> dict[str, Any]:
             if result.cameras
             else {}
         ),
+        **({"unknowns": _unknowns(result)} if result.unknowns else {}),
         "points": _points(result),
         "observations": _observations(result),
         "observations_beside_images": _beside_images(result),
@@ -166,6 +167,28 @@ def _cameras(result: Result) -> list[dict[str, Any]]:
             "covariance": each.covariance.tolist(),
         }
         for each in result.cameras
+    ]
+
+
+def _unknowns(result: Result) -> list[dict[str, Any]]:
+    return [
+        {
+            "kind": each.kind,
+            "name": each.name,
+            "position": each.position.tolist(),
+            "matrix": each.attitude.tolist(),
+            "observations": each.observations,
+            "components": list(each.components),
+            "units": list(each.units),
+            "sd_given": each.given.deviations.tolist(),
+            "value": each.values.tolist(),
+            "change": each.change.tolist(),
+            "sd": each.sd.tolist(),
+            "redundancy": each.redundancy.tolist(),
+            "standardized": each.standardized.tolist(),
+            "covariance": each.covariance.tolist(),
+        }
+        for each in result.unknowns
     ]
 
 

@@ -87,12 +87,13 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
     """Return what has become of the observations of a block, by the names of their kinds."""
     found = iter(solution.adjusted_observations)
     kinds = {}
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids)
-    for rows, (kind, _, _, covariances) in groups:
+    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
+    for rows, (*_, covariances) in groups:
         first = block.observations[rows[0]]
+        kind = first.label
         components = first.components(geographic=block.geographic)
         observed = np.ones((len(rows), len(components)), dtype=bool)
-        if kind == "difference":
+        if first.MISSING:
             observed = ~np.isnan([block.observations[row].observed for row in rows])
         tables = np.full((3, *observed.shape), np.nan)
         single = np.full((2, len(rows)), np.nan)
@@ -107,7 +108,7 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
             rows=np.array(rows, dtype=np.int64),
             names=[" - ".join(block.observations[row].of) for row in rows],
             components=components,
-            units=tuple("rad" if name.startswith("rotation") else block.linear_unit for name in components),
+            units=first.units(block.linear_unit),
             sd=np.sqrt(np.where(observed, variances, np.nan)),
             residuals=tables[0].copy(),
             redundancy=tables[1].copy(),

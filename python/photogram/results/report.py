@@ -13,6 +13,7 @@ from photogram.results.calibration_report import calibration_sections
 from photogram.results.kinds import kind_lines, tested_kind
 from photogram.results.observed import image_lines, observed_lines, tested
 from photogram.results.result import Result
+from photogram.results.unknowns import unknown_lines
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.sections import Section, composed, headline, problems
 from photogram.show.ways import report_of
@@ -62,6 +63,7 @@ def report(result: Result) -> str:
         ),
         *calibration_sections(result),
         ("Cameras that are held", _held_cameras(result)),
+        ("Unknowns that observations have in common", unknown_lines(result.unknowns)),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
         ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),

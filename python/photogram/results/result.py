@@ -16,6 +16,7 @@ from photogram.network.block import Block
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
+from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:
@@ -86,6 +87,9 @@ class Result(AdjustedNetwork):
         Observations beside images: arrays for each kind, by its name.
     cameras
         The adjusted cameras of the block, in its order; none where it has principal distances.
+    unknowns
+        The adjusted unknowns that observations, and photos on frames, have in common, in the order of
+        `block.unknowns`.
     dropped
         Points left out, with the reason.
     """
@@ -100,6 +104,7 @@ class Result(AdjustedNetwork):
     point_last_corrections: Floats
     kinds: Mapping[str, ObservedKind]
     cameras: tuple[AdjustedCamera, ...]
+    unknowns: tuple[AdjustedUnknown, ...]
     dropped: Mapping[str, str]
 
     @classmethod
@@ -113,6 +118,7 @@ class Result(AdjustedNetwork):
     ) -> Self:
         """Take over what the core found."""
         variance = solution.variance_of_unit_weight
+        scale = 1.0 if variance is None else variance
         return cls.taken_over(
             solution,
             block=block.kept(),
@@ -121,7 +127,8 @@ class Result(AdjustedNetwork):
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
             unit_variance=unit_variance,
             kinds=observed_kinds(block, solution),
-            cameras=adjusted_cameras(block, solution, 1.0 if variance is None else variance),
+            cameras=adjusted_cameras(block, solution, scale),
+            unknowns=adjusted_unknowns(block, solution, scale),
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
         )
 
@@ -203,6 +210,10 @@ class Result(AdjustedNetwork):
     def camera_table(self) -> pd.DataFrame:
         """Return adjusted cameras as a data frame: a row for each parameter, with its unit."""
         return self._table("camera")
+
+    def unknown_table(self) -> pd.DataFrame:
+        """Return adjusted common unknowns as a data frame: a row for each component, with its unit."""
+        return self._table("unknown")
 
     def observation_table(self) -> pd.DataFrame:
         """Return observations beside images as a data frame, a row for each component, with its unit."""

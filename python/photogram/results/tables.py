@@ -110,6 +110,27 @@ def _cameras(result: Result) -> dict[str, Any]:
     return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
+def _unknowns(result: Result) -> dict[str, Any]:
+    """Name what there is of each component: `sd_given` is infinite for free ones and 0 for those held."""
+    rows = [
+        (each.kind, each.name, component, unit, *numbers)
+        for each in result.unknowns
+        for component, unit, *numbers in zip(
+            each.components,
+            each.units,
+            each.given.deviations,
+            each.values,
+            each.change,
+            each.sd,
+            each.redundancy,
+            each.standardized,
+            strict=True,
+        )
+    ]
+    names = ("kind", "unknown", "component", "unit", "sd_given", "value", "change", "sd", "redundancy")
+    return {name: [row[k] for row in rows] for k, name in enumerate((*names, "standardized"))}
+
+
 _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "photo": _photos,
     "point": _points,
@@ -119,6 +140,7 @@ _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "station": _stations,
     "observation": _beside_images,
     "camera": _cameras,
+    "unknown": _unknowns,
 }
 
 

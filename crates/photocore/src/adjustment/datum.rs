@@ -12,19 +12,20 @@
 //! and with T = G (B^T G)^-1 and W = Q B, which takes d further right-hand sides, a block of it is
 //! Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W) T_j^T. Redundancy numbers and residuals are the same in every datum.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use faer::{Mat, Side};
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use super::loss::Reweighting;
+use super::factored::{Factored, Inverted};
+use super::loss::Loss;
 use super::motions::Open;
 use super::options::Options;
-use super::problem::{Linearized, Model, Motions, Problem};
+use super::problem::{Model, Motions, Problem};
 use super::result::{AdjustError, Adjustment};
-use super::run::unless_stopped;
-use crate::normals::{Cofactors, Inversion, Layout};
+use super::transformation::Transformation;
+use crate::normals::Cofactors;
 
 /// A datum of a network whose observations leave one open.
 #[derive(Debug, Clone, Default)]
@@ -34,6 +35,9 @@ pub struct Datum {
     pub carriers: Vec<(usize, f64)>,
     /// Those of the model's motions that stay with the unknowns that are held: their numbers. A network keeps its scale so.
     pub left: Vec<usize>,
+    /// Whether the other motions are taken, all of them, whether or not the observations leave them open: cofactors are then those of
+    /// the unknowns relative to the carriers.
+    pub relative: bool,
 }
 
 /// An adjusted network in another datum.
@@ -43,6 +47,10 @@ pub struct InDatum {
     pub unknowns: Vec<f64>,
     /// Their cofactors.
     pub cofactors: Cofactors,
+    /// Redundancy numbers of the unknowns as observations of themselves (zero unless weighted).
+    pub prior_redundancy: Vec<f64>,
+    /// About how large a part of a variance rounding may be: large numbers cancel where the old datum is far from the new one, or short.
+    pub lost: f64,
 }
 
 /// Why an adjusted network cannot be taken to a datum.
@@ -89,37 +97,81 @@ pub fn in_datum<M: Model>(
     if adjustment.cofactors.is_none() {
         return Err(DatumError::NoCofactors);
     }
-    let (unknowns, basis) = moved(problem, &adjustment.unknowns, datum, reference, pool)?;
-    let held = &adjustment.datum;
-    let reweighting = options.loss.map(|loss| Reweighting { loss, curved: false });
-    let equations = pool.install(|| Linearized::new(problem, &unknowns, held, reweighting));
-    let prior = problem.prior_equations(&unknowns, held);
-    let factor = unless_stopped(problem.system.factor(pool, &equations, &prior, 0.0, between))?;
+    let adjusted = Adjusted { unknowns: &adjustment.unknowns, held: &adjustment.datum, loss: options.loss };
+    Factored::in_datum(problem, adjusted, datum, reference, pool, between)?.into_datum(problem, pool, between)
+}
 
-    // Held unknowns stand in the normal equations with unit weight: their columns of Q are zero.
-    let (count, d) = (unknowns.len(), basis.t.ncols());
-    let mut rights = vec![0.0; count * d];
-    let free = |unknown: usize| !held.contains(&unknown) && problem.sd[unknown] != 0.0;
-    for (row, &(carrier, _)) in datum.carriers.iter().enumerate().filter(|(_, carrier)| free(carrier.0)) {
-        (0..d).for_each(|k| rights[k * count + carrier] = basis.b[(row, k)]);
+/// Where an adjustment has ended.
+#[derive(Debug, Clone, Copy)]
+pub struct Adjusted<'a> {
+    /// The adjusted unknowns.
+    pub unknowns: &'a [f64],
+    /// Those held for a datum.
+    pub held: &'a [usize],
+    /// What has weighted the observations.
+    pub loss: Option<Loss>,
+}
+
+impl Factored {
+    /// Moves an adjusted network to another datum, and factors its normal equations there.
+    ///
+    /// # Errors
+    /// A network that is not free, carriers that do not carry all null vectors; what ends adjustments.
+    pub fn in_datum<M: Model>(
+        problem: &Problem<M>,
+        adjusted: Adjusted<'_>,
+        datum: &Datum,
+        reference: &[f64],
+        pool: &ThreadPool,
+        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Self, DatumError> {
+        let Adjusted { unknowns, held, loss } = adjusted;
+        let (unknowns, basis) = moved(problem, unknowns, datum, reference, pool)?;
+        let mut factored = Self::form(problem, loss, unknowns, held.to_vec(), pool, between)?;
+        // Held unknowns stand in the normal equations with unit weight: their columns of Q are zero.
+        let (count, d) = (factored.values.len(), basis.t.ncols());
+        let mut rights = vec![0.0; count * d];
+        let free = |unknown: usize| !held.contains(&unknown) && problem.sd[unknown] != 0.0;
+        let carriers = datum.carriers.iter().enumerate();
+        for (row, &(carrier, _)) in carriers.filter(|(_, carrier)| free(carrier.0)) {
+            (0..d).for_each(|k| rights[k * count + carrier] = basis.b[(row, k)]);
+        }
+        let columns = factored.solve_for(problem, &rights, pool, between)?;
+        let w = Mat::from_fn(count, d, |i, k| columns[k * count + i]);
+        let of_carriers = Mat::from_fn(datum.carriers.len(), d, |row, k| w[(datum.carriers[row].0, k)]);
+        let mut staying = vec![];
+        if datum.carriers.len() == d {
+            staying = datum.carriers.iter().map(|&(carrier, _)| carrier).collect();
+            staying.sort_unstable();
+        }
+        let common = basis.b.transpose() * of_carriers;
+        let Basis { t, condition, .. } = basis;
+        factored.transformation = Some(Transformation { t, w, common, condition, staying });
+        Ok(factored)
     }
-    let solved = problem.system.solve_for(pool, &factor, &equations, &prior, 0.0, &rights, between);
-    let columns = unless_stopped(solved)?;
-    let w = Mat::from_fn(count, d, |i, k| columns[k * count + i]);
-    let of_carriers = Mat::from_fn(datum.carriers.len(), d, |row, k| w[(datum.carriers[row].0, k)]);
-    let common = basis.b.transpose() * of_carriers;
 
-    let inverted = problem.system.invert(pool, factor, &equations, &prior, between);
-    let Inversion { mut cofactors, .. } = unless_stopped(inverted)?;
-    problem.finish_cofactors(&mut cofactors, held, &unknowns);
-    Transformation { t: &basis.t, w: &w, common: &common }.apply(problem.layout(), &mut cofactors);
-    Ok(InDatum { unknowns, cofactors })
+    /// The unknowns and their cofactors in its datum.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn into_datum<M: Model>(
+        self,
+        problem: &Problem<M>,
+        pool: &ThreadPool,
+        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<InDatum, DatumError> {
+        let unknowns = self.values.clone();
+        let Inverted { cofactors, prior_redundancy, lost } = self.inverted(problem, pool, between)?;
+        Ok(InDatum { unknowns, cofactors, prior_redundancy, lost: lost.unwrap_or(0.0) })
+    }
 }
 
 /// B in the rows of the carriers, and T = G (B^T G)^-1, in the columns for which B divided by the factors is orthonormal.
 struct Basis {
     b: Mat<f64>,
     t: Mat<f64>,
+    /// Of B^T G, its columns scaled.
+    condition: f64,
 }
 
 /// The basis, and how the carriers would come nearer to their references.
@@ -145,7 +197,11 @@ fn moved<M: Model>(
     let (mut before, mut stalls) = (f64::INFINITY, 0);
     for _ in 0..MOST_MOVES {
         let (motions, kept) = motions_of(problem, &unknowns, datum, pool).ok_or(DatumError::NotFree)?;
-        let open = problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?;
+        let open = if datum.relative {
+            Open::all(&motions)
+        } else {
+            problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?
+        };
         let Carried { basis, amounts, length } =
             carried(&open, datum, &unknowns, reference).ok_or(DatumError::NotCarried)?;
         stalls += usize::from(length >= 0.5 * before);
@@ -169,7 +225,9 @@ fn motions_of<M: Model>(
     datum: &Datum,
     pool: &ThreadPool,
 ) -> Option<(Motions, (Vec<usize>, usize))> {
-    let Motions { mut vectors, preferred } = pool.install(|| problem.model.motions(unknowns))?;
+    let model = &problem.model;
+    let motions = || if datum.relative { model.all_motions(unknowns) } else { model.motions(unknowns) };
+    let Motions { mut vectors, preferred } = pool.install(motions)?;
     let all = vectors.len();
     let kept: Vec<usize> = (0..all).filter(|number| !datum.left.contains(number)).collect();
     let vectors = kept.iter().map(|&number| std::mem::take(&mut vectors[number])).collect();
@@ -189,7 +247,8 @@ fn carried(open: &Open, datum: &Datum, unknowns: &[f64], reference: &[f64]) -> O
     let product = b.transpose() * &b;
     let scale: Vec<f64> = (0..d).map(|k| product[(k, k)].sqrt().recip()).collect();
     let scaled = Mat::from_fn(d, d, |i, k| product[(i, k)] * scale[i] * scale[k]);
-    let least = scaled.self_adjoint_eigenvalues(Side::Lower).ok()?.first().copied()?;
+    let eigenvalues = scaled.self_adjoint_eigenvalues(Side::Lower).ok()?;
+    let (least, most) = (*eigenvalues.first()?, *eigenvalues.last()?);
     if least.is_nan() || least <= SEPARABLE {
         return None;
     }
@@ -215,53 +274,5 @@ fn carried(open: &Open, datum: &Datum, unknowns: &[f64], reference: &[f64]) -> O
         amounts[k] = (amounts[k] - after) / r[(k, k)];
     }
     let b = Mat::from_fn(q.nrows(), d, |row, k| datum.carriers[row].1 * q[(row, k)]);
-    Some(Carried { basis: Basis { b, t }, amounts, length })
-}
-struct Transformation<'a> {
-    t: &'a Mat<f64>,
-    w: &'a Mat<f64>,
-    common: &'a Mat<f64>,
-}
-
-impl Transformation<'_> {
-    fn apply(&self, layout: &Layout, cofactors: &mut Cofactors) {
-        let l = layout.local_dim();
-        for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
-            self.block(layout.local_range(local), layout.local_range(local), block);
-        }
-        let border = layout.border_range();
-        let (mut own, mut tied) = (&mut cofactors.kept[..], &mut cofactors.kept_border[..]);
-        for kept in 0..layout.kept() {
-            let range = layout.kept_range(kept);
-            let (block, rest) = std::mem::take(&mut own).split_at_mut(range.len().pow(2));
-            self.block(range.clone(), range.clone(), block);
-            own = rest;
-            if !border.is_empty() {
-                let (block, rest) = std::mem::take(&mut tied).split_at_mut(range.len() * border.len());
-                self.block(range, border.clone(), block);
-                tied = rest;
-            }
-        }
-        if !border.is_empty() {
-            self.block(border.clone(), border, &mut cofactors.border);
-        }
-    }
-
-    /// Transforms one block of Q, row by row.
-    fn block(&self, rows: Range<usize>, columns: Range<usize>, block: &mut [f64]) {
-        let d = self.common.nrows();
-        let width = columns.len();
-        for (i, row) in rows.enumerate() {
-            let t_common: Vec<f64> =
-                (0..d).map(|k| (0..d).map(|m| self.t[(row, m)] * self.common[(m, k)]).sum()).collect();
-            for (j, column) in columns.clone().enumerate() {
-                block[i * width + j] += (0..d)
-                    .map(|k| {
-                        (t_common[k] - self.w[(row, k)]) * self.t[(column, k)]
-                            - self.t[(row, k)] * self.w[(column, k)]
-                    })
-                    .sum::<f64>();
-            }
-        }
-    }
+    Some(Carried { basis: Basis { b, t, condition: most / least }, amounts, length })
 }

@@ -53,9 +53,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod again;
 mod damped;
 mod datum;
 mod distributions;
+mod factored;
 mod loss;
 mod method;
 mod motions;
@@ -66,13 +68,15 @@ mod published;
 mod result;
 mod run;
 mod statistics;
+mod transformation;
 mod trust_region;
 mod walk;
 
-pub use datum::{Datum, DatumError, InDatum, in_datum};
+pub use datum::{Adjusted, Datum, DatumError, InDatum, in_datum};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
 };
+pub use factored::{CofactorError, Factored};
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
 pub use normal_equations::NormalEquations;

@@ -22,6 +22,19 @@ pub(super) struct Open {
     pub hold: Vec<usize>,
 }
 
+impl Open {
+    /// All motions, each by itself.
+    pub fn all(motions: &Motions) -> Self {
+        let count = motions.vectors.len();
+        let unknowns = motions.vectors.first().map_or(0, Vec::len);
+        Self {
+            combinations: Mat::identity(count, count),
+            vectors: Mat::from_fn(unknowns, count, |unknown, k| motions.vectors[k][unknown]),
+            hold: vec![],
+        }
+    }
+}
+
 /// What a combination may change of the observations, as the square of a share of what its parts change, and be rounding: the eigenvalues
 /// of a matrix of ones are good to 1e-15. Positions of photos that are observed to a hundred metres change 1e4 times as much.
 const NULL: f64 = 1e-14;

@@ -54,6 +54,11 @@ pub trait Model: Sync {
         None
     }
 
+    /// Its motions whether or not observations and weights give a datum.
+    fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        self.motions(unknowns)
+    }
+
     /// Moves the unknowns by amounts of its motions, which need not be small. By default along their vectors, which is exact where the
     /// motions are linear in the unknowns.
     fn move_along(&self, unknowns: &mut [f64], amounts: &[f64]) {

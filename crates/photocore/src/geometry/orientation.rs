@@ -2,6 +2,7 @@
 
 use nalgebra::Matrix6;
 
+use super::angle_axis::rotation_angle_axis;
 use super::attitude::{AttitudeNumbers, RotationSense};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
 use super::space::{Lift, ObjectSpace, Point};
@@ -158,15 +159,42 @@ impl Orientation {
         }
     }
 
-    /// How the six unknowns move with a step of the pose, dC, then rho: the inverse of [`Orientation::steps`]. None where angles are
-    /// singular.
-    pub fn unknowns_by_step(&self) -> Option<Matrix6<f64>> {
+    /// The steps of [`Orientation::steps`] as columns, dC, then rho.
+    pub fn step_matrix(&self) -> Matrix6<f64> {
         let mut steps = Matrix6::zeros();
         for (k, (shift, rho)) in self.steps().iter().enumerate() {
             steps.fixed_view_mut::<3, 1>(0, k).copy_from(shift);
             steps.fixed_view_mut::<3, 1>(3, k).copy_from(rho);
         }
-        steps.try_inverse()
+        steps
+    }
+
+    /// How the six unknowns move with a step of the pose, dC, then rho: the inverse of [`Orientation::steps`]. None where angles are
+    /// singular.
+    pub fn unknowns_by_step(&self) -> Option<Matrix6<f64>> {
+        self.step_matrix().try_inverse()
+    }
+
+    /// The six numbers of the pose (see [`PoseNumbers`]).
+    pub fn numbers(&self, numbers: PoseNumbers, space: ObjectSpace) -> [f64; 6] {
+        let Pose { position, attitude } = self.pose;
+        match numbers {
+            PoseNumbers::Angles(sense) => {
+                let [x, y, z] = space.coordinates(position);
+                let local = match space {
+                    ObjectSpace::Rectangular => attitude,
+                    ObjectSpace::Geographic(_) => local_vertical(x, y) * attitude,
+                };
+                let [omega, phi, kappa] = AttitudeNumbers::OmegaPhiKappa(sense).numbers(&local);
+                [x, y, z, omega, phi, kappa]
+            }
+            PoseNumbers::Vectors => {
+                let to_photo = attitude.transpose();
+                let ([a, b, c], [x, y, z]): ([f64; 3], [f64; 3]) =
+                    (rotation_angle_axis(&to_photo).into(), (-(to_photo * position)).into());
+                [a, b, c, x, y, z]
+            }
+        }
     }
 
     /// u, the point in the photo's axes.

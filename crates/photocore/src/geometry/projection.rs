@@ -73,8 +73,7 @@ impl<C: CameraModel> Photo<C> {
 
     /// The image position of a lifted point and its partials, those of the lift included.
     pub fn linearize_lifted(&self, point: &Point, lift: &Lift) -> Projection<C::Parameters> {
-        let (orientation, camera) = (self.orientation.under(lift), self.camera.clone());
-        Self { orientation, camera }.linearize(&point.lifted(lift))
+        Self { orientation: self.orientation.under(lift), camera: self.camera }.linearize(&point.lifted(lift))
     }
 
     /// The ray of an image position; None where no direction has it.

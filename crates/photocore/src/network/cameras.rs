@@ -1,7 +1,5 @@
 //! Cameras whose parameters are unknown: those of one photo are unknowns of that, those of several are blocks of their own.
 
-use std::ops::Range;
-
 use super::model::Bundle;
 use super::precision::median;
 use super::problem::Assembled;
@@ -28,10 +26,12 @@ pub struct AdjustedCamera {
 }
 
 impl Network {
-    /// The cameras with unknown parameters that several photos share, ascending.
+    /// The cameras with unknown parameters that several photos share, or one on a frame has, ascending.
     pub(super) fn shared_cameras(&self) -> Vec<usize> {
         let mut photos = vec![0; self.cameras.len()];
         self.photos.iter().for_each(|photo| photos[photo.camera] += 1);
+        // A photo on a frame has no unknowns of its own.
+        self.mounts.iter().for_each(|mount| photos[self.photos[mount.photo].camera] += 1);
         (0..photos.len()).filter(|&camera| photos[camera] > 1 && !self.cameras[camera].is_held()).collect()
     }
 
@@ -70,12 +70,8 @@ impl Network {
                 camera.take_over(photo);
             }
         }
-        let mut start = (0..model.cameras.len()).map(|photo| model.of_block(photo).len().pow(2)).sum();
         for (shared, &index) in model.shared.iter().enumerate() {
-            let range = model.of_block(model.cameras.len() + shared);
-            let count = range.len().pow(2);
-            cameras[index].take_block(range, start..start + count, adjustment, unknowns);
-            start += count;
+            cameras[index].take_block(model, model.cameras.len() + shared, adjustment, unknowns);
         }
         cameras
     }
@@ -137,11 +133,30 @@ impl Bundle {
         for (place, block) in photos.iter().zip(&self.camera_block) {
             block.iter().for_each(|block| of_cameras[block - self.cameras.len()].push(*place));
         }
-        let middle = |places: Vec<[f64; 3]>| {
-            [0, 1, 2].map(|k| median(places.iter().map(|place| place[k]).collect()).unwrap_or_default())
-        };
-        of_cameras.into_iter().map(middle).collect()
+        of_cameras.into_iter().map(|places| middle(&places)).collect()
     }
+
+    /// The places of the common unknowns that have blocks: the medians of those of the photos and points that they belong to; `tied`
+    /// are those of the points that are not local.
+    pub(super) fn places_of_commons(&self, photos: &[[f64; 3]], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let mut of_commons: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.commons.len()];
+        for mount in self.mounts.iter().flatten() {
+            of_commons[mount.sensor].push(photos[mount.photo]);
+        }
+        for touches in self.observations.iter().map(|tied| &tied.touches) {
+            let points = touches.points.iter().map(|&point| tied[point - self.locals]);
+            let places: Vec<[f64; 3]> =
+                points.chain(touches.photos.iter().map(|&photo| photos[photo])).collect();
+            touches.commons.iter().for_each(|&(common, _)| of_commons[common].extend(&places));
+        }
+        let own = of_commons.iter().zip(&self.common_block).filter(|(_, block)| block.is_some());
+        own.map(|(places, _)| middle(places)).collect()
+    }
+}
+
+/// The medians of coordinates.
+fn middle(places: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|k| median(places.iter().map(|place| place[k]).collect()).unwrap_or_default())
 }
 
 impl AdjustedCamera {
@@ -154,17 +169,12 @@ impl AdjustedCamera {
             photo.cofactors.chunks_exact(width).skip(6).flat_map(|row| &row[6..]).copied().collect();
     }
 
-    /// Takes what was found of a kept block of its own, known by its unknowns and their cofactors among those of all kept blocks.
-    fn take_block(
-        &mut self,
-        own: Range<usize>,
-        cofactors: Range<usize>,
-        adjustment: &Adjustment,
-        unknowns: &[f64],
-    ) {
+    /// Takes what was found of a kept block of its own.
+    fn take_block(&mut self, model: &Bundle, block: usize, adjustment: &Adjustment, unknowns: &[f64]) {
+        let own = model.of_block(block);
         self.parameters = unknowns[own.clone()].to_vec();
         if let Some(all) = &adjustment.cofactors {
-            self.cofactors = all.kept[cofactors].to_vec();
+            self.cofactors = model.cofactors_of_block(all, block).to_vec();
         }
         if let Some(all) = &adjustment.prior_redundancy {
             self.redundancy = all[own].to_vec();

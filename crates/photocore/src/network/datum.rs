@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::Vector6;
 
+use super::commons::Motion;
 use super::model::Bundle;
 use super::problem::Assembled;
 use crate::adjustment::{Datum, Motions};
@@ -40,6 +41,7 @@ fn displacement(k: usize, from: &Vector3) -> Vector3 {
 impl Bundle {
     /// The photo that the user has placed or, where there is none, that with most images among those of the largest part, photos hanging
     /// together by their points; and its part. None without images.
+    /// A frame has the images of all photos on it.
     fn central_photo(&self) -> Option<(usize, Vec<usize>)> {
         let mut part: Vec<usize> = (0..self.images_on.len()).collect();
         fn root(part: &mut [usize], mut photo: usize) -> usize {
@@ -51,12 +53,14 @@ impl Bundle {
         }
         for point in 0..self.points.len() {
             for pair in self.images_of(point).windows(2) {
-                let [a, b] = [0, 1].map(|k| root(&mut part, pair[k].photo));
+                let [a, b] = [0, 1].map(|k| root(&mut part, self.carrier(pair[k].photo)));
                 part[a.max(b)] = a.min(b);
             }
         }
+        let mut images_on = vec![0; part.len()];
+        self.images_on.iter().enumerate().for_each(|(photo, n)| images_on[self.carrier(photo)] += n);
         let mut photos = vec![vec![]; part.len()];
-        for photo in (0..part.len()).filter(|&photo| self.images_on[photo] > 0) {
+        for photo in (0..part.len()).filter(|&photo| images_on[photo] > 0) {
             photos[root(&mut part, photo)].push(photo);
         }
         let first_longest =
@@ -69,15 +73,16 @@ impl Bundle {
         let central = largest
             .iter()
             .copied()
-            .reduce(|best, next| if self.images_on[next] > self.images_on[best] { next } else { best })?;
+            .reduce(|best, next| if images_on[next] > images_on[best] { next } else { best })?;
         Some((central, largest))
     }
 
     /// The motions of a free network about the central photo, whose pose is held first, and for the scale the coordinate of another
     /// in which the two are farthest apart.
     pub(super) fn rigid_motions(&self, unknowns: &[f64]) -> Option<Motions> {
-        let photos = self.photos(&unknowns[self.of_stations()]);
-        let (central, part) = self.central_photo().filter(|_| !self.placed)?;
+        let placed = self.placed(&unknowns[self.of_stations()]);
+        let photos = &placed.photos;
+        let (central, part) = self.central_photo()?;
         let origin = photos[central].orientation.centre();
         let mut vectors = vec![vec![0.0; unknowns.len()]; MOTIONS];
         for (point, &at) in self.coordinates(unknowns).enumerate() {
@@ -92,7 +97,7 @@ impl Bundle {
                 vector[self.of_point(point)].copy_from_slice(moved.as_slice());
             }
         }
-        for (photo, station) in photos.iter().enumerate() {
+        for (photo, station) in photos.iter().enumerate().filter(|&(photo, _)| self.mount(photo).is_none()) {
             let by_step = station.orientation.unknowns_by_step()?;
             let pose = station.orientation.pose();
             for (k, vector) in vectors.iter_mut().enumerate() {
@@ -102,6 +107,13 @@ impl Bundle {
                 let moved = by_step * Vector6::new(shift.x, shift.y, shift.z, rho.x, rho.y, rho.z);
                 vector[self.of_block(photo)][..6].copy_from_slice(moved.as_slice());
             }
+        }
+        for (k, vector) in vectors.iter_mut().enumerate() {
+            let turn = if (3..6).contains(&k) { Vector3::ith(k - 3, 1.0) } else { Vector3::zeros() };
+            let scale = if k == SCALE { 2.0 } else { 1.0 };
+            let displacement = |place: &Vector3| displacement(k, &(place - origin));
+            let motion = Motion { displacement: &displacement, turn, scale };
+            self.move_commons(&placed, &motion, |common, state| common.change(state, &motion), vector);
         }
         let shifts = part.iter().filter(|&&photo| photo != central).flat_map(|&photo| {
             let shift = photos[photo].orientation.shifts_along(&origin);
@@ -116,19 +128,24 @@ impl Bundle {
 
     /// Moves the network as a whole, exactly: P -> o + e^s Exp(w) (P - o) + e, o being the centre of the central photo.
     pub(super) fn move_rigidly(&self, unknowns: &mut [f64], amounts: &[f64]) {
-        let photos = self.photos(&unknowns[self.of_stations()]);
+        let placed = self.placed(&unknowns[self.of_stations()]);
+        let photos = &placed.photos;
         let Some((central, _)) = self.central_photo() else { return };
         let origin = photos[central].orientation.centre();
         let shift = Vector3::new(amounts[0], amounts[1], amounts[2]);
         let turn = angle_axis_rotation(&Vector3::new(amounts[3], amounts[4], amounts[5]));
         let scale = amounts[SCALE].exp();
         let moved = |place: Vector3| origin + scale * (turn * (place - origin)) + shift;
+        let displacement = |place: &Vector3| moved(*place) - place;
+        let rotation = Vector3::new(amounts[3], amounts[4], amounts[5]);
+        let motion = Motion { displacement: &displacement, turn: rotation, scale };
+        self.move_commons(&placed, &motion, |common, state| common.moved(state, &motion), unknowns);
         let places =
             self.coordinates(unknowns).map(|&at| self.space.coordinates(moved(self.space.cartesian(at))));
         for (point, at) in places.collect::<Vec<[f64; 3]>>().into_iter().enumerate() {
             unknowns[self.of_point(point)].copy_from_slice(&at);
         }
-        for (photo, station) in photos.iter().enumerate() {
+        for (photo, station) in photos.iter().enumerate().filter(|&(photo, _)| self.mount(photo).is_none()) {
             let pose = &mut unknowns[self.of_block(photo)][..6];
             let (centre, attitude) =
                 (moved(station.orientation.centre()), turn * station.orientation.pose().attitude);
@@ -176,6 +193,12 @@ impl Assembled {
             [0, 1, 2].map(|k| (first + k, partials.column(k).norm()))
         };
         let carriers = points.chain(photos).flat_map(lengths).collect();
-        (Datum { carriers, left: if inner.scale { vec![] } else { vec![SCALE] } }, reference)
+        let left = if inner.scale { vec![] } else { vec![SCALE] };
+        (Datum { carriers, left, relative: false }, reference)
+    }
+
+    /// The datum in which cofactors are relative to some unknowns, scale staying as it is.
+    pub(super) fn relative(&self, carriers: Vec<(usize, f64)>) -> Datum {
+        Datum { carriers, left: vec![SCALE], relative: true }
     }
 }

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::model::Owner;
 use super::observations::Fault;
 use super::precision::Coarse;
 use super::problem::Assembled;
@@ -17,9 +18,40 @@ pub enum NetworkError {
     /// A photo names a camera that is not there.
     #[error("photo {0} names a camera that is not there")]
     NoCamera(usize),
+    /// There is no photo of this index.
+    #[error("there is no photo {0}")]
+    NoPhoto(usize),
+    /// There is no point of this index.
+    #[error("there is no point {0}")]
+    NoPoint(usize),
+    /// There is no camera of this index.
+    #[error("there is no camera {0}")]
+    CameraIndex(usize),
+    /// The point took no part in the adjustment.
+    #[error("point {0} was left out of the adjustment")]
+    LeftOut(usize),
+    /// Partials that are not those of functions of the unknowns.
+    #[error("{numbers} partials are not rows of {unknowns}, as many as there are unknowns")]
+    Partials {
+        /// How many unknowns there are.
+        unknowns: usize,
+        /// How many partials.
+        numbers: usize,
+    },
+    /// The state is not that of an adjustment of this network.
+    #[error("the adjusted state is not of this network")]
+    State,
     /// A camera has more or fewer standard deviations than parameters.
     #[error("camera {0} has not as many standard deviations as parameters")]
     CameraDeviations(usize),
+    /// A common unknown has more or fewer standard deviations than unknowns.
+    #[error("common unknown {0} has not as many standard deviations as unknowns")]
+    CommonDeviations(usize),
+    /// A photo that is mounted twice, on itself, on a photo that is mounted, or names a photo or sensor that is not there.
+    #[error(
+        "mount {0} names a photo or sensor that is not there, or a photo that is mounted twice or has others mounted on it"
+    )]
+    Mount(usize),
     /// A constant of a camera has a standard deviation.
     #[error(
         "{parameter} of camera {camera} is a constant and cannot be free or weighted: its standard deviation is 0"
@@ -90,6 +122,8 @@ pub struct Combination {
     pub photos: Vec<usize>,
     /// Cameras that several photos share.
     pub cameras: Vec<usize>,
+    /// Common unknowns.
+    pub commons: Vec<usize>,
 }
 
 impl NetworkError {
@@ -112,13 +146,14 @@ impl NetworkError {
     /// Combinations of kept blocks: those that move photos and cameras by these, else the points that they move.
     fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
         let model = &assembled.problem.model;
-        let (photos, stations) = (model.cameras.len(), model.stations());
+        let stations = model.stations();
         let of_stations = |blocks: &Vec<usize>| {
             let mut found = Combination::default();
             for &block in blocks.iter().filter(|&&block| block < stations) {
-                match block.checked_sub(photos) {
-                    None => found.photos.push(block),
-                    Some(shared) => found.cameras.push(model.shared[shared]),
+                match model.owner(block) {
+                    Owner::Photo(photo) => found.photos.push(photo),
+                    Owner::Camera(camera) => found.cameras.push(camera),
+                    Owner::Common(common) => found.commons.push(common),
                 }
             }
             (found != Combination::default()).then_some(found)

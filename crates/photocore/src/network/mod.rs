@@ -40,6 +40,8 @@
 //!     points: corners.map(|coordinates| Point { coordinates, sd: [0.02; 3] }).to_vec(),
 //!     images,
 //!     observations: vec![],
+//!     commons: vec![],
+//!     mounts: vec![],
 //! };
 //! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
 //! let solution = network.adjust(&Options::default(), &pool, &mut |_| ControlFlow::Continue(()))?;
@@ -52,9 +54,12 @@
 //! ```
 
 mod cameras;
+pub mod commons;
+mod covariance;
 mod datum;
 mod error;
 mod model;
+mod mounts;
 mod neighbourhood;
 pub mod observations;
 mod precision;
@@ -73,8 +78,11 @@ use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
 pub use cameras::AdjustedCamera;
+pub use commons::{AdjustedCommon, Common, CommonKind};
+pub use covariance::{Covariances, NetworkDatum, Of, State};
 pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError};
+pub use mounts::Mount;
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub(crate) use precision::median;
@@ -165,6 +173,10 @@ pub struct Network {
     pub images: Vec<Image>,
     /// What else was observed.
     pub observations: Vec<Observation>,
+    /// Unknowns that observations, and the photos of rigs, have in common.
+    pub commons: Vec<Common>,
+    /// Which photos are on a frame with others.
+    pub mounts: Vec<Mount>,
 }
 
 /// What the variance of unit weight is based on (GIANT guide, Appendix E).
@@ -270,10 +282,7 @@ impl Network {
             let reached = before.as_ref().map(|(_, reached)| reached);
             let assembled = pool.install(|| self.assemble(options, screened, reached))?;
             let problem = &assembled.problem;
-            let needed = problem.system.memory();
-            if let Some(available) = options.memory.filter(|&available| needed > available) {
-                return Err(NetworkError::Memory { needed, available });
-            }
+            assembled.check_memory(options)?;
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
@@ -282,11 +291,16 @@ impl Network {
             let earlier = before.take();
             adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
             if adjusted.collapsed.is_empty() {
+                let mut lost = 0.0;
                 if let Some(inner) = datum {
-                    self.take_to(inner, &options.adjustment, &assembled, &mut adjusted, pool, watch)?;
+                    lost =
+                        self.take_to(inner, &options.adjustment, &assembled, &mut adjusted, pool, watch)?;
                 }
                 let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
-                return Ok(Solution::new(self, options, &assembled, adjusted, collapsed));
+                let mut solution = Solution::new(self, options, &assembled, adjusted, collapsed);
+                solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
+                solution.lost_digits = lost;
+                return Ok(solution);
             }
             adjusted.collapsed.iter().for_each(|&point| left_out[assembled.points[point]] = true);
             let reached = assembled.reached(&adjusted.unknowns, self.points.len());
@@ -294,7 +308,13 @@ impl Network {
         }
     }
 
-    /// Takes an adjusted network to the datum of inner constraints.
+    /// Refuses photos that cannot carry a datum.
+    fn check_carriers(&self, inner: &InnerConstraints) -> Result<(), NetworkError> {
+        let vectors = self.poses == PoseNumbers::Vectors && !inner.photos.is_empty();
+        if vectors { Err(NetworkError::Vectors) } else { Ok(()) }
+    }
+
+    /// Takes an adjusted network to the datum of inner constraints; returns how large a part of its variances may be rounding.
     fn take_to(
         &self,
         inner: &InnerConstraints,
@@ -303,10 +323,8 @@ impl Network {
         adjusted: &mut Adjustment,
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<(), NetworkError> {
-        if self.poses == PoseNumbers::Vectors && !inner.photos.is_empty() {
-            return Err(NetworkError::Vectors);
-        }
+    ) -> Result<f64, NetworkError> {
+        self.check_carriers(inner)?;
         let (datum, reference) = assembled.datum(inner);
         let total = assembled.points.len();
         let mut between = |done| watch(Event::Progress { phase: adjustment::Phase::Invert, done, total });
@@ -314,7 +332,7 @@ impl Network {
         let found = adjustment::in_datum(problem, options, adjusted, &datum, &reference, pool, &mut between)?;
         adjusted.unknowns = found.unknowns;
         adjusted.cofactors = Some(found.cofactors);
-        Ok(())
+        Ok(found.lost)
     }
 
     /// Refuses a network that contradicts itself.
@@ -339,8 +357,14 @@ impl Network {
                 return Err(NetworkError::CameraConstant { camera: index, parameter: known[free].0 });
             }
         }
+        for (index, common) in self.commons.iter().enumerate() {
+            if common.sd.len() != common.kind.unknowns().len() {
+                return Err(NetworkError::CommonDeviations(index));
+            }
+        }
+        self.check_mounts()?;
         for (index, observation) in self.observations.iter().enumerate() {
-            let checked = observation.check(self.points.len(), self.photos.len());
+            let checked = observation.check(self.points.len(), self.photos.len(), &self.commons);
             checked.map_err(|fault| NetworkError::Observation { index, kind: observation.kind(), fault })?;
         }
         let cartesian = self.space == ObjectSpace::Rectangular && self.refraction.is_none();

@@ -2,9 +2,12 @@
 
 use std::ops::Range;
 
+use nalgebra::Matrix2x6;
 use rayon::prelude::*;
 
-use super::observations::{TiedModel, TiedObservation};
+use super::commons::{CommonState, PlacedCommon};
+use super::mounts::{Mount, Mounted, mounted};
+use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::{Image, Point};
 use crate::adjustment::{Model, Motions, Weighted};
 use crate::geometry::camera::each_camera;
@@ -12,11 +15,11 @@ use crate::geometry::{
     self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
     RotationSense, Vector3, Vertical,
 };
-use crate::normals::{GroupRows, Tie, TieRows};
+use crate::normals::{Cofactors, GroupRows, Tie, TieRows};
 
 /// Images of points by photos, and other observations of these: the local blocks are the points that no such observation touches, the
 /// kept blocks the photos with their pose and, unless it is held or shared, their camera, then the cameras that several photos share,
-/// then all other points. The images of these are ties, and so are the observations, in this order.
+/// then common unknowns, then all other points. The images of these are ties, and so are the observations, in this order.
 #[derive(Debug)]
 pub struct Bundle {
     pub space: ObjectSpace,
@@ -26,12 +29,22 @@ pub struct Bundle {
     /// Of each photo, with the parameters that it starts from.
     pub cameras: Vec<Camera>,
     /// The unknowns of kept block i are `first[i]..first[i + 1]` of the kept ones: photos (six of the pose, then those of a camera of
-    /// their own), then shared cameras.
+    /// their own; six that are held where it is mounted), then shared cameras, then common unknowns.
     pub first: Vec<usize>,
+    /// Where the cofactors of each of these blocks start among those of all kept ones.
+    pub squares: Vec<usize>,
     /// The cameras that several photos share, as the network numbers them.
     pub shared: Vec<usize>,
     /// The kept block of each photo's camera where that is shared.
     pub camera_block: Vec<Option<usize>>,
+    /// The common unknowns.
+    pub commons: Vec<PlacedCommon>,
+    /// The kept block of each, unless it is known.
+    pub common_block: Vec<Option<usize>>,
+    /// How many observations and images that take part are of each.
+    pub uses_of_commons: Vec<usize>,
+    /// The mount of each photo; none at all where there are no rigs.
+    pub mounts: Vec<Option<Mount>>,
     /// What coordinates are counted from.
     pub origin: [f64; 3],
     /// The points, local ones first; coordinates counted from the origin.
@@ -63,7 +76,32 @@ pub struct Stations {
     pub points: Vec<geometry::Point>,
     /// The coordinates of the points that are not local.
     tied: Vec<[f64; 3]>,
+    pub commons: Vec<CommonState>,
+    bent: Option<Bent>,
+}
+
+/// What images need besides where they are not plain.
+#[derive(Debug)]
+struct Bent {
     refracted: Option<Refracted>,
+    /// By photo; none at all where there are no rigs.
+    mounted: Vec<Option<Mounted>>,
+}
+
+/// Photos and common unknowns at given values.
+pub struct Placed {
+    pub photos: Vec<Station>,
+    pub commons: Vec<CommonState>,
+    /// By photo; none at all where there are no rigs.
+    pub mounted: Vec<Option<Mounted>>,
+}
+
+/// What a kept block belongs to: indices into the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Owner {
+    Photo(usize),
+    Camera(usize),
+    Common(usize),
 }
 
 /// A photo at given values of its unknowns.
@@ -89,15 +127,53 @@ struct Refracted {
 }
 
 impl Refracted {
-    /// Out of line, so that images without refraction do not pay for it.
-    #[inline(never)]
-    fn write(&self, stations: &Stations, image: &Image, local: usize, rows: &mut GroupRows<'_>) {
-        let Station { orientation, camera } = &stations.photos[image.photo];
+    /// The orientation and the place of a point as its image has them.
+    fn lifted(&self, stations: &Stations, image: &Image, local: usize) -> (Orientation, geometry::Point) {
+        let Station { orientation, .. } = &stations.photos[image.photo];
         let (from, to) = (&self.at_photos[image.photo], &self.at_points[local]);
         let point = &stations.points[local];
         let lift = self.refraction.lift(orientation, from, point, to);
-        let (lifted, point) = (orientation.under(&lift), point.lifted(&lift));
-        each_camera!(camera, camera => write_in_its_place(&lifted, camera, &point, image, rows));
+        (orientation.under(&lift), point.lifted(&lift))
+    }
+}
+
+impl Bent {
+    /// Out of line, so that plain images do not pay for it.
+    #[inline(never)]
+    fn write(&self, stations: &Stations, image: &Image, local: usize, rows: &mut GroupRows<'_>) {
+        let Station { orientation, camera } = &stations.photos[image.photo];
+        let (orientation, point) = match &self.refracted {
+            None => (*orientation, stations.points[local]),
+            Some(refracted) => refracted.lifted(stations, image, local),
+        };
+        let write = |rows: &mut GroupRows<'_>| {
+            each_camera!(camera, camera => write_in_its_place(&orientation, camera, &point, image, rows));
+        };
+        match self.mounted.get(image.photo).and_then(Option::as_ref) {
+            None => write(rows),
+            Some(mounted) => mounted.write(rows, write),
+        }
+    }
+}
+
+impl Mounted {
+    /// Writes an image of its photo: `write` does so as if the photo had six unknowns of its own. They are those of the frame, the main
+    /// block, and of the sensor, the first of what is common with others where it is as wide as there is room besides the camera.
+    fn write(&self, rows: &mut GroupRows<'_>, write: impl FnOnce(&mut GroupRows<'_>)) {
+        let (width, common) = (rows.kept.len() / 2, rows.common.len() / 2);
+        let sensor = if self.sensor_is_unknown { 6 } else { 0 };
+        let (mut pose, mut camera) = ([0.0; 12], vec![0.0; 2 * (common - sensor)]);
+        let (constant, local) = (&mut *rows.constant, &mut *rows.local);
+        write(&mut GroupRows { constant, local, kept: &mut pose, common: &mut camera });
+        let pose = Matrix2x6::from_row_slice(&pose);
+        let (by_frame, by_sensor) = (pose * self.by_frame, pose * self.by_sensor);
+        rows.kept.fill(0.0);
+        for row in 0..2 {
+            (0..6).for_each(|k| rows.kept[width * row + k] = by_frame[(row, k)]);
+            let own = &mut rows.common[common * row..][..common];
+            (0..sensor).for_each(|k| own[k] = by_sensor[(row, k)]);
+            own[sensor..].copy_from_slice(&camera[(common - sensor) * row..][..common - sensor]);
+        }
     }
 }
 
@@ -194,18 +270,18 @@ impl Shares {
 }
 
 impl Bundle {
-    /// The unknowns that are those of photos and shared cameras, of all.
+    /// The unknowns that are those of photos, shared cameras and common unknowns, of all.
     pub fn of_stations(&self) -> Range<usize> {
         let start = 3 * self.locals;
         start..start + self.first[self.stations()]
     }
 
-    /// Number of photos and shared cameras: the first kept blocks.
+    /// Number of photos, shared cameras and common unknowns: the first kept blocks.
     pub fn stations(&self) -> usize {
         self.first.len() - 1
     }
 
-    /// The unknowns of a photo or shared camera, of all.
+    /// The unknowns of a photo, shared camera or common unknown, of all.
     pub fn of_block(&self, block: usize) -> Range<usize> {
         let start = 3 * self.locals;
         start + self.first[block]..start + self.first[block + 1]
@@ -231,22 +307,44 @@ impl Bundle {
 
     /// The ties: images of points that are not local, then observations.
     pub fn ties(&self) -> Vec<Tie> {
-        let block = |&point: &usize| (self.stations() + point - self.locals) as u32;
         let images = self.images[self.start[self.locals]..].iter().enumerate().map(|(tie, image)| {
             let point = self.point_of(self.start[self.locals] + tie);
-            let camera = self.camera_block[image.photo].map(|block| block as u32);
-            Tie {
-                rows: 2,
-                kept: [block(&point), image.photo as u32].into_iter().chain(camera).collect(),
-                border: 0..0,
-            }
+            let others = self.blocks_of_pose(image.photo).chain(self.camera_block[image.photo]);
+            let blocks = std::iter::once(self.block_of_point(point)).chain(others);
+            Tie { rows: 2, kept: blocks.map(|block| block as u32).collect(), border: 0..0 }
         });
         let observations = self.observations.iter().map(|tied| Tie {
             rows: tied.root.nrows(),
-            kept: tied.points.iter().map(block).chain(tied.photos.iter().map(|&i| i as u32)).collect(),
+            kept: tied.blocks.iter().map(|&block| block as u32).collect(),
             border: 0..0,
         });
         images.chain(observations).collect()
+    }
+
+    /// The kept block of a point that is not local.
+    fn block_of_point(&self, point: usize) -> usize {
+        self.stations() + point - self.locals
+    }
+
+    /// How many unknowns a kept block has.
+    fn width(&self, block: usize) -> usize {
+        if block < self.stations() { self.of_block(block).len() } else { 3 }
+    }
+
+    /// The further kept blocks of an image: sensor, then camera.
+    pub fn further(&self, image: &Image) -> impl Iterator<Item = usize> {
+        self.blocks_of_pose(image.photo).skip(1).chain(self.camera_block[image.photo])
+    }
+
+    /// The kept blocks of what an observation touches, each once; points as the model numbers them.
+    pub fn blocks_of(&self, touches: &Touches) -> Vec<usize> {
+        let points = touches.points.iter().map(|&point| self.block_of_point(point));
+        let photos = touches.photos.iter().flat_map(|&photo| self.blocks_of_pose(photo));
+        let commons = touches.commons.iter().filter_map(|&(common, _)| self.common_block[common]);
+        let mut blocks: Vec<usize> = points.chain(photos).chain(commons).collect();
+        blocks.sort_unstable();
+        blocks.dedup();
+        blocks
     }
 
     /// How many ties are images.
@@ -262,7 +360,7 @@ impl Bundle {
     /// Writes the equations of an image whose point is not local.
     fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut TieRows<'_>) {
         let all = rows.coefficients.len() / 2;
-        let width = self.of_block(self.images[image].photo).len();
+        let width = self.of_block(self.carrier(self.images[image].photo)).len();
         let shared = all - 3 - width;
         let (mut local, mut kept, mut common) = ([0.0; 6], vec![0.0; 2 * width], vec![0.0; 2 * shared]);
         let constant = &mut *rows.constant;
@@ -275,8 +373,8 @@ impl Bundle {
         }
     }
 
-    /// The photos at given values of the unknowns of photos and shared cameras.
-    pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
+    /// Photos and common unknowns at given values of the unknowns of photos, shared cameras and common unknowns.
+    pub fn placed(&self, unknowns: &[f64]) -> Placed {
         let photo = |photo: usize| {
             let (pose, camera) = unknowns[self.first[photo]..self.first[photo + 1]].split_at(6);
             let pose = std::array::from_fn(|k| pose[k]);
@@ -287,7 +385,48 @@ impl Bundle {
                 camera: own.with_parameters(camera).unwrap_or(own),
             }
         };
-        (0..self.cameras.len()).map(photo).collect()
+        let mut photos: Vec<Station> = (0..self.cameras.len()).map(photo).collect();
+        let commons = self.common_states(unknowns);
+        let mut on_frames = vec![None; self.mounts.len()];
+        for mount in self.mounts.iter().flatten() {
+            let frame = photos[mount.frame].orientation;
+            let unknown = self.common_block[mount.sensor].is_some();
+            let (orientation, own) = mounted(self.space, &frame, &commons[mount.sensor], unknown);
+            photos[mount.photo].orientation = orientation;
+            on_frames[mount.photo] = Some(own);
+        }
+        Placed { photos, commons, mounted: on_frames }
+    }
+
+    /// The photos alone.
+    pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
+        self.placed(unknowns).photos
+    }
+
+    /// The common unknowns at given values of the same unknowns.
+    pub fn common_states(&self, unknowns: &[f64]) -> Vec<CommonState> {
+        let values = |block: Option<usize>| {
+            block.map_or(&[] as &[f64], |block| &unknowns[self.first[block]..self.first[block + 1]])
+        };
+        self.commons.iter().zip(&self.common_block).map(|(common, &block)| common.at(values(block))).collect()
+    }
+
+    /// What a photo's, shared camera's or common unknown's block belongs to.
+    pub fn owner(&self, block: usize) -> Owner {
+        let (photos, cameras) = (self.cameras.len(), self.shared.len());
+        if block < photos {
+            Owner::Photo(block)
+        } else if block < photos + cameras {
+            Owner::Camera(self.shared[block - photos])
+        } else {
+            let own = self.common_block.iter().position(|&own| own == Some(block));
+            Owner::Common(own.unwrap_or_default())
+        }
+    }
+
+    /// The cofactors of such a block.
+    pub fn cofactors_of_block<'a>(&self, all: &'a Cofactors, block: usize) -> &'a [f64] {
+        &all.kept[self.squares[block]..self.squares[block + 1]]
     }
 
     /// The orientation of a photo, its pose given, with the columns of its unknowns.
@@ -300,6 +439,21 @@ impl Bundle {
             }
             None => Orientation::new(self.poses, self.space, pose),
         }
+    }
+
+    /// The verticals at the photos; `unknowns` are those of all stations.
+    fn verticals_at_photos(
+        &self,
+        refraction: &Refraction,
+        unknowns: &[f64],
+        photos: &[Station],
+    ) -> Vec<Vertical> {
+        let place = |(photo, station): (usize, &Station)| match self.mount(photo) {
+            None => std::array::from_fn(|k| unknowns[self.first[photo] + k]),
+            Some(_) => self.space.coordinates(station.orientation.centre()),
+        };
+        let places = photos.iter().enumerate().map(place);
+        places.map(|place: [f64; 3]| refraction.vertical(self.space, place)).collect()
     }
 
     /// The sense of the angles of a photo that steps by a rotation vector; None for all others.
@@ -369,24 +523,23 @@ impl Model for Bundle {
         let photos = &unknowns[self.of_stations()];
         let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
         let tied = tied.as_chunks().0.to_vec();
+        let Placed { photos: stations, commons, mounted } = self.placed(photos);
         let refracted = self.refraction.map(|refraction| Refracted {
             refraction,
-            at_photos: verticals(
-                &refraction,
-                self.space,
-                self.first[..self.cameras.len()].iter().map(|&i| &photos[i..]),
-            ),
+            at_photos: self.verticals_at_photos(&refraction, photos, &stations),
             at_points: verticals(
                 &refraction,
                 self.space,
                 local.chunks(3).chain(tied.as_flattened().chunks(3)),
             ),
         });
+        let plain = refracted.is_none() && mounted.is_empty();
+        let bent = (!plain).then_some(Bent { refracted, mounted });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
         let mut points: Vec<geometry::Point> =
             local.as_chunks().0.par_iter().with_min_len(1024).map(place).collect();
         points.extend(tied.iter().map(place));
-        Stations { photos: self.photos(photos), points, tied, refracted }
+        Stations { photos: stations, points, tied, commons, bent }
     }
 
     /// Angles of photos that step by a rotation vector go by way of their matrix.
@@ -419,13 +572,13 @@ impl Model for Bundle {
     #[inline(always)]
     fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let image = &self.images[group];
-        match &stations.refracted {
+        match &stations.bent {
             None => {
                 let Station { orientation, camera } = &stations.photos[image.photo];
                 let point = &stations.points[local];
                 each_camera!(camera, camera => write_in_its_place(orientation, camera, point, image, rows));
             }
-            Some(refracted) => refracted.write(stations, image, local, rows),
+            Some(bent) => bent.write(stations, image, local, rows),
         }
     }
 
@@ -433,9 +586,30 @@ impl Model for Bundle {
         let Some(observation) = tie.checked_sub(self.tied_images()) else {
             return self.observe_tied_image(stations, self.start[self.locals] + tie, rows);
         };
-        let point = |point: usize| (stations.points[point], stations.tied[point - self.locals]);
-        let photo = |photo: usize| (&stations.photos[photo].orientation, self.of_block(photo).len());
-        let model = TiedModel { space: self.space, origin: self.origin, point: &point, photo: &photo };
+        let point = |point: usize| PointSite {
+            point: stations.points[point],
+            coordinates: stations.tied[point - self.locals],
+            block: self.block_of_point(point),
+        };
+        let mounted = |photo: usize| {
+            let own = stations.bent.as_ref()?.mounted.get(photo)?.as_ref()?;
+            Some((own, self.blocks_of_pose(photo).nth(1)))
+        };
+        let photo = |photo: usize| PhotoSite {
+            orientation: &stations.photos[photo].orientation,
+            block: self.carrier(photo),
+            mounted: mounted(photo),
+        };
+        let common =
+            |common: usize| CommonSite { state: &stations.commons[common], block: self.common_block[common] };
+        let model = TiedModel {
+            space: self.space,
+            origin: self.origin,
+            point: &point,
+            photo: &photo,
+            common: &common,
+            width: &|block| self.width(block),
+        };
         self.observations[observation].write(&model, rows.constant, rows.coefficients);
     }
 
@@ -451,6 +625,10 @@ impl Model for Bundle {
     }
 
     fn motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        if self.placed { None } else { self.rigid_motions(unknowns) }
+    }
+
+    fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
         self.rigid_motions(unknowns)
     }
 

@@ -1,18 +1,22 @@
 //! The least-squares problem of a network: points are local blocks of three, photos kept blocks of six and their own cameras', cameras
-//! that several photos share blocks of their own; points that observations touch are kept blocks of three.
+//! that several photos share and common unknowns blocks of their own; points that observations touch are kept blocks of three.
 
 use std::collections::HashMap;
 
+use super::commons::PlacedCommon;
 use super::model::{Bundle, Station};
-use super::observations::{Fault, Observation, TiedObservation};
+use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
-use super::{Camera, Image, Network, NetworkError, Options, Photo, Point, Start};
+use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start};
 use crate::adjustment::{Method, Model, Problem};
-use crate::geometry::{ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, nearest_turns};
+use crate::geometry::{
+    Matrix3, ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, local_vertical, nearest_turns,
+};
 use crate::normals::{Layout, System, TieRows};
 
 /// A problem, and what its parts are in the network.
+#[derive(Debug)]
 pub(super) struct Assembled {
     pub problem: Problem<Bundle>,
     /// The points that take part, in the order of the model.
@@ -28,6 +32,15 @@ pub(super) struct Reached {
 }
 
 impl Assembled {
+    /// Refuses what takes more memory than it may.
+    pub fn check_memory(&self, options: &Options) -> Result<(), NetworkError> {
+        let needed = self.problem.system.memory();
+        match options.memory {
+            Some(available) if needed > available => Err(NetworkError::Memory { needed, available }),
+            _ => Ok(()),
+        }
+    }
+
     /// Takes over adjusted unknowns; `count` is the number of all points.
     pub fn reached(&self, unknowns: &[f64], count: usize) -> Reached {
         let model = &self.problem.model;
@@ -64,24 +77,29 @@ impl Network {
         &self.cameras[photo.camera]
     }
 
-    /// Standard deviations of the unknowns of photos and shared cameras; those of `unused` photos, and of cameras that have no others,
-    /// are held.
+    /// Standard deviations of the unknowns of photos, shared cameras and common unknowns; those of `unused` and of mounted photos, of
+    /// cameras that have no others, and of common unknowns that nothing which takes part is of, are held.
     fn station_sd(&self, model: &Bundle, unused: impl Fn(usize) -> bool) -> Vec<f64> {
         let mut all = Vec::new();
         let mut used = vec![false; self.cameras.len()];
         for (index, photo) in self.photos.iter().enumerate() {
             let own = if model.has_own_camera(index) { &self.camera(photo).sd[..] } else { &[] };
-            let held = unused(index);
-            used[photo.camera] |= !held;
+            used[photo.camera] |= !unused(index);
+            let held = unused(index) || model.mount(index).is_some();
             all.extend(photo.sd.iter().chain(own).map(|&sd| if held { 0.0 } else { sd }));
         }
         for &camera in &model.shared {
             all.extend(self.cameras[camera].sd.iter().map(|&sd| if used[camera] { sd } else { 0.0 }));
         }
+        for (common, own) in self.commons.iter().enumerate().filter(|&(i, _)| model.common_block[i].is_some())
+        {
+            let is_used = model.uses_of_commons[common] > 0;
+            all.extend(own.sd.iter().map(|&sd| if is_used { sd } else { 0.0 }));
+        }
         all
     }
 
-    /// The values of the unknowns of photos, with the given poses, and of shared cameras.
+    /// The values of the unknowns of photos, with the given poses, of shared cameras and common unknowns.
     fn station_values(&self, model: &Bundle, pose: impl Fn(&Photo) -> [f64; 6]) -> Vec<f64> {
         let mut all = Vec::new();
         for (index, photo) in self.photos.iter().enumerate() {
@@ -91,6 +109,8 @@ impl Network {
             }
         }
         all.extend(model.shared.iter().flat_map(|&camera| self.cameras[camera].camera.parameters()));
+        // They count from what is given.
+        all.resize(model.of_stations().len(), 0.0);
         all
     }
 
@@ -122,7 +142,10 @@ impl Network {
     ) -> Result<Assembled, NetworkError> {
         let mut images_on = vec![0; self.photos.len()];
         screened.images.order.iter().for_each(|&image| images_on[self.images[image].photo] += 1);
-        let unused = |photo: usize| options.hold_unused && images_on[photo] == 0;
+        // A frame is used when a photo on it is.
+        let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
+        self.mounts.iter().for_each(|mount| used[mount.frame] |= images_on[mount.photo] > 0);
+        let unused = |photo: usize| options.hold_unused && !used[photo];
         if reached.is_none() {
             self.check_rounding(&screened, |photo| !unused(photo))?;
         }
@@ -142,7 +165,8 @@ impl Network {
             || self.station_values(&model, |photo| local(photo.pose)),
             |reached| reached.stations.clone(),
         );
-        let stations = model.photos(&values);
+        let placed = model.placed(&values);
+        let stations = placed.photos;
         let start = match reached {
             Some(reached) => screened.points.iter().map(|&point| reached.points[point]).collect(),
             None => self.start(options.start, &screened, &model, &stations)?,
@@ -162,7 +186,9 @@ impl Network {
         let centres: Vec<[f64; 3]> =
             stations.iter().map(|station| station.orientation.centre().into()).collect();
         let cameras = model.places_of_cameras(&centres);
-        let places = [centres, cameras, tied.map(Into::into).collect()].concat();
+        let tied: Vec<[f64; 3]> = tied.map(Into::into).collect();
+        let commons = model.places_of_commons(&centres, &tied);
+        let places = [centres, cameras, commons, tied].concat();
         let of_images = model.images.iter().flat_map(|image| image.sd);
         let of_ties = model.observations.iter().flat_map(|tied| vec![1.0; tied.root.nrows()]);
         let problem = Problem {
@@ -221,11 +247,30 @@ impl Network {
         for &camera in &shared {
             first.push(first[first.len() - 1] + self.cameras[camera].sd.len());
         }
+        let mut common_block = vec![None; self.commons.len()];
+        for (index, common) in self.commons.iter().enumerate().filter(|(_, common)| !common.is_held()) {
+            common_block[index] = Some(first.len() - 1);
+            first.push(first[first.len() - 1] + common.sd.len());
+        }
+        let mut squares = vec![0];
+        first
+            .windows(2)
+            .for_each(|ends| squares.push(squares[squares.len() - 1] + (ends[1] - ends[0]).pow(2)));
+        let vertical = self.vertical();
+        let place = |common| PlacedCommon::new(common, self.space, origin, &vertical);
         let block = |photo: &Photo| Some(self.photos.len() + shared.binary_search(&photo.camera).ok()?);
-        let observations = self.tied_observations(screened)?;
-        let (placed, anchor) = self.placed(screened);
+        let mounts = self.mounts_by_photo();
+        let mut uses_of_commons = vec![0; self.commons.len()];
+        for image in screened.images.order.iter().filter_map(|&i| mounts.get(self.images[i].photo)?.as_ref())
+        {
+            uses_of_commons[image.sensor] += 1;
+        }
+        let commons_of = |&observation: &usize| self.observations[observation].touches().commons;
+        let touched = screened.observations.iter().flat_map(commons_of);
+        touched.for_each(|(common, _)| uses_of_commons[common] += 1);
+        let (placed, anchor) = self.placed(screened, &mounts);
         let images: Vec<Image> = screened.images.order.iter().map(|&image| self.images[image]).collect();
-        Ok(Bundle {
+        let mut bundle = Bundle {
             space: self.space,
             poses: self.poses,
             // Coordinates are counted from the origin; heights are not.
@@ -236,6 +281,11 @@ impl Network {
             first,
             camera_block: self.photos.iter().map(block).collect(),
             shared,
+            squares,
+            commons: self.commons.iter().map(place).collect(),
+            common_block,
+            uses_of_commons,
+            mounts,
             origin,
             locals: screened.locals,
             points: screened.points.iter().map(local_point).collect(),
@@ -244,18 +294,31 @@ impl Network {
             order: screened.images.order.clone(),
             turning: vec![false; self.photos.len()],
             images_on,
-            observations,
+            observations: vec![],
             placed,
             anchor,
-        })
+        };
+        bundle.observations = self.tied_observations(screened, &bundle)?;
+        Ok(bundle)
+    }
+
+    /// The axes amid the photos, as rows, that shifts and drifts are told in: X, Y, Z or, in geographic space, east, north and up.
+    fn vertical(&self) -> Matrix3 {
+        let middle =
+            |k: usize| median(self.photos.iter().map(|photo| photo.pose[k]).collect()).unwrap_or_default();
+        match self.space {
+            ObjectSpace::Rectangular => Matrix3::identity(),
+            ObjectSpace::Geographic(_) => local_vertical(middle(0), middle(1)),
+        }
     }
 
     /// Whether the datum is the user's; and the photo to hold where it is not, but the position of a single one is fixed.
-    fn placed(&self, screened: &Screened) -> (bool, Option<usize>) {
+    fn placed(&self, screened: &Screened, mounts: &[Option<Mount>]) -> (bool, Option<usize>) {
         // Angles alone leave position and scale open.
         let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
         let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
-        let mut photos = (0..self.photos.len()).filter(|&index| own(&self.photos[index]));
+        let mounted = |index: usize| mounts.get(index).is_some_and(Option::is_some);
+        let mut photos = (0..self.photos.len()).filter(|&index| !mounted(index) && own(&self.photos[index]));
         let fixed = |index: usize| self.photos[index].sd[..positions].iter().all(|&sd| sd == 0.0);
         match (photos.next(), photos.next()) {
             _ if screened.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),
@@ -266,19 +329,29 @@ impl Network {
     }
 
     /// The observations that take part.
-    fn tied_observations(&self, screened: &Screened) -> Result<Vec<TiedObservation>, NetworkError> {
+    fn tied_observations(
+        &self,
+        screened: &Screened,
+        model: &Bundle,
+    ) -> Result<Vec<TiedObservation>, NetworkError> {
         let Screened { points, locals, observations, .. } = screened;
         let place: HashMap<usize, usize> =
             points[*locals..].iter().enumerate().map(|(i, &point)| (point, locals + i)).collect();
         let tied = |&index: &usize| {
             let observation: &Observation = &self.observations[index];
             let touches = observation.touches();
-            let root = observation.precision().root(observation.rows());
+            let points = touches.points.iter().map(|point| place[point]).collect();
+            let touches = Touches { points, ..touches };
+            let blocks = model.blocks_of(&touches);
+            let root = match blocks.len() {
+                0 => Err(Fault::NothingUnknown),
+                _ => observation.precision().root(observation.rows()),
+            };
             let kind = observation.kind();
             Ok(TiedObservation {
                 index,
-                points: touches.points.iter().map(|point| place[point]).collect(),
-                photos: touches.photos,
+                touches,
+                blocks,
                 root: root.map_err(|fault| NetworkError::Observation { index, kind, fault })?,
                 observation: observation.clone(),
             })
@@ -318,15 +391,15 @@ fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError>
     let widths = model.first.windows(2).map(|pair| pair[1] - pair[0]);
     let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
     let images = &model.images[..groups];
-    let photo_of = images.iter().map(|image| image.photo as u32).collect();
+    let photo_of = images.iter().map(|image| model.carrier(image.photo) as u32).collect();
     let mut layout = Layout::new(2, 3, &widths, model.start[..=model.locals].to_vec(), photo_of)?;
-    if !model.shared.is_empty() {
+    if !(model.shared.is_empty() && model.mounts.is_empty()) {
         let (mut further_ptr, mut further) = (vec![0], Vec::new());
         for image in images {
-            further.extend(model.camera_block[image.photo].map(|block| block as u32));
+            further.extend(model.further(image).map(|block| block as u32));
             further_ptr.push(further.len());
         }
         layout = layout.with_further(further_ptr, further)?;
     }
-    Ok(layout.with_places(places)?.with_ties(model.ties())?)
+    Ok(layout.with_places(places)?.with_ties(model.ties())?.with_pairs(model.pairs())?)
 }

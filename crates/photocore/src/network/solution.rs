@@ -4,19 +4,21 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
+use super::model::{Owner, Placed};
 use super::problem::Assembled;
 use super::{
-    AdjustedCamera, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options, Point,
-    UnitVariance,
+    AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
+    Point, State, UnitVariance,
 };
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
-use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
+use crate::geometry::{AttitudeNumbers, Matrix3, Orientation, PoseNumbers};
 use crate::network::model::Bundle;
+use crate::normals::Cofactors;
 
 /// An adjusted photo.
 #[derive(Debug, Clone)]
 pub struct AdjustedPhoto {
-    /// The six unknowns of its pose.
+    /// The six unknowns of its pose; of a photo on a frame those that it would have, from the poses of frame and sensor.
     pub pose: [f64; 6],
     /// The parameters of its camera.
     pub camera: Vec<f64>,
@@ -77,6 +79,8 @@ pub struct Solution {
     pub photos: Vec<AdjustedPhoto>,
     /// The cameras.
     pub cameras: Vec<AdjustedCamera>,
+    /// The common unknowns.
+    pub commons: Vec<AdjustedCommon>,
     /// For every iteration, the corrections of the unknowns of all photos, one photo after the other.
     pub photo_corrections: Vec<Vec<f64>>,
     /// The points; None for those that were left out.
@@ -96,6 +100,8 @@ pub struct Solution {
     pub weak: Vec<(usize, usize)>,
     /// The same for cameras that several photos share, camera and parameter.
     pub weak_cameras: Vec<(usize, usize)>,
+    /// The same for common unknowns, common unknown and its number.
+    pub weak_commons: Vec<(usize, usize)>,
     /// What was held to give a datum where nothing else does: photo and unknown. In the datum of inner constraints, what they were
     /// taken from.
     pub datum: Vec<(usize, usize)>,
@@ -109,6 +115,10 @@ pub struct Solution {
     pub degrees_of_freedom: i64,
     /// Variance of unit weight; None where there are no degrees of freedom.
     pub variance_of_unit_weight: Option<f64>,
+    /// Where the adjustment has ended: what covariances are computed from, and other datums.
+    pub state: State,
+    /// About how large a part of the variances rounding may be, in a datum that they were taken to; zero otherwise.
+    pub lost_digits: f64,
     /// Status, iterations, counts, operations and times.
     pub adjustment: Adjustment,
 }
@@ -143,6 +153,7 @@ impl Solution {
         let mut solution = Self {
             cameras: network.adjusted_cameras(assembled, &adjustment, &unknowns, &photos),
             photos,
+            commons: network.adjusted_commons(assembled, &adjustment, &unknowns),
             photo_corrections: adjustment.corrections().map(|all| all[..photos_end].to_vec()).collect(),
             points: adjusted_points(network, assembled, &adjustment, &unknowns),
             images,
@@ -152,8 +163,17 @@ impl Solution {
             undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, assembled)),
             weak: adjustment.weak.iter().filter_map(of_photo).collect(),
             weak_cameras: adjustment.weak.iter().filter_map(|&unknown| of_camera(problem, unknown)).collect(),
+            weak_commons: adjustment.weak.iter().filter_map(|&unknown| of_common(problem, unknown)).collect(),
             datum: adjustment.datum.iter().filter_map(of_photo).collect(),
             dropped: dropped.clone(),
+            state: State {
+                unknowns: vec![],
+                held: adjustment.datum.clone(),
+                collapsed: collapsed.clone(),
+                ordering: adjustment.ordering,
+                datum: None,
+            },
+            lost_digits: 0.0,
             collapsed,
             sums_of_squares,
             degrees_of_freedom,
@@ -161,6 +181,7 @@ impl Solution {
             adjustment,
         };
         solution.find_behind(assembled, &unknowns);
+        solution.state.unknowns = unknowns;
         solution.adjustment.cofactors = None;
         solution.adjustment.release_observations();
         solution
@@ -189,23 +210,34 @@ impl Solution {
 
 /// The photo and the number of one of its unknowns; None for unknowns of anything else.
 fn of_photo(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
-    let (block, number) = of_block(problem, unknown)?;
-    (block < problem.model.cameras.len()).then_some((block, number))
+    match of_block(problem, unknown)? {
+        (Owner::Photo(photo), number) => Some((photo, number)),
+        _ => None,
+    }
 }
 
 /// The shared camera and the number of one of its parameters; None for unknowns of anything else.
 fn of_camera(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
-    let (block, parameter) = of_block(problem, unknown)?;
-    let shared = block.checked_sub(problem.model.cameras.len())?;
-    Some((problem.model.shared[shared], parameter))
+    match of_block(problem, unknown)? {
+        (Owner::Camera(camera), parameter) => Some((camera, parameter)),
+        _ => None,
+    }
 }
 
-/// The photo or shared camera, and the number of one of its unknowns; None for unknowns of points.
-fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
+/// The common unknown and the number of one of its unknowns; None for unknowns of anything else.
+fn of_common(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
+    match of_block(problem, unknown)? {
+        (Owner::Common(common), number) => Some((common, number)),
+        _ => None,
+    }
+}
+
+/// What an unknown belongs to, and its number there; None for unknowns of points.
+fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(Owner, usize)> {
     let all = model.of_stations();
     let kept = all.contains(&unknown).then(|| unknown - all.start)?;
     let block = model.first.partition_point(|&start| start <= kept) - 1;
-    Some((block, kept - model.first[block]))
+    Some((model.owner(block), kept - model.first[block]))
 }
 
 /// The observations beside images.
@@ -235,14 +267,14 @@ fn photos(
     unknowns: &[f64],
 ) -> Vec<AdjustedPhoto> {
     let model = &problem.model;
-    let (locals, origin) = (model.of_stations().start, model.origin);
+    let origin = model.origin;
     let positions = if let PoseNumbers::Angles(_) = network.poses { 3 } else { 0 };
-    let mut start = 0;
+    let placed = model.placed(&unknowns[model.of_stations()]);
     let photo = |(index, photo): (usize, &super::Photo)| {
-        let (first, end) = (locals + model.first[index], locals + model.first[index + 1]);
-        let values = &unknowns[first..end];
-        let (count, given) = ((end - first).pow(2), start);
-        start += count;
+        let range = model.of_block(index);
+        let (first, end) = (range.start, range.end);
+        let values = &unknowns[range];
+        let count = (end - first).pow(2);
         let angles = reported_angles(model, index, values);
         let absolute = |k: usize| {
             let counted = if k < positions { values[k] + origin[k] } else { values[k] };
@@ -254,16 +286,23 @@ fn photos(
         let asked = model.images_on[index] > 0 || problem.sd[first..end].iter().any(|&sd| sd != 0.0);
         let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
         let redundancy = adjustment.prior_redundancy.as_ref();
+        let camera = match model.camera_block[index] {
+            Some(block) => unknowns[model.of_block(block)].to_vec(),
+            None if values.len() > 6 => values[6..].to_vec(),
+            None => model.cameras[index].parameters(),
+        };
+        if model.mount(index).is_some() {
+            let cofactors = adjustment.cofactors.as_ref().filter(|_| model.images_on[index] > 0);
+            let (pose, cofactors) = mounted_pose(network, problem, &placed, index, cofactors);
+            let redundancy = vec![if cofactors[0].is_nan() { f64::NAN } else { 0.0 }; 6];
+            return AdjustedPhoto { pose, camera, cofactors, redundancy, images: model.images_on[index] };
+        }
         AdjustedPhoto {
             pose: std::array::from_fn(absolute),
-            camera: match model.camera_block[index] {
-                Some(block) => unknowns[model.of_block(block)].to_vec(),
-                None if values.len() > 6 => values[6..].to_vec(),
-                None => model.cameras[index].parameters(),
-            },
+            camera,
             cofactors: cofactors.map_or_else(
                 || vec![f64::NAN; count],
-                |all| in_angles(model, index, values, &all.kept[given..given + count]),
+                |all| in_angles(model, index, values, model.cofactors_of_block(all, index)),
             ),
             redundancy: redundancy
                 .map_or_else(|| vec![f64::NAN; end - first], |all| all[first..end].to_vec()),
@@ -271,6 +310,29 @@ fn photos(
         }
     };
     network.photos.iter().enumerate().map(photo).collect()
+}
+
+/// The six numbers of the pose of a photo that is mounted, and their cofactors; NaN where there are none.
+fn mounted_pose(
+    network: &Network,
+    problem: &Problem<Bundle>,
+    Placed { photos, mounted, .. }: &Placed,
+    photo: usize,
+    cofactors: Option<&Cofactors>,
+) -> ([f64; 6], Vec<f64>) {
+    let (model, orientation) = (&problem.model, &photos[photo].orientation);
+    let numbers = orientation.numbers(network.poses, network.space);
+    let found = cofactors.zip(mounted[photo].as_ref()).and_then(|(all, own)| {
+        let cofactors = model.mounted_cofactors(problem.layout(), photo, own, all);
+        let by_step = Orientation::new(network.poses, network.space, &numbers).unknowns_by_step()?;
+        let taken = by_step * orientation.step_matrix();
+        Some((taken * cofactors * taken.transpose()).as_slice().to_vec())
+    });
+    let mut pose = numbers;
+    if let PoseNumbers::Angles(_) = network.poses {
+        (0..3).for_each(|k| pose[k] += model.origin[k]);
+    }
+    (pose, found.unwrap_or_else(|| vec![f64::NAN; 36]))
 }
 
 /// The angles of a photo that steps by a rotation vector; at a singular attitude kappa is zero and omega takes the sum.

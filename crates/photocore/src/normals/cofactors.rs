@@ -32,6 +32,8 @@ pub struct Cofactors {
     pub equations: Vec<f64>,
     /// a Q a^T of the equations a of each tie, a square block row by row, one after the other.
     pub ties: Vec<f64>,
+    /// Of the pairs of kept blocks that were asked for, one after the other; NaN where no equations touch both.
+    pub pairs: Vec<f64>,
 }
 
 impl Cofactors {
@@ -71,12 +73,18 @@ impl Cofactors {
         }
         let blocks = 0..layout.kept();
         let kept = blocks.clone().filter_map(|block| inverse.block(block, block)).flatten().collect();
+        let pair = |pair: &[u32; 2]| {
+            let [row, column] = pair.map(|block| block as usize);
+            let size = layout.kept_dim(row) * layout.kept_dim(column);
+            inverse.block(row, column).unwrap_or_else(|| vec![f64::NAN; size])
+        };
+        let pairs = layout.pairs().iter().flat_map(pair).collect();
         let (mut border, mut kept_border) = (Vec::new(), Vec::new());
         if layout.border_dim() > 0 {
             border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
             kept_border = blocks.filter_map(|block| inverse.block(block, layout.kept())).flatten().collect();
         }
-        Some(Self { local, kept, border, kept_border, equations, ties })
+        Some(Self { local, kept, border, kept_border, equations, ties, pairs })
     }
 }
 

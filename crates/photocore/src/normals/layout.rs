@@ -33,6 +33,9 @@ pub struct Layout {
     /// Where the square block of the equations of each tie starts; one more at the end.
     block_ptr: Vec<usize>,
     places: Option<Vec<[f64; 3]>>,
+    /// Pairs of kept blocks, ascending, and where the block of each starts among those of all; one more at the end.
+    pairs: Vec<[u32; 2]>,
+    pair_ptr: Vec<usize>,
 }
 
 /// Equations among kept blocks and common unknowns: a distance between two points that are kept, a relative pose of two
@@ -99,6 +102,9 @@ pub enum LayoutError {
         /// Size of the border.
         border: usize,
     },
+    /// A pair names a kept block that does not exist.
+    #[error("a pair of kept blocks names one that does not exist: {0:?}")]
+    Pair([usize; 2]),
     /// A tie without equations or unknowns, or one that names a block twice or unknowns that do not exist.
     #[error("tie {tie} has no equations or unknowns, or names a block twice or one that does not exist")]
     Tie {
@@ -157,6 +163,8 @@ impl Layout {
             tie_ptr: vec![0],
             block_ptr: vec![0],
             places: None,
+            pairs: Vec::new(),
+            pair_ptr: vec![0],
         })
     }
 
@@ -228,6 +236,35 @@ impl Layout {
         }
         self.ties = ties;
         Ok(self)
+    }
+
+    /// Asks for the cofactors of pairs of kept blocks, the first of which have the rows; those are found that some equations touch
+    /// together.
+    pub fn with_pairs(mut self, mut pairs: Vec<[u32; 2]>) -> Result<Self, LayoutError> {
+        pairs.sort_unstable();
+        pairs.dedup();
+        self.pair_ptr.truncate(1);
+        for (index, pair) in pairs.iter().enumerate() {
+            let [rows, columns] = pair.map(|block| block as usize);
+            if rows.max(columns) >= self.kept() {
+                return Err(LayoutError::Pair(pair.map(|block| block as usize)));
+            }
+            let size = self.kept_dim(rows) * self.kept_dim(columns);
+            self.pair_ptr.push(self.pair_ptr[index] + size);
+        }
+        self.pairs = pairs;
+        Ok(self)
+    }
+
+    /// The pairs of kept blocks whose cofactors are asked for.
+    pub fn pairs(&self) -> &[[u32; 2]] {
+        &self.pairs
+    }
+
+    /// Where the cofactors of a pair of kept blocks stand among those of all pairs; None where they were not asked for.
+    pub fn pair(&self, pair: [u32; 2]) -> Option<Range<usize>> {
+        let index = self.pairs.binary_search(&pair).ok()?;
+        Some(self.pair_ptr[index]..self.pair_ptr[index + 1])
     }
 
     /// Equations in each group.

@@ -9,7 +9,7 @@
 //! 3. [`System::factor`]: the normal equations formed, the local blocks reduced out and the rest factored (block Cholesky on dense
 //!    panels), front by front;
 //! 4. [`System::solve`], and [`System::solve_for`] for any other right-hand sides;
-//! 5. [`System::invert`]: the selected inverse, and cofactors of everything.
+//! 5. [`System::invert`]: the selected inverse, and cofactors of everything; [`System::reduce`] those of any linear functions.
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -45,6 +45,7 @@ mod equation_block;
 mod equations;
 mod factor;
 mod front;
+mod functions;
 mod graph;
 mod incidence;
 mod invert;
@@ -53,6 +54,7 @@ mod memory;
 mod minimum_degree;
 mod ordering;
 mod panels;
+mod products;
 mod selected;
 mod solve;
 mod solve_for;
@@ -71,6 +73,7 @@ pub use cofactors::Cofactors;
 pub use deficiency::Deficiency;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
 pub use factor::Factor;
+pub use functions::{Function, Functions};
 pub use graph::Graph;
 pub use invert::Inversion;
 pub use layout::{Layout, LayoutError, Tie};

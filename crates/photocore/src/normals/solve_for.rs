@@ -1,6 +1,6 @@
 //! Solution of the normal equations for any other right-hand sides.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -15,7 +15,7 @@ use super::incidence::Stacks;
 use super::layout::Layout;
 use super::stack::{Stack, dot};
 use super::system::System;
-use super::vectorised::{Kernel, Rows, run};
+use super::vectorised::{Kernel, run};
 use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::reserved;
 
@@ -140,23 +140,6 @@ impl<E: Equations> Work<'_, E> {
         stack.gather(self.system, self.equations, locals);
         stack.eliminate(&self.system.layout, self.prior, self.damping);
     }
-
-    /// What a stack is coupled to: its coupling V, and where the coupled unknowns stand in the order of elimination.
-    #[inline(always)]
-    fn couplings<'s, const L: usize, const D: usize>(
-        &self,
-        stack: &'s Stack,
-    ) -> impl Iterator<Item = (Range<usize>, Rows<'s>)> {
-        let symbolic = &*self.system.symbolic;
-        let slots = stack
-            .slots
-            .iter()
-            .map(move |slot| (symbolic.range(slot.position), stack.slot_coupling::<L, D>(slot).rows));
-        let segments = stack.segments.iter();
-        slots.chain(
-            segments.map(move |segment| (segment.range(symbolic), stack.segment_coupling::<L>(segment).rows)),
-        )
-    }
 }
 
 /// Computes V^T L^-1 r of a stack for every right-hand side: column, first of the coupled unknowns, values.
@@ -182,7 +165,7 @@ impl<E: Equations> Kernel for Reduce<'_, E> {
             if reduced.iter().all(|&value| value == 0.0) {
                 continue;
             }
-            for (range, v) in self.work.couplings::<L, D>(self.stack) {
+            for (range, v) in self.stack.couplings::<L, D>(&self.work.system.symbolic) {
                 let mut sums = vec![0.0; range.len()];
                 for (row, factor) in v.values.chunks_exact(range.len().max(1)).zip(&reduced) {
                     sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += factor * value);
@@ -215,7 +198,7 @@ impl<E: Equations> Kernel for Solve<'_, E> {
                 let mut own = [0.0; L];
                 own.copy_from_slice(&right[range.clone()]);
                 self.stack.triangles[t].forward::<L>(&mut own, 1);
-                for (coupled, v) in self.work.couplings::<L, D>(self.stack) {
+                for (coupled, v) in self.stack.couplings::<L, D>(&self.work.system.symbolic) {
                     let x = &others[coupled];
                     let rows = v.values[t * L * x.len()..].chunks_exact(x.len().max(1));
                     own.iter_mut().zip(rows).for_each(|(value, row)| *value -= dot(row, x));
@@ -246,7 +229,7 @@ impl Factor {
     }
 
     /// Replaces columns, in the order of elimination, by (L L^T)^-1 times them.
-    fn solve_columns(&self, columns: &mut [f64]) {
+    pub(super) fn solve_columns(&self, columns: &mut [f64]) {
         let symbolic = &*self.panels.symbolic;
         let count = columns.len() / symbolic.unknowns().max(1);
         let mut x = MatMut::from_column_major_slice_mut(columns, symbolic.unknowns(), count);
@@ -282,7 +265,7 @@ impl Factor {
     }
 
     /// The own and the coupled rows of the panel of a supernode.
-    fn panel(&self, index: usize) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
+    pub(super) fn panel(&self, index: usize) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
         let s = &self.panels.symbolic.supernodes()[index];
         MatRef::from_column_major_slice(self.panels.panel(index), s.height(), s.width).split_at_row(s.width)
     }

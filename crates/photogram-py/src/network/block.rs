@@ -10,6 +10,7 @@ use super::solution::BlockSolution;
 use super::{BlockError, adjusted, failure, images, points};
 use crate::arrays::{check_lengths, indices, rows};
 use crate::camera::named;
+use crate::commons::{CommonRow, MountRow, common, mount};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
 use crate::observations::{Group, observations};
 use crate::options::{named_loss, named_ordering, unknown};
@@ -29,7 +30,7 @@ fn camera((model, parameters, sd): CameraRow) -> PyResult<Camera> {
 #[pyfunction]
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
-    photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
+    photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, unknowns, mounts, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
     covariance, loss, ordering, unit_variance, threads, memory, progress
 ))]
 fn adjust_block(
@@ -49,6 +50,8 @@ fn adjust_block(
     image_xy: PyReadonlyArrayDyn<'_, f64>,
     image_sd: PyReadonlyArrayDyn<'_, f64>,
     observation_groups: Vec<Group<'_>>,
+    unknowns: Vec<CommonRow>,
+    mounts: Vec<MountRow>,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
     refraction: Option<RefractionRow>,
@@ -97,6 +100,8 @@ fn adjust_block(
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
         observations: observations(&observation_groups)?,
+        commons: unknowns.into_iter().map(common).collect::<PyResult<_>>()?,
+        mounts: mounts.into_iter().map(mount).collect(),
     };
     let method = match criterion {
         "fraction" => Method::Damped(Stop::Fraction(limit)),

@@ -114,6 +114,8 @@ fn adjust_collection(
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
         observations: vec![],
+        commons: vec![],
+        mounts: vec![],
     };
     let options = Options {
         adjustment: AdjustmentOptions {

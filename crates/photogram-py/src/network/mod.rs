@@ -18,13 +18,13 @@ create_exception!(
     _photocore,
     BlockError,
     PyException,
-    "The block cannot be adjusted: (kind, message, photos, points, cameras)."
+    "The block cannot be adjusted: (kind, message, photos, points, cameras, unknowns)."
 );
 create_exception!(
     _photocore,
     CollectionError,
     PyException,
-    "The collection cannot be adjusted: (kind, message, photos, points, cameras)."
+    "The collection cannot be adjusted: (kind, message, photos, points, cameras, unknowns)."
 );
 
 /// Adds the functions and classes to the extension module.
@@ -75,18 +75,19 @@ fn adjusted(
     watched(py, workers, progress, |pool, watch| network.adjust(options, pool, watch))
 }
 
-/// Kind, message, and the photos, points and cameras concerned; photos and cameras combination by combination.
-type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>, Vec<Vec<usize>>);
+/// Kind, message, and the photos, points, cameras and common unknowns concerned; all but points combination by combination.
+type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>, Vec<Vec<usize>>, Vec<Vec<usize>>);
 
 /// A failure as Python sees it.
 fn failure(error: &Failure, what: &str) -> FailureRow {
-    let mut cameras = vec![];
+    let (mut cameras, mut commons) = (vec![], vec![]);
     let (kind, photos, points) = match error {
         Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
         Failure::Undetermined(combinations) => {
             let photos = combinations.iter().map(|combination| combination.photos.clone()).collect();
             cameras = combinations.iter().map(|combination| combination.cameras.clone()).collect();
+            commons = combinations.iter().map(|combination| combination.commons.clone()).collect();
             ("undetermined photos", photos, vec![])
         }
         Failure::Coarse(Coarse { photos, points }) => ("coarse", vec![photos.clone()], points.clone()),
@@ -96,6 +97,14 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
+        | Failure::CommonDeviations(_)
+        | Failure::Mount(_)
+        | Failure::NoPhoto(_)
+        | Failure::NoPoint(_)
+        | Failure::CameraIndex(_)
+        | Failure::LeftOut(_)
+        | Failure::Partials { .. }
+        | Failure::State
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
@@ -103,7 +112,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
     };
-    (kind, said(error, what), photos, points, cameras)
+    (kind, said(error, what), photos, points, cameras, commons)
 }
 
 /// What went wrong, in terms of what was given: a block or a collection.

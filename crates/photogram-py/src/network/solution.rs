@@ -7,6 +7,7 @@ use pyo3::types::PyDict;
 
 use super::{FailureRow, failure};
 use crate::arrays::{squares, table};
+use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
 use crate::observations::{AdjustedRow, adjusted_row};
 use crate::solution::{
     IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
@@ -251,6 +252,16 @@ solution_class! {
         #[getter]
         fn weak(&self) -> Vec<(usize, usize)> {
             self.solution.weak.clone()
+        }
+
+        #[getter]
+        fn weak_unknowns(&self) -> Vec<(usize, usize)> {
+            self.solution.weak_commons.clone()
+        }
+
+        #[getter]
+        fn adjusted_unknowns(&self) -> Vec<UnknownRow> {
+            self.solution.commons.iter().map(unknown_row).collect()
         }
 
         #[getter]

@@ -22,7 +22,7 @@ pub struct Corrected<P> {
 /// ```
 ///
 /// Every such type is a [`CameraModel`]. Where an image is asked for, it is the measured position that g takes to c (u1, u2) / u3.
-pub trait BackwardModel: Clone {
+pub trait BackwardModel: Copy {
     /// See [`CameraModel::Parameters`].
     type Parameters: Copy + AsRef<[f64]> + AsMut<[f64]> + for<'a> TryFrom<&'a [f64]>;
 

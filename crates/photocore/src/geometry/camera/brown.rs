@@ -2,8 +2,8 @@
 
 use super::Unit;
 use super::backward::{BackwardModel, Corrected};
-use super::inverse::{RadialFactor, RadialLimit};
-use super::radial_tangential::RadialTangential;
+use super::inverse::{RadialFactor, RadialLimit, from_radial};
+use super::radial_tangential::{Bent, RadialTangential};
 
 /// Radial and tangential corrections, affinity and shear, backward: functions of measured coordinates, which they are added to.
 ///
@@ -140,8 +140,12 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
     }
 
     fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]> {
-        let ([a1, a2], beside) = self.affine();
-        let [x, y] = self.lens().unbend(corrected, [beside, [0.0; 2]])?;
+        let ([a1, a2], [b1, b2]) = self.affine();
+        let lens = self.lens();
+        let [x, y] = from_radial(&lens.radial, corrected, |[x, y]| {
+            let Bent { xy, by_place: [by_x, by_y], .. } = lens.bend([x, y]);
+            ([xy[0] + b1 * x + b2 * y, xy[1]], [[by_x[0] + b1, by_x[1] + b2], by_y])
+        })?;
         let dx = (x - a2 * y) / (1.0 + a1);
         Some([self.principal_point[0] + dx, self.principal_point[1] + y])
     }

@@ -212,3 +212,14 @@ pub fn way_back(
     }
     None
 }
+
+/// The place that a lens (its value and partials) takes to `target`: from what its radial part alone says, along the direction of that.
+pub fn from_radial(
+    radial: &RadialFactor,
+    target: [f64; 2],
+    lens: impl Fn([f64; 2]) -> ([f64; 2], Matrix2),
+) -> Option<[f64; 2]> {
+    let distorted = target[0].hypot(target[1]);
+    let ratio = if distorted > 0.0 { radial.invert(distorted)? / distorted } else { 1.0 };
+    way_back(target.map(|value| ratio * value), target, lens)
+}

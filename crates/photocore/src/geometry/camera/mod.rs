@@ -4,6 +4,7 @@
 
 pub mod backward;
 mod inverse;
+mod projections;
 mod radial_tangential;
 
 use super::Vector3;
@@ -17,7 +18,7 @@ pub use inverse::{Matrix2, RadialLimit};
 /// A **forward** camera has a lens whose terms are functions of ideal coordinates: it maps u to what is measured. That of a **backward**
 /// one has terms that are functions of measured coordinates: it corrects what is measured, and compares that with the central perspective
 /// of u ([`backward::BackwardModel`]).
-pub trait CameraModel: Clone {
+pub trait CameraModel: Copy {
     /// Its interior parameters, an array of numbers.
     type Parameters: Copy + AsRef<[f64]> + for<'a> TryFrom<&'a [f64]>;
 
@@ -185,9 +186,37 @@ cameras! { $
     perspective::Perspective;
     bal::Bal;
     radial::Radial;
+    equirectangular::Equirectangular;
+    brown_forward::BrownForward;
     [brown] {
         Brown;
         BrownAffinityAfter;
+    }
+    [orthogonal] {
+        Ebner;
+        Gruen;
+    }
+    [vision] {
+        SimplePinhole;
+        Pinhole;
+        SimpleRadial;
+        Opencv;
+        FullOpencv;
+        OpencvPinhole;
+        Fov;
+        SimpleFisheye;
+        Fisheye;
+        SimpleRadialFisheye;
+        RadialFisheye;
+        OpencvFisheye;
+        OpencvFisheyeSkew;
+        ThinPrismFisheye;
+        RadTanThinPrismFisheye;
+        SimpleDivision;
+        Division;
+        Eucm;
+        AgisoftFrame;
+        AgisoftFisheye;
     }
 }
 

@@ -1,6 +1,6 @@
 //! The terms of Brown (1966, 1971), Conrady (1919) and those who came after: radial, tangential, thin prism.
 
-use super::inverse::{Matrix2, RadialFactor, way_back};
+use super::inverse::{Matrix2, RadialFactor};
 
 /// The lens
 ///
@@ -32,6 +32,8 @@ pub struct Bent {
     square: f64,
     /// 1 / D.
     reciprocal: f64,
+    /// s.
+    factor: f64,
 }
 
 impl RadialTangential {
@@ -59,19 +61,8 @@ impl RadialTangential {
             place,
             square,
             reciprocal,
+            factor,
         }
-    }
-
-    /// The place that goes there: from the radial part alone, along the direction of the bent place, then with all terms and what
-    /// `more` adds to them.
-    pub fn unbend(&self, target: [f64; 2], more: Matrix2) -> Option<[f64; 2]> {
-        let distorted = target[0].hypot(target[1]);
-        let ratio = if distorted > 0.0 { self.radial.invert(distorted)? / distorted } else { 1.0 };
-        way_back(target.map(|value| ratio * value), target, |place| {
-            let Bent { xy, by_place, .. } = self.bend(place);
-            let by = [0, 1].map(|i| [0, 1].map(|k| by_place[i][k] + more[i][k]));
-            ([0, 1].map(|i| xy[i] + more[i][0] * place[0] + more[i][1] * place[1]), by)
-        })
     }
 }
 
@@ -83,10 +74,22 @@ impl Bent {
         self.place.map(|value| scale * value)
     }
 
+    /// By the coefficient of q^i in D.
+    #[inline(always)]
+    pub fn by_denominator(&self, power: i32) -> [f64; 2] {
+        self.by_numerator(power).map(|value| -self.factor * value)
+    }
+
     /// By t1, t2.
     #[inline(always)]
     pub fn by_tangential(&self) -> [[f64; 2]; 2] {
         let ([a, b], q) = (self.place, self.square);
         [[q + 2.0 * a * a, 2.0 * a * b], [2.0 * a * b, q + 2.0 * b * b]]
+    }
+
+    /// By s1, s2, which only x has, as s3, s4 are those of y.
+    #[inline(always)]
+    pub fn by_prism(&self) -> [f64; 2] {
+        [self.square, self.square * self.square]
     }
 }

@@ -1,6 +1,8 @@
 //! Control points whose coordinates are correlated.
 
-use super::{ObservationModel, Precision, Rows, Sites, Touches};
+use nalgebra::DMatrix;
+
+use super::{Named, ObservationModel, Precision, Rows, Sites, Touches, three};
 
 /// The position of a point with its full covariance, from an adjustment of its own.
 ///
@@ -17,6 +19,11 @@ pub struct Control {
 
 impl ObservationModel for Control {
     const NAME: &'static str = "control";
+
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let &[point] = of.points else { return None };
+        Some(Self { point, coordinates: three(values, 0)?, precision: Precision::Covariance(covariance) })
+    }
 
     fn touches(&self) -> Touches {
         Touches::points(&[self.point])

@@ -1,8 +1,8 @@
 //! Differences of coordinates.
 
-use nalgebra::SMatrix;
+use nalgebra::{DMatrix, SMatrix};
 
-use super::{ObservationModel, Precision, Rows, Sites, Touches};
+use super::{Named, ObservationModel, Precision, Rows, Sites, Touches, three};
 use crate::geometry::Matrix3;
 
 /// The components of the vector from one point to another: a GNSS baseline, a levelled height, offsets that were taped.
@@ -20,6 +20,18 @@ pub struct Difference {
 
 impl ObservationModel for Difference {
     const NAME: &'static str = "difference";
+
+    /// The vector, NaN for components that were not observed.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let &[p, q] = of.points else { return None };
+        let components = three(values, 0)?.map(|value| (!value.is_nan()).then_some(value));
+        if covariance.shape() != (3, 3) {
+            return None;
+        }
+        let seen: Vec<usize> = (0..3).filter(|&k| components[k].is_some()).collect();
+        let precision = Precision::Covariance(covariance.select_rows(&seen).select_columns(&seen));
+        Some(Self { points: [p, q], components, precision })
+    }
 
     fn touches(&self) -> Touches {
         Touches::points(&self.points)

@@ -1,6 +1,8 @@
 //! Points at one height.
 
-use super::{ObservationModel, Precision, Rows, Sites, Touches};
+use nalgebra::DMatrix;
+
+use super::{Named, ObservationModel, Precision, Rows, Sites, Touches, deviation};
 
 /// Two points at one height, or with the difference of heights that was levelled.
 ///
@@ -17,6 +19,11 @@ pub struct EqualHeight {
 
 impl ObservationModel for EqualHeight {
     const NAME: &'static str = "equal height";
+
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[p, q], &[difference]) = (of.points, values) else { return None };
+        Some(Self { points: [p, q], difference, sd: deviation(&covariance) })
+    }
 
     fn touches(&self) -> Touches {
         Touches::points(&self.points)

@@ -8,22 +8,28 @@ mod precision;
 mod rows;
 mod tied;
 
+use nalgebra::{DMatrix, SMatrix, SVector};
 use thiserror::Error;
 
+use super::commons::{Common, CommonKind};
 use crate::geometry::Matrix3;
 
 pub use adjusted::{AdjustedObservation, KindSums};
 pub(super) use attitude::misalignment;
 pub use precision::Precision;
+pub(super) use rows::{CommonSite, PhotoSite, PointSite};
 pub use rows::{Rows, Sites};
 pub(super) use tied::{TiedModel, TiedObservation};
 
-/// A kind of observation of points and photos.
-pub trait ObservationModel {
+/// A kind of observation of points, photos and unknowns that observations have in common.
+pub trait ObservationModel: Sized {
     /// The name under which reports know the kind.
     const NAME: &'static str;
 
-    /// The points and photos that it is of: they are known by their place in this list to [`ObservationModel::write`].
+    /// From numbers, as callers have them that know a kind by its name; None where there are more or fewer than it has.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self>;
+
+    /// What it is of: points, photos and common unknowns are known by their place in these lists to [`ObservationModel::write`].
     fn touches(&self) -> Touches;
 
     /// How many components it has.
@@ -72,6 +78,19 @@ macro_rules! kinds {
                 }
             }
 
+            /// An observation of the kind of that name (see [`ObservationModel::from_numbers`]); None where there is no such kind.
+            pub fn from_numbers(
+                kind: &str,
+                of: &Named<'_>,
+                values: &[f64],
+                covariance: DMatrix<f64>,
+            ) -> Option<Self> {
+                match kind {
+                    $($name::NAME => $name::from_numbers(of, values, covariance).map(Self::from),)*
+                    _ => None,
+                }
+            }
+
             /// See [`ObservationModel::touches`].
             pub fn touches(&self) -> Touches {
                 match self {
@@ -113,30 +132,95 @@ kinds! {
     distance::Distance;
     difference::Difference;
     equal_height::EqualHeight;
+    on_level::OnLevel;
+    on_plane::OnPlane;
+    on_plumb_line::OnPlumbLine;
+    on_line::OnLine;
     position::Position;
     attitude::Attitude;
     relative::Relative;
+    base::Base;
+    prior::Prior;
 }
 
-/// What an observation is of: indices into the network, each once.
+/// What an observation is of: indices into the network, each once; of a common unknown with the type that it must have, None for any.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Touches {
     /// Its points.
     pub points: Vec<usize>,
     /// Its photos.
     pub photos: Vec<usize>,
+    /// Its common unknowns.
+    pub commons: Vec<(usize, Option<CommonKind>)>,
 }
 
 impl Touches {
     /// Points alone.
     pub fn points(points: &[usize]) -> Self {
-        Self { points: points.to_vec(), photos: vec![] }
+        Self { points: points.to_vec(), ..Self::default() }
     }
 
     /// Photos alone.
     pub fn photos(photos: &[usize]) -> Self {
-        Self { points: vec![], photos: photos.to_vec() }
+        Self { photos: photos.to_vec(), ..Self::default() }
     }
+
+    /// Besides a common unknown, where there is one.
+    #[must_use]
+    pub fn and(mut self, common: Option<usize>, kind: CommonKind) -> Self {
+        self.commons.extend(common.map(|common| (common, Some(kind))));
+        self
+    }
+}
+
+/// What an observation is of, as it is given in numbers: indices into the network.
+#[derive(Debug, Clone, Copy)]
+pub struct Named<'a> {
+    /// Points.
+    pub points: &'a [usize],
+    /// Photos.
+    pub photos: &'a [usize],
+    /// Common unknowns; None where the kind can do without.
+    pub commons: &'a [Option<usize>],
+}
+
+/// A quantity that is known, or a common unknown, by its index.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Quantity<T> {
+    /// Its value.
+    Known(T),
+    /// Its index.
+    Common(usize),
+}
+
+impl<T> Quantity<T> {
+    /// The common unknown, where there is one; else what is known.
+    pub fn new(common: Option<usize>, known: T) -> Self {
+        common.map_or(Self::Known(known), Self::Common)
+    }
+
+    /// The index of a common unknown.
+    pub fn common(&self) -> Option<usize> {
+        match self {
+            Self::Known(_) => None,
+            Self::Common(index) => Some(*index),
+        }
+    }
+}
+
+/// Three numbers from a place on; None where there are not so many.
+fn three(values: &[f64], first: usize) -> Option<[f64; 3]> {
+    values.get(first..first + 3)?.try_into().ok()
+}
+
+/// A matrix of nine numbers, row by row, from a place on.
+fn nine(values: &[f64], first: usize) -> Option<Matrix3> {
+    values.get(first..first + 9).map(Matrix3::from_row_slice)
+}
+
+/// The standard deviation of an observation of one component.
+fn deviation(covariance: &DMatrix<f64>) -> f64 {
+    covariance[(0, 0)].sqrt()
 }
 
 /// What is wrong with an observation.
@@ -148,8 +232,22 @@ pub enum Fault {
     /// A photo that is not there.
     #[error("names photo {0}, which is not there")]
     NoPhoto(usize),
-    /// A point or photo with itself.
-    #[error("names a point or photo twice")]
+    /// A common unknown that is not there.
+    #[error("names common unknown {0}, which is not there")]
+    NoCommon(usize),
+    /// A common unknown of another type than it needs.
+    #[error("names common unknown {common}, which is no {}", .needed.name())]
+    OtherCommon {
+        /// Its index.
+        common: usize,
+        /// The type.
+        needed: CommonKind,
+    },
+    /// Nothing of what it is of is unknown.
+    #[error("is of known quantities alone")]
+    NothingUnknown,
+    /// A point, photo or common unknown with itself.
+    #[error("names a point, photo or common unknown twice")]
     Twice,
     /// No component is observed.
     #[error("has no component")]
@@ -177,8 +275,8 @@ pub enum Fault {
 }
 
 impl Observation {
-    /// Refuses an observation that contradicts itself or a network of so many points and photos.
-    pub(super) fn check(&self, points: usize, photos: usize) -> Result<(), Fault> {
+    /// Refuses an observation that contradicts itself or a network of so many points and photos, and these common unknowns.
+    pub(super) fn check(&self, points: usize, photos: usize, commons: &[Common]) -> Result<(), Fault> {
         let touches = self.touches();
         if let Some(&point) = touches.points.iter().find(|&&point| point >= points) {
             return Err(Fault::NoPoint(point));
@@ -186,8 +284,20 @@ impl Observation {
         if let Some(&photo) = touches.photos.iter().find(|&&photo| photo >= photos) {
             return Err(Fault::NoPhoto(photo));
         }
+        for &(common, needed) in &touches.commons {
+            let own = commons.get(common).ok_or(Fault::NoCommon(common))?;
+            if let Some(needed) = needed.filter(|&needed| needed != own.kind) {
+                return Err(Fault::OtherCommon { common, needed });
+            }
+            // Of any type: all its unknowns are observed.
+            let (components, given) = (own.sd.len(), self.rows());
+            if needed.is_none() && components != given {
+                return Err(Fault::Deviations { components, given });
+            }
+        }
         let twice = |all: &[usize]| (1..all.len()).any(|i| all[..i].contains(&all[i]));
-        if twice(&touches.points) || twice(&touches.photos) {
+        let named: Vec<usize> = touches.commons.iter().map(|&(common, _)| common).collect();
+        if twice(&touches.points) || twice(&touches.photos) || twice(&named) {
             return Err(Fault::Twice);
         }
         self.own_check()?;
@@ -198,6 +308,24 @@ impl Observation {
     }
 }
 
+/// Writes some components of a point in the own axes of a plane or line, less the unknown offsets: `selected` has them as rows.
+///
+/// own = R^T (P - p_0), with the partials R^T by P, and `[own]x` by a turn of the axes about themselves.
+fn in_own_axes<const N: usize>(
+    sites: &Sites<'_>,
+    rows: &mut Rows<'_>,
+    selected: &SMatrix<f64, N, 3>,
+    observed: &[f64; N],
+) {
+    let common = sites.common(0);
+    let own = common.own(&sites.position(0));
+    let residual = SVector::from(*observed) - selected * (own - common.offset());
+    rows.residual(0, residual.as_slice());
+    rows.by_position(0, 0, &(selected * common.attitude().transpose()));
+    rows.by_offset(0, 0, &-selected);
+    rows.by_turn(0, 0, &(selected * own.cross_matrix()));
+}
+
 /// Refuses a matrix that is not a rotation to six digits.
 fn rotates(matrix: &Matrix3) -> Result<(), Fault> {
     const DIGITS: f64 = 1e-6;
@@ -206,5 +334,7 @@ fn rotates(matrix: &Matrix3) -> Result<(), Fault> {
     if difference < DIGITS && matrix.determinant() > 0.0 { Ok(()) } else { Err(Fault::Rotation) }
 }
 
+#[cfg(test)]
+mod golden;
 #[cfg(test)]
 mod tests;

@@ -1,9 +1,9 @@
 //! Relative poses of two photos.
 
-use nalgebra::SMatrix;
+use nalgebra::{DMatrix, SMatrix};
 
 use super::attitude::misalignment;
-use super::{Fault, ObservationModel, Precision, Rows, Sites, Touches, rotates};
+use super::{Fault, Named, ObservationModel, Precision, Rows, Sites, Touches, nine, rotates, three};
 use crate::geometry::{Matrix3, Pose};
 
 /// The pose of one photo in the axes of another: odometry, a stereo rig that was calibrated.
@@ -23,6 +23,13 @@ pub struct Relative {
 
 impl ObservationModel for Relative {
     const NAME: &'static str = "relative";
+
+    /// t_obs, then R_obs row by row.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let &[i, j] = of.photos else { return None };
+        let pose = Pose { position: three(values, 0)?.into(), attitude: nine(values, 3)? };
+        Some(Self { photos: [i, j], pose, precision: Precision::Covariance(covariance) })
+    }
 
     fn touches(&self) -> Touches {
         Touches::photos(&self.photos)

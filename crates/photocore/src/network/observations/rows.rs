@@ -3,32 +3,62 @@
 use nalgebra::SMatrix;
 
 use crate::geometry::{Matrix3, ObjectSpace, Orientation, Point, Pose, Vector3, local_vertical};
+use crate::network::commons::CommonState;
+use crate::network::mounts::Mounted;
 
-/// The points and photos that an observation touches, each known by its place in [`super::Touches`], at given values of the unknowns.
-/// Cartesian positions are counted from an origin amid the network.
+/// The points, photos and common unknowns that an observation touches, each known by its place in [`super::Touches`], at given values
+/// of the unknowns. Cartesian positions are counted from an origin amid the network.
 #[derive(Debug)]
 pub struct Sites<'a> {
     pub(super) space: ObjectSpace,
     pub(super) origin: [f64; 3],
-    /// Each point with its coordinates in the object space, counted from the origin.
-    pub(super) points: Vec<(Point, [f64; 3])>,
-    pub(super) photos: Vec<&'a Orientation>,
+    pub(super) points: Vec<PointSite>,
+    pub(super) photos: Vec<PhotoSite<'a>>,
+    pub(super) commons: Vec<CommonSite<'a>>,
+}
+
+/// A point with its coordinates in the object space, counted from the origin, and the block of its unknowns.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::network) struct PointSite {
+    pub point: Point,
+    pub coordinates: [f64; 3],
+    pub block: usize,
+}
+
+/// A photo, and the block of its unknowns or, where it is mounted, those of its frame and sensor.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::network) struct PhotoSite<'a> {
+    pub orientation: &'a Orientation,
+    pub block: usize,
+    pub mounted: Option<(&'a Mounted, Option<usize>)>,
+}
+
+/// A common unknown, and its block unless it is known.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::network) struct CommonSite<'a> {
+    pub state: &'a CommonState,
+    pub block: Option<usize>,
 }
 
 impl Sites<'_> {
     /// The cartesian position of a point.
     pub fn position(&self, point: usize) -> Vector3 {
-        self.points[point].0.position()
+        self.points[point].point.position()
     }
 
     /// The height of a point: its Z in rectangular space, that above the ellipsoid in geographic space.
     pub fn height(&self, point: usize) -> f64 {
-        self.points[point].1[2]
+        self.points[point].coordinates[2]
     }
 
     /// The pose of a photo.
     pub fn pose(&self, photo: usize) -> &Pose {
-        self.photos[photo].pose()
+        self.photos[photo].orientation.pose()
+    }
+
+    /// A common unknown.
+    pub fn common(&self, common: usize) -> &CommonState {
+        self.commons[common].state
     }
 
     /// The attitude A of a photo in the axes that its angles refer to: those of the space or, where it is geographic, east, north and up
@@ -60,8 +90,8 @@ impl Sites<'_> {
 #[derive(Debug)]
 pub struct Rows<'a> {
     pub(super) sites: &'a Sites<'a>,
-    /// The first column of each point, then of each photo.
-    pub(super) columns: Vec<usize>,
+    /// The blocks that are touched, and the first column of each.
+    pub(super) columns: &'a [(usize, usize)],
     /// Columns in all.
     pub(super) width: usize,
     pub(super) constant: &'a mut [f64],
@@ -76,26 +106,27 @@ impl Rows<'_> {
 
     /// Partials of some rows, from the given one on, by the cartesian position of a point.
     pub fn by_position<const N: usize>(&mut self, row: usize, point: usize, partials: &SMatrix<f64, N, 3>) {
-        let by_coordinates = partials * self.sites.points[point].0.partials();
+        let PointSite { point, block, .. } = self.sites.points[point];
+        let by_coordinates = partials * point.partials();
         for k in 0..3 {
-            self.add(row, self.columns[point] + k, by_coordinates.column(k).iter());
+            self.add(row, block, k, by_coordinates.column(k).iter());
         }
     }
 
     /// The partial of a row by the height of a point (see [`Sites::height`]).
     pub fn by_height(&mut self, row: usize, point: usize, partial: f64) {
-        self.add(row, self.columns[point] + 2, [partial].iter());
+        self.add(row, self.sites.points[point].block, 2, [partial].iter());
     }
 
     /// Partials of some rows by the cartesian position of the projection centre of a photo.
     pub fn by_centre<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
-        let steps = self.sites.photos[photo].steps();
+        let steps = self.sites.photos[photo].orientation.steps();
         self.by_pose(row, photo, steps.map(|(shift, _)| partials * shift));
     }
 
     /// Partials of some rows by the rotation step rho of a photo about its own axes, A <- A Exp(rho).
     pub fn by_rotation<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
-        let steps = self.sites.photos[photo].steps();
+        let steps = self.sites.photos[photo].orientation.steps();
         self.by_pose(row, photo, steps.map(|(_, turn)| partials * turn));
     }
 
@@ -110,19 +141,59 @@ impl Rows<'_> {
             ObjectSpace::Rectangular => 0,
             ObjectSpace::Geographic(_) => 3,
         };
-        let mut by_pose = self.sites.photos[photo].steps().map(|(_, turn)| partials * turn);
+        let mut by_pose = self.sites.photos[photo].orientation.steps().map(|(_, turn)| partials * turn);
         by_pose[..turning].fill(SMatrix::zeros());
         self.by_pose(row, photo, by_pose);
     }
 
-    fn by_pose<const N: usize>(&mut self, row: usize, photo: usize, partials: [SMatrix<f64, N, 1>; 6]) {
-        let first = self.columns[self.sites.points.len() + photo];
-        for (k, partials) in partials.iter().enumerate() {
-            self.add(row, first + k, partials.iter());
+    /// Partials of some rows by the offset of a common unknown: of its vector, or in the own axes of a place.
+    pub fn by_offset<const N: usize>(&mut self, row: usize, common: usize, partials: &SMatrix<f64, N, 3>) {
+        self.by_common(row, common, |(offset, _)| partials * offset);
+    }
+
+    /// Partials of some rows by the turn of a common unknown about its own axes, R <- R Exp(rho).
+    pub fn by_turn<const N: usize>(&mut self, row: usize, common: usize, partials: &SMatrix<f64, N, 3>) {
+        self.by_common(row, common, |(_, turn)| partials * turn);
+    }
+
+    /// The partials of rows that are the unknowns of a common one themselves, as they are counted.
+    pub fn by_itself(&mut self, row: usize, common: usize, count: usize) {
+        let Some(block) = self.sites.commons[common].block else { return };
+        (0..count).for_each(|k| self.add(row + k, block, k, [1.0].iter()));
+    }
+
+    fn by_common<const N: usize>(
+        &mut self,
+        row: usize,
+        common: usize,
+        partials: impl Fn((Vector3, Vector3)) -> SMatrix<f64, N, 1>,
+    ) {
+        let CommonSite { state, block } = self.sites.commons[common];
+        let Some(block) = block else { return };
+        for (k, step) in state.steps().enumerate() {
+            self.add(row, block, k, partials(step).iter());
         }
     }
 
-    fn add<'v>(&mut self, row: usize, column: usize, values: impl Iterator<Item = &'v f64>) {
+    fn by_pose<const N: usize>(&mut self, row: usize, photo: usize, partials: [SMatrix<f64, N, 1>; 6]) {
+        let PhotoSite { block, mounted, .. } = self.sites.photos[photo];
+        let Some((Mounted { by_frame, by_sensor, .. }, sensor)) = mounted else {
+            for (k, partials) in partials.iter().enumerate() {
+                self.add(row, block, k, partials.iter());
+            }
+            return;
+        };
+        let all = SMatrix::<f64, N, 6>::from_columns(&partials);
+        for (steps, block) in [(by_frame, Some(block)), (by_sensor, sensor)] {
+            let Some(block) = block else { continue };
+            let partials = all * steps;
+            (0..6).for_each(|k| self.add(row, block, k, partials.column(k).iter()));
+        }
+    }
+
+    fn add<'v>(&mut self, row: usize, block: usize, column: usize, values: impl Iterator<Item = &'v f64>) {
+        let Some(&(_, first)) = self.columns.iter().find(|own| own.0 == block) else { return };
+        let column = first + column;
         for (k, value) in values.enumerate() {
             self.coefficients[(row + k) * self.width + column] += value;
         }

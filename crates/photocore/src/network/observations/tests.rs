@@ -2,15 +2,34 @@
 
 #![allow(clippy::unwrap_used)]
 
+use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::tied::TiedModel;
-use super::{Fault, Observation, Precision, TiedObservation};
-use crate::geometry::{Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, PoseNumbers, RotationSense};
+use super::{Common, CommonKind, Fault, Observation, Precision, Quantity, TiedObservation};
+use crate::geometry::{
+    Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, PoseNumbers, RotationSense, rotation,
+};
+use crate::network::commons::{CommonState, PlacedCommon};
+use crate::network::mounts::{Mounted, mounted};
 
 /// Two points or photos in rectangular space.
 pub const PLACES: [[f64; 3]; 2] = [[10.0, 20.0, 1.5], [13.0, 18.5, 2.0]];
 const ATTITUDES: [[f64; 3]; 2] = [[0.4, -0.3, 1.2], [1.1, 0.5, -0.7]];
 /// Unknowns of a photo, those of its camera among them.
 const PHOTO: usize = 7;
+/// Blocks of points and photos.
+const BLOCKS: usize = 4;
+
+/// Common unknowns: one of each type, and a second sensor.
+pub const LEVER_ARM: usize = 0;
+pub const SHIFT: usize = 1;
+pub const DRIFT: usize = 2;
+pub const BORESIGHT: usize = 3;
+pub const INSTRUMENT: usize = 4;
+pub const LEVEL: usize = 5;
+pub const PLUMB_LINE: usize = 6;
+pub const LINE: usize = 7;
+pub const PLANE: usize = 8;
+pub const SENSORS: [usize; 2] = [9, 10];
 
 /// A space with two places of points and two photos, as unknowns.
 struct Scene {
@@ -19,75 +38,128 @@ struct Scene {
     unknowns: Vec<f64>,
     /// What a unit of each unknown moves in units of length or radians, about.
     units: Vec<f64>,
+    commons: Vec<PlacedCommon>,
+    /// Whether the second photo is on a frame, which is the first, with the first sensor.
+    rig: bool,
 }
 
-fn scenes() -> [Scene; 4] {
+fn width(common: &PlacedCommon) -> usize {
+    common.kind.unknowns().len()
+}
+
+/// Common unknowns of all types, near the given place.
+fn commons(space: ObjectSpace, [x, y, z]: [f64; 3]) -> Vec<PlacedCommon> {
+    let kinds = CommonKind::ALL.iter().chain(&[CommonKind::Sensor]);
+    let common = |(k, &kind): (usize, &CommonKind)| {
+        let place =
+            matches!(kind, CommonKind::Level | CommonKind::PlumbLine | CommonKind::Line | CommonKind::Plane);
+        let turns = kind.unknowns().iter().any(|&(_, component, _)| component > 2);
+        let position = if place { [x, y, z + 0.3] } else { [0.4, 0.2 * k as f64, -0.7] };
+        let attitude = if turns { rotation([0.2 * k as f64, -0.4, 0.9]) } else { Matrix3::identity() };
+        Common { kind, position, attitude, sd: vec![1.0; kind.unknowns().len()] }
+    };
+    let vertical = match space {
+        ObjectSpace::Rectangular => Matrix3::identity(),
+        ObjectSpace::Geographic(_) => crate::geometry::local_vertical(x + 0.1, y - 0.05),
+    };
+    let commons = kinds.enumerate().map(common);
+    commons.map(|common| PlacedCommon::new(&common, space, [0.0; 3], &vertical)).collect()
+}
+
+fn scenes() -> [Scene; 6] {
     let ellipsoid = Ellipsoid::new(300.0, 290.0).unwrap();
     let [to_photo, to_ground] =
         [RotationSense::GroundToPhoto, RotationSense::PhotoToGround].map(PoseNumbers::Angles);
-    let scene = |space, poses, places: [[f64; 3]; 2], turned: bool| {
+    let scene = |space, poses, places: [[f64; 3]; 2], turned: bool, rig: bool| {
+        let commons = commons(space, places[0]);
         let photo = |k: usize| {
             let [place, attitude] = [places[1 - k], ATTITUDES[k]];
             let pose = if turned { [attitude, place] } else { [place, attitude] };
             [pose.concat(), vec![0.0]].concat()
         };
-        let unknowns: Vec<f64> = [places.concat(), photo(0), photo(1)].concat();
+        let of_commons: usize = commons.iter().map(width).sum();
+        let small = (0..of_commons).map(|k| 0.3 * (1.7 * k as f64).sin()).collect();
+        let unknowns: Vec<f64> = [places.concat(), photo(0), photo(1), small].concat();
         let unit = |place: bool, k: usize| match space {
             ObjectSpace::Geographic(_) if place && k < 2 => 1.0 / 300.0,
             _ => 1.0,
         };
         let units = (0..6).map(|k| unit(true, k % 3)).chain((0..2 * PHOTO).map(|k| unit(true, k % PHOTO)));
-        Scene { space, poses, unknowns, units: units.collect() }
+        let units = units.chain(vec![1.0; of_commons]).collect();
+        Scene { space, poses, unknowns, units, commons, rig }
     };
     let geographic = [[0.3, 0.7, 1.5], [0.31, 0.69, 2.0]];
     [
-        scene(ObjectSpace::Rectangular, to_photo, PLACES, false),
-        scene(ObjectSpace::Rectangular, PoseNumbers::Vectors, PLACES, true),
-        scene(ObjectSpace::Geographic(ellipsoid), to_photo, geographic, false),
-        scene(ObjectSpace::Geographic(ellipsoid), to_ground, geographic, false),
+        scene(ObjectSpace::Rectangular, to_photo, PLACES, false, false),
+        scene(ObjectSpace::Rectangular, PoseNumbers::Vectors, PLACES, true, false),
+        scene(ObjectSpace::Geographic(ellipsoid), to_photo, geographic, false, false),
+        scene(ObjectSpace::Geographic(ellipsoid), to_ground, geographic, false, false),
+        scene(ObjectSpace::Rectangular, PoseNumbers::Vectors, PLACES, true, true),
+        scene(ObjectSpace::Geographic(ellipsoid), to_photo, geographic, false, true),
     ]
 }
 
 impl Scene {
-    fn orientations(&self, unknowns: &[f64]) -> [Orientation; 2] {
+    /// The unknowns of a block: two points, two photos, common unknowns.
+    fn of_block(&self, block: usize) -> std::ops::Range<usize> {
+        let widths = [3, 3, PHOTO, PHOTO].into_iter().chain(self.commons.iter().map(width));
+        let starts: Vec<usize> = std::iter::once(0)
+            .chain(widths.scan(0, |sum, width| {
+                *sum += width;
+                Some(*sum)
+            }))
+            .collect();
+        starts[block]..starts[block + 1]
+    }
+
+    fn orientations(&self, unknowns: &[f64]) -> ([Orientation; 2], Option<Mounted>) {
         let pose = |k: usize| std::array::from_fn(|i| unknowns[6 + PHOTO * k + i]);
-        [0, 1].map(|k| Orientation::new(self.poses, self.space, &pose(k)))
+        let [first, second] = [0, 1].map(|k| Orientation::new(self.poses, self.space, &pose(k)));
+        if self.rig {
+            let sensor = &self.states(unknowns)[SENSORS[0]];
+            let (second, mounted) = mounted(self.space, &first, sensor, true);
+            ([first, second], Some(mounted))
+        } else {
+            ([first, second], None)
+        }
+    }
+
+    fn states(&self, unknowns: &[f64]) -> Vec<CommonState> {
+        let state = |(k, common): (usize, &PlacedCommon)| common.at(&unknowns[self.of_block(BLOCKS + k)]);
+        self.commons.iter().enumerate().map(state).collect()
     }
 
     /// Constant and coefficients of an observation at given values, over all unknowns.
     fn equations(&self, observation: &Observation, unknowns: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let orientations = self.orientations(unknowns);
-        let touches = observation.touches();
-        let rows = observation.rows();
-        let width = 3 * touches.points.len() + PHOTO * touches.photos.len();
+        let ((orientations, mounted), states) = (self.orientations(unknowns), self.states(unknowns));
+        let (rows, width) = (observation.rows(), unknowns.len());
         let tied = TiedObservation {
             index: 0,
-            points: touches.points.clone(),
-            photos: touches.photos.clone(),
+            touches: observation.touches(),
+            blocks: (0..BLOCKS + self.commons.len()).collect(),
             root: Precision::Deviations(vec![1.0; rows]).root(rows).unwrap(),
             observation: observation.clone(),
         };
         let point = |i: usize| {
             let coordinates = std::array::from_fn(|k| unknowns[3 * i + k]);
-            (Point::new(self.space, coordinates), coordinates)
+            PointSite { point: Point::new(self.space, coordinates), coordinates, block: i }
+        };
+        let photo = |i: usize| {
+            let mounted = mounted.as_ref().filter(|_| i == 1).map(|own| (own, Some(BLOCKS + SENSORS[0])));
+            let block = if mounted.is_some() { 2 } else { 2 + i };
+            PhotoSite { orientation: &orientations[i], block, mounted }
         };
         let model = TiedModel {
             space: self.space,
             origin: [0.0; 3],
             point: &point,
-            photo: &|photo| (&orientations[photo], PHOTO),
+            photo: &photo,
+            common: &|i| CommonSite { state: &states[i], block: Some(BLOCKS + i) },
+            width: &|block| self.of_block(block).len(),
         };
         let (mut constant, mut coefficients) = (vec![0.0; rows], vec![f64::NAN; rows * width]);
         tied.write(&model, &mut constant, &mut coefficients);
-        let columns = touches.points.iter().flat_map(|i| 3 * i..3 * i + 3);
-        let columns = columns.chain(touches.photos.iter().flat_map(|i| 6 + PHOTO * i..6 + PHOTO * (i + 1)));
-        let columns: Vec<usize> = columns.collect();
-        let spread = |row: &[f64]| {
-            let mut all = vec![0.0; unknowns.len()];
-            columns.iter().zip(row).for_each(|(&column, &value)| all[column] = value);
-            all
-        };
-        (constant, coefficients.chunks_exact(width).map(spread).collect())
+        (constant, coefficients.chunks_exact(width).map(<[f64]>::to_vec).collect())
     }
 }
 
@@ -117,7 +189,7 @@ pub fn agrees(observation: &Observation) {
 /// Whether an observation stays as it is when everything is shifted and turned.
 pub fn stays(observation: &Observation) -> bool {
     let scene = &scenes()[0];
-    let turn = crate::geometry::rotation([0.2, -0.4, 0.3]);
+    let turn = rotation([0.2, -0.4, 0.3]);
     let numbers =
         crate::geometry::AttitudeNumbers::OmegaPhiKappa(crate::geometry::RotationSense::GroundToPhoto);
     let mut moved = scene.unknowns.clone();
@@ -126,7 +198,7 @@ pub fn stays(observation: &Observation) -> bool {
         let place_moved = turn * crate::geometry::Vector3::new(x, y, z);
         (0..3).for_each(|k| moved[place + k] = place_moved[k] + 5.0);
     }
-    for (photo, orientation) in scene.orientations(&scene.unknowns).iter().enumerate() {
+    for (photo, orientation) in scene.orientations(&scene.unknowns).0.iter().enumerate() {
         let angles = numbers.numbers(&(turn * orientation.pose().attitude));
         moved[6 + PHOTO * photo + 3..][..3].copy_from_slice(&angles);
     }
@@ -136,8 +208,11 @@ pub fn stays(observation: &Observation) -> bool {
 
 #[test]
 fn what_contradicts_itself_is_refused() {
-    let distance =
-        |points, sd| Observation::from(super::Distance { points, length: 1.0, sd }).check(3, 2).err();
+    let distance = |points, sd| {
+        Observation::from(super::Distance { points, length: 1.0, sd, instrument: None })
+            .check(3, 2, &[])
+            .err()
+    };
     assert_eq!(distance([0, 2], 0.1), None);
     assert_eq!(distance([0, 3], 0.1), Some(Fault::NoPoint(3)));
     assert_eq!(distance([1, 1], 0.1), Some(Fault::Twice));
@@ -145,7 +220,9 @@ fn what_contradicts_itself_is_refused() {
         assert_eq!(distance([0, 1], sd), Some(Fault::Deviation));
     }
     let control = |precision| {
-        Observation::from(super::Control { point: 0, coordinates: [0.0; 3], precision }).check(1, 0).err()
+        Observation::from(super::Control { point: 0, coordinates: [0.0; 3], precision })
+            .check(1, 0, &[])
+            .err()
     };
     assert_eq!(
         control(Precision::Deviations(vec![1.0; 2])),
@@ -161,10 +238,31 @@ fn what_contradicts_itself_is_refused() {
     assert_eq!(covariance(1.5, 1.5), Some(Fault::Covariance));
     let attitude = |matrix: Matrix3| {
         let precision = Precision::Deviations(vec![0.1; 3]);
-        let attitude =
-            super::Attitude { photo: 1, attitude: matrix, boresight: Matrix3::identity(), precision };
-        Observation::from(attitude).check(0, 2).err()
+        let attitude = super::Attitude {
+            photo: 1,
+            attitude: matrix,
+            boresight: Quantity::Known(Matrix3::identity()),
+            precision,
+        };
+        Observation::from(attitude).check(0, 2, &[]).err()
     };
     assert_eq!(attitude(Matrix3::identity()), None);
     assert_eq!(attitude(-Matrix3::identity()), Some(Fault::Rotation));
+}
+
+#[test]
+fn common_unknowns_of_other_types_are_refused() {
+    let common = |kind: CommonKind| Common::vector(kind, [0.0; 3], &vec![1.0; kind.unknowns().len()]);
+    let commons = [common(CommonKind::Level), common(CommonKind::Plane)];
+    let level = |level| super::OnLevel { point: 0, level, difference: 0.0, sd: 1.0 };
+    let check = |own: Observation| own.check(1, 0, &commons).err();
+    assert_eq!(check(level(0).into()), None);
+    assert_eq!(check(level(1).into()), Some(Fault::OtherCommon { common: 1, needed: CommonKind::Level }));
+    assert_eq!(check(level(2).into()), Some(Fault::NoCommon(2)));
+    let prior = |components: usize| {
+        let precision = Precision::Deviations(vec![1.0; components]);
+        check(super::Prior { common: 1, components, precision }.into())
+    };
+    assert_eq!(prior(3), None);
+    assert_eq!(prior(1), Some(Fault::Deviations { components: 3, given: 1 }));
 }

@@ -2,50 +2,55 @@
 
 use nalgebra::DMatrix;
 
-use super::{Observation, Rows, Sites};
-use crate::geometry::{ObjectSpace, Orientation, Point};
+use super::rows::{CommonSite, PhotoSite, PointSite};
+use super::{Observation, Rows, Sites, Touches};
+use crate::geometry::ObjectSpace;
 
-/// An observation of points and photos of a model.
+/// An observation of points, photos and common unknowns of a model.
 #[derive(Debug)]
 pub struct TiedObservation {
     /// Its index in the network.
     pub index: usize,
     pub observation: Observation,
-    /// Its points, as the model numbers them, and photos.
-    pub points: Vec<usize>,
-    pub photos: Vec<usize>,
+    /// What it touches, points as the model numbers them.
+    pub touches: Touches,
+    /// The kept blocks of these, each once.
+    pub blocks: Vec<usize>,
     /// L of its covariance matrix S = L L^T.
     pub root: DMatrix<f64>,
 }
 
-/// Points and photos of a model at given values of the unknowns.
+/// What a model has at given values of the unknowns.
 pub struct TiedModel<'a> {
     pub space: ObjectSpace,
     pub origin: [f64; 3],
-    /// Position and coordinates of a point.
-    pub point: &'a dyn Fn(usize) -> (Point, [f64; 3]),
-    /// The photos, and how many unknowns each has.
-    pub photo: &'a dyn Fn(usize) -> (&'a Orientation, usize),
+    pub point: &'a dyn Fn(usize) -> PointSite,
+    pub photo: &'a dyn Fn(usize) -> PhotoSite<'a>,
+    pub common: &'a dyn Fn(usize) -> CommonSite<'a>,
+    /// How many unknowns each block has.
+    pub width: &'a dyn Fn(usize) -> usize,
 }
 
 impl TiedObservation {
-    /// Writes L^-1 (observed - computed) and L^-1 times the partials: columns of three for each point, then those of each photo.
+    /// Writes L^-1 (observed - computed) and L^-1 times the partials, in columns block by block.
     pub fn write(&self, model: &TiedModel<'_>, constant: &mut [f64], coefficients: &mut [f64]) {
-        let photos: Vec<(&Orientation, usize)> = self.photos.iter().map(|&i| (model.photo)(i)).collect();
         let sites = Sites {
             space: model.space,
             origin: model.origin,
-            points: self.points.iter().map(|&point| (model.point)(point)).collect(),
-            photos: photos.iter().map(|&(photo, _)| photo).collect(),
+            points: self.touches.points.iter().map(|&point| (model.point)(point)).collect(),
+            photos: self.touches.photos.iter().map(|&photo| (model.photo)(photo)).collect(),
+            commons: self.touches.commons.iter().map(|&(common, _)| (model.common)(common)).collect(),
         };
         let mut width = 0;
-        let mut columns = Vec::new();
-        for unknowns in self.points.iter().map(|_| 3).chain(photos.iter().map(|&(_, unknowns)| unknowns)) {
-            columns.push(width);
-            width += unknowns;
-        }
+        let column = |&block: &usize| {
+            let first = width;
+            width += (model.width)(block);
+            (block, first)
+        };
+        let columns: Vec<(usize, usize)> = self.blocks.iter().map(column).collect();
         coefficients.fill(0.0);
-        let mut rows = Rows { sites: &sites, columns, width, constant: &mut *constant, coefficients };
+        let mut rows =
+            Rows { sites: &sites, columns: &columns, width, constant: &mut *constant, coefficients };
         self.observation.write(&sites, &mut rows);
         self.whiten(constant, 1);
         self.whiten(coefficients, width);

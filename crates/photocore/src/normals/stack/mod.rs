@@ -127,6 +127,20 @@ impl Stack {
         Strip { at: segment.row, rows: Rows { values, width, stride: width, count } }
     }
 
+    /// Its coupling V, part by part: where the coupled unknowns stand in the order of elimination, and its rows, local block by local
+    /// block.
+    #[inline(always)]
+    pub fn couplings<'s, const L: usize, const D: usize>(
+        &'s self,
+        symbolic: &'s Symbolic,
+    ) -> impl Iterator<Item = (Range<usize>, Rows<'s>)> {
+        let of_slot =
+            move |slot: &'s Slot| (symbolic.range(slot.position), self.slot_coupling::<L, D>(slot).rows);
+        let of_segment =
+            move |segment: &'s Segment| (segment.range(symbolic), self.segment_coupling::<L>(segment).rows);
+        self.slots.iter().map(of_slot).chain(self.segments.iter().map(of_segment))
+    }
+
     /// The coefficients of a main block in all its equations, local block by local block.
     #[inline(always)]
     pub fn slot_rows<const D: usize>(&self, slot: &Slot, rows: usize) -> Strip<'_> {

@@ -110,6 +110,8 @@ impl Search<'_> {
             points: own,
             images: images.iter().filter_map(|&index| image(&self.given.sightings[index])).collect(),
             observations: vec![],
+            commons: vec![],
+            mounts: vec![],
         }
     }
 

@@ -2,7 +2,8 @@
 //!
 //! The first photo stands at the origin, its attitude is the identity, and the base has length 1. Samples of five points give essential
 //! matrices ([`five_points`]), samples of four the poses of a homography, the rival where the scene is a plane. Each is judged by the
-//! angle by which the pairs of rays miss each other, that of the best two fifths, those that meet behind a photo (u3 > 0) missing altogether; least squares comes
+//! angle by which the best two fifths of the pairs of rays miss each other at the most, those that meet behind a photo (u3 > 0) missing
+//! altogether; least squares comes
 //! after (`first_values`).
 //!
 //! ```

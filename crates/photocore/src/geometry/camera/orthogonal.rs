@@ -1,0 +1,296 @@
+//! Corrections that are orthogonal over the format of the image: the 12 of Ebner (1976) and the 44 of Gruen (1978).
+
+use super::Unit;
+use super::backward::{BackwardModel, Corrected};
+use super::inverse::{RadialLimit, way_back};
+
+/// P_0 to P_4 of one coordinate, and their derivatives.
+type Basis = [(f64, f64); 5];
+
+/// A parameter times a number is the factor of the product P_i(Y) P_j(X) in one component: (parameter, component, number, i, j).
+type Term = (usize, usize, f64, usize, usize);
+
+/// A set of orthogonal corrections.
+pub trait OrthogonalSet<const N: usize>: Copy {
+    /// What the camera is called.
+    const NAME: &'static str;
+    /// c, xp, yp, the corrections, b.
+    const PARAMETERS: &'static [(&'static str, Unit)];
+    /// As documents say it.
+    const FORMULA: &'static str;
+    /// What the corrections are, numbered from zero.
+    const TERMS: &'static [Term];
+
+    /// The polynomials of one coordinate over a format of half side b.
+    fn basis(x: f64, b: f64) -> Basis;
+}
+
+/// Corrections of a set, backward: functions of measured coordinates, which they are added to.
+///
+/// With X = x - xp, Y = y - yp, x to the right and y up, and b half the side of the used format, which is never an unknown. What shifts,
+/// rotations, scale and tilts of a vertical photo do is not among them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Orthogonal<S, const N: usize> {
+    /// c, negative for the positive plane; xp, yp; the corrections; b.
+    pub parameters: [f64; N],
+    set: S,
+}
+
+/// [`Ebner12`] with c, xp, yp before and b behind.
+pub type Ebner = Orthogonal<Ebner12, 16>;
+/// [`Gruen44`] with c, xp, yp before and b behind.
+pub type Gruen = Orthogonal<Gruen44, 48>;
+
+/// Corrections orthogonal on the grid -b, 0, b.
+///
+/// ```text
+/// k = X^2 - 2 b^2/3,    l = Y^2 - 2 b^2/3
+/// gx = X + e1 X + e2 Y - 2 e3 k + e4 X Y + e5 l + e7 X l + e9 Y k + e11 k l
+/// gy = Y - e1 Y + e2 X + e3 X Y - 2 e4 l + e6 k + e8 Y k + e10 X l + e12 k l
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Ebner12;
+
+/// Corrections orthogonal on the grid -b, -b/2, 0, b/2, b.
+///
+/// ```text
+/// k = X^2 - b^2/2,  p = X^2 - 17 b^2/20,  r = X^2 (X^2 - 31 b^2/28) + 9 b^4/70;     l, q, s: the same of Y
+/// T_ij = (row i of 1, Y, l, Y q, s) times (column j of 1, X, k, X p, r),       i, j = 1..5
+/// gx = X + a12 X + a21 Y + a22 X Y + a31 l - (10/7) b22 k + sum a_ij T_ij
+/// gy = Y - a12 Y + a21 X - (10/7) a22 l + b13 k + b22 X Y + sum b_ij T_ij
+/// further a_ij, b_ij:  14 23 32 41  15 24 33 42 51  25 34 43 52  35 44 53  45 54  55
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Gruen44;
+
+impl OrthogonalSet<16> for Ebner12 {
+    const NAME: &'static str = "ebner";
+    const PARAMETERS: &'static [(&'static str, Unit)] = &[
+        ("c", Unit::Image),
+        ("xp", Unit::Image),
+        ("yp", Unit::Image),
+        ("e1", Unit::One),
+        ("e2", Unit::One),
+        ("e3", Unit::PerImage(1)),
+        ("e4", Unit::PerImage(1)),
+        ("e5", Unit::PerImage(1)),
+        ("e6", Unit::PerImage(1)),
+        ("e7", Unit::PerImage(2)),
+        ("e8", Unit::PerImage(2)),
+        ("e9", Unit::PerImage(2)),
+        ("e10", Unit::PerImage(2)),
+        ("e11", Unit::PerImage(3)),
+        ("e12", Unit::PerImage(3)),
+        ("b", Unit::Image),
+    ];
+    const FORMULA: &'static str = "X = x - xp, Y = y - yp, k = X^2 - 2 b^2/3, l = Y^2 - 2 b^2/3, corrected = (X + e1 X + e2 Y - 2 e3 k + \
+         e4 X Y + e5 l + e7 X l + e9 Y k + e11 k l, Y - e1 Y + e2 X + e3 X Y - 2 e4 l + e6 k + e8 Y k + e10 X l + e12 k l), \
+         residual = corrected - image, image = c (u1, u2) / u3";
+    const TERMS: &'static [Term] = &[
+        (0, 0, 1.0, 0, 1),
+        (1, 0, 1.0, 1, 0),
+        (2, 0, -2.0, 0, 2),
+        (3, 0, 1.0, 1, 1),
+        (4, 0, 1.0, 2, 0),
+        (6, 0, 1.0, 2, 1),
+        (8, 0, 1.0, 1, 2),
+        (10, 0, 1.0, 2, 2),
+        (0, 1, -1.0, 1, 0),
+        (1, 1, 1.0, 0, 1),
+        (2, 1, 1.0, 1, 1),
+        (3, 1, -2.0, 2, 0),
+        (5, 1, 1.0, 0, 2),
+        (7, 1, 1.0, 1, 2),
+        (9, 1, 1.0, 2, 1),
+        (11, 1, 1.0, 2, 2),
+    ];
+
+    #[inline(always)]
+    fn basis(x: f64, b: f64) -> Basis {
+        [(1.0, 0.0), (x, 1.0), (x * x - 2.0 * b * b / 3.0, 2.0 * x), (0.0, 0.0), (0.0, 0.0)]
+    }
+}
+
+impl OrthogonalSet<48> for Gruen44 {
+    const NAME: &'static str = "gruen";
+    const PARAMETERS: &'static [(&'static str, Unit)] = &[
+        ("c", Unit::Image),
+        ("xp", Unit::Image),
+        ("yp", Unit::Image),
+        ("a12", Unit::One),
+        ("a21", Unit::One),
+        ("a22", Unit::PerImage(1)),
+        ("a31", Unit::PerImage(1)),
+        ("a14", Unit::PerImage(2)),
+        ("a23", Unit::PerImage(2)),
+        ("a32", Unit::PerImage(2)),
+        ("a41", Unit::PerImage(2)),
+        ("a15", Unit::PerImage(3)),
+        ("a24", Unit::PerImage(3)),
+        ("a33", Unit::PerImage(3)),
+        ("a42", Unit::PerImage(3)),
+        ("a51", Unit::PerImage(3)),
+        ("a25", Unit::PerImage(4)),
+        ("a34", Unit::PerImage(4)),
+        ("a43", Unit::PerImage(4)),
+        ("a52", Unit::PerImage(4)),
+        ("a35", Unit::PerImage(5)),
+        ("a44", Unit::PerImage(5)),
+        ("a53", Unit::PerImage(5)),
+        ("a45", Unit::PerImage(6)),
+        ("a54", Unit::PerImage(6)),
+        ("a55", Unit::PerImage(7)),
+        ("b13", Unit::PerImage(1)),
+        ("b22", Unit::PerImage(1)),
+        ("b14", Unit::PerImage(2)),
+        ("b23", Unit::PerImage(2)),
+        ("b32", Unit::PerImage(2)),
+        ("b41", Unit::PerImage(2)),
+        ("b15", Unit::PerImage(3)),
+        ("b24", Unit::PerImage(3)),
+        ("b33", Unit::PerImage(3)),
+        ("b42", Unit::PerImage(3)),
+        ("b51", Unit::PerImage(3)),
+        ("b25", Unit::PerImage(4)),
+        ("b34", Unit::PerImage(4)),
+        ("b43", Unit::PerImage(4)),
+        ("b52", Unit::PerImage(4)),
+        ("b35", Unit::PerImage(5)),
+        ("b44", Unit::PerImage(5)),
+        ("b53", Unit::PerImage(5)),
+        ("b45", Unit::PerImage(6)),
+        ("b54", Unit::PerImage(6)),
+        ("b55", Unit::PerImage(7)),
+        ("b", Unit::Image),
+    ];
+    const FORMULA: &'static str = "X = x - xp, Y = y - yp, k = X^2 - b^2/2, p = X^2 - 17 b^2/20, r = X^2 (X^2 - 31 b^2/28) + 9 b^4/70, \
+         l, q, s of Y as k, p, r of X, T_ij = (1, Y, l, Y q, s)_i (1, X, k, X p, r)_j, corrected = (X + a12 X + a21 Y + a22 X Y + a31 l \
+         - (10/7) b22 k + sum a_ij T_ij, Y - a12 Y + a21 X - (10/7) a22 l + b13 k + b22 X Y + sum b_ij T_ij), residual = corrected - \
+         image, image = c (u1, u2) / u3";
+    const TERMS: &'static [Term] = &[
+        (0, 0, 1.0, 0, 1),
+        (1, 0, 1.0, 1, 0),
+        (2, 0, 1.0, 1, 1),
+        (3, 0, 1.0, 2, 0),
+        (24, 0, -10.0 / 7.0, 0, 2),
+        (4, 0, 1.0, 0, 3),
+        (5, 0, 1.0, 1, 2),
+        (6, 0, 1.0, 2, 1),
+        (7, 0, 1.0, 3, 0),
+        (8, 0, 1.0, 0, 4),
+        (9, 0, 1.0, 1, 3),
+        (10, 0, 1.0, 2, 2),
+        (11, 0, 1.0, 3, 1),
+        (12, 0, 1.0, 4, 0),
+        (13, 0, 1.0, 1, 4),
+        (14, 0, 1.0, 2, 3),
+        (15, 0, 1.0, 3, 2),
+        (16, 0, 1.0, 4, 1),
+        (17, 0, 1.0, 2, 4),
+        (18, 0, 1.0, 3, 3),
+        (19, 0, 1.0, 4, 2),
+        (20, 0, 1.0, 3, 4),
+        (21, 0, 1.0, 4, 3),
+        (22, 0, 1.0, 4, 4),
+        (0, 1, -1.0, 1, 0),
+        (1, 1, 1.0, 0, 1),
+        (2, 1, -10.0 / 7.0, 2, 0),
+        (23, 1, 1.0, 0, 2),
+        (24, 1, 1.0, 1, 1),
+        (25, 1, 1.0, 0, 3),
+        (26, 1, 1.0, 1, 2),
+        (27, 1, 1.0, 2, 1),
+        (28, 1, 1.0, 3, 0),
+        (29, 1, 1.0, 0, 4),
+        (30, 1, 1.0, 1, 3),
+        (31, 1, 1.0, 2, 2),
+        (32, 1, 1.0, 3, 1),
+        (33, 1, 1.0, 4, 0),
+        (34, 1, 1.0, 1, 4),
+        (35, 1, 1.0, 2, 3),
+        (36, 1, 1.0, 3, 2),
+        (37, 1, 1.0, 4, 1),
+        (38, 1, 1.0, 2, 4),
+        (39, 1, 1.0, 3, 3),
+        (40, 1, 1.0, 4, 2),
+        (41, 1, 1.0, 3, 4),
+        (42, 1, 1.0, 4, 3),
+        (43, 1, 1.0, 4, 4),
+    ];
+
+    #[inline(always)]
+    fn basis(x: f64, b: f64) -> Basis {
+        let (square, format) = (x * x, b * b);
+        [
+            (1.0, 0.0),
+            (x, 1.0),
+            (square - format / 2.0, 2.0 * x),
+            (x * (square - 0.85 * format), 3.0 * square - 0.85 * format),
+            (
+                square * (square - 31.0 / 28.0 * format) + 9.0 / 70.0 * format * format,
+                x * (4.0 * square - 31.0 / 14.0 * format),
+            ),
+        ]
+    }
+}
+
+/// The first parameter that is a correction.
+const FIRST: usize = 3;
+
+impl<S: OrthogonalSet<N> + Default, const N: usize> BackwardModel for Orthogonal<S, N>
+where
+    [f64; N]: for<'a> TryFrom<&'a [f64]>,
+{
+    type Parameters = [f64; N];
+
+    const NAME: &'static str = S::NAME;
+    const PARAMETERS: &'static [(&'static str, Unit)] = S::PARAMETERS;
+    const CONSTANTS: usize = 1;
+    const FORMULA: &'static str = S::FORMULA;
+
+    fn with_parameters(parameters: [f64; N]) -> Self {
+        Self { parameters, set: S::default() }
+    }
+
+    fn parameters(&self) -> [f64; N] {
+        self.parameters
+    }
+
+    fn principal_distance(&self) -> f64 {
+        self.parameters[0]
+    }
+
+    #[inline(always)]
+    fn correct(&self, measured: [f64; 2]) -> Corrected<[f64; N]> {
+        let place = [measured[0] - self.parameters[1], measured[1] - self.parameters[2]];
+        let [of_x, of_y] = place.map(|value| S::basis(value, self.parameters[N - 1]));
+        let (mut xy, mut by_measured) = (place, [[1.0, 0.0], [0.0, 1.0]]);
+        let mut by_parameters = [[0.0; N]; 2];
+        for &(parameter, component, number, i, j) in S::TERMS {
+            let ((p, by_p), (q, by_q)) = (of_y[i], of_x[j]);
+            let value = number * self.parameters[FIRST + parameter];
+            xy[component] += value * p * q;
+            by_measured[component][0] += value * p * by_q;
+            by_measured[component][1] += value * by_p * q;
+            by_parameters[component][FIRST + parameter] = number * p * q;
+        }
+        for (own, by) in by_parameters.iter_mut().zip(&by_measured) {
+            (own[1], own[2]) = (-by[0], -by[1]);
+        }
+        Corrected { xy, by_measured, by_parameters }
+    }
+
+    /// The corrections are small: what is corrected is where it starts.
+    fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]> {
+        let start = [corrected[0] + self.parameters[1], corrected[1] + self.parameters[2]];
+        way_back(start, corrected, |measured| {
+            let Corrected { xy, by_measured, .. } = self.correct(measured);
+            (xy, by_measured)
+        })
+    }
+
+    /// They have no radial part.
+    fn radial_limit(&self) -> Option<RadialLimit> {
+        None
+    }
+}

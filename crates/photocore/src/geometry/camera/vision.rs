@@ -1,0 +1,397 @@
+//! Cameras of computer vision and of Agisoft: a projection, a lens with radial, tangential and prism terms, focal lengths.
+//!
+//! Each is a table of what its parameters are. Axes are those of vision, x right, y down, z forward: (X, Y, Z) = (u1, -u2, -u3). Image
+//! coordinates are pixels, column and row.
+
+use super::inverse::{Matrix2, RadialFactor, RadialLimit, from_radial};
+use super::projections::{
+    Central, DivisionByRadius, Equidistant, ExtendedUnified, FieldOfView, RayProjection, Seen,
+};
+use super::radial_tangential::{Bent, RadialTangential};
+use super::{CameraModel, Image, Unit};
+use crate::geometry::Vector3;
+
+/// What a parameter is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Role {
+    /// Both focal lengths; that of columns; that of rows.
+    F,
+    Fx,
+    Fy,
+    /// The principal point.
+    Cx,
+    Cy,
+    /// The size of the picture, from whose centre the principal point is counted.
+    W,
+    H,
+    /// Beside the focal length of columns; what rows add to columns; the same as a part of it.
+    B1,
+    B2,
+    Skew,
+    /// A parameter of the projection.
+    Own(usize),
+    /// A coefficient of N or D of the radial factor, by its power.
+    N(usize),
+    D(usize),
+    /// t1 or t2.
+    T(usize),
+    /// s1 and s2 of x, s3 and s4 of y.
+    S(usize),
+}
+
+impl Role {
+    const fn unit(self) -> Unit {
+        match self {
+            Self::F | Self::Fx | Self::Fy | Self::Cx | Self::Cy | Self::W | Self::H | Self::B1 | Self::B2 => {
+                Unit::Image
+            }
+            Self::Skew | Self::Own(_) | Self::N(_) | Self::D(_) | Self::T(_) | Self::S(_) => Unit::One,
+        }
+    }
+}
+
+/// What a camera is made of: image = (fx a + shear b + x0, fy b + y0) of the bent a, b.
+#[derive(Debug, Clone, Copy)]
+struct Parts {
+    focal: [f64; 2],
+    shear: f64,
+    skew: f64,
+    origin: [f64; 2],
+    own: [f64; 2],
+    lens: RadialTangential,
+}
+
+impl Parts {
+    #[inline(always)]
+    fn new<const N: usize>(roles: &[Role; N], values: &[f64; N]) -> Self {
+        let lens = RadialTangential {
+            radial: RadialFactor::polynomial(&[]),
+            tangential: [0.0; 2],
+            prism: [[0.0; 2]; 2],
+        };
+        let (origin, own) = ([0.0; 2], [0.0; 2]);
+        let mut parts = Self { focal: [0.0; 2], shear: 0.0, skew: 0.0, origin, own, lens };
+        for (role, &value) in roles.iter().zip(values) {
+            match *role {
+                Role::F => parts.focal = parts.focal.map(|focal| focal + value),
+                Role::Fx | Role::B1 => parts.focal[0] += value,
+                Role::Fy => parts.focal[1] += value,
+                Role::Cx => parts.origin[0] += value,
+                Role::Cy => parts.origin[1] += value,
+                Role::W => parts.origin[0] += 0.5 * value,
+                Role::H => parts.origin[1] += 0.5 * value,
+                Role::B2 => parts.shear += value,
+                Role::Skew => parts.skew = value,
+                Role::Own(k) => parts.own[k] = value,
+                Role::N(power) => parts.lens.radial.numerator[power] = value,
+                Role::D(power) => parts.lens.radial.denominator[power] = value,
+                Role::T(k) => parts.lens.tangential[k] = value,
+                Role::S(k) => parts.lens.prism[k / 2][k % 2] = value,
+            }
+        }
+        parts.shear += parts.skew * parts.focal[0];
+        parts
+    }
+
+    /// The place that a lens bends, and what it is then.
+    #[inline(always)]
+    fn bend(&self, ab: [f64; 2], staged: bool) -> Bending {
+        if !staged {
+            let bent = self.lens.bend(ab);
+            return Bending {
+                first: bent,
+                last: bent,
+                by_first: [[1.0, 0.0], [0.0, 1.0]],
+                by_place: bent.by_place,
+            };
+        }
+        let straight = RadialFactor::polynomial(&[]);
+        let first = RadialTangential { tangential: [0.0; 2], prism: [[0.0; 2]; 2], ..self.lens }.bend(ab);
+        let last = RadialTangential { radial: straight, ..self.lens }.bend(first.xy);
+        let (to, from) = (last.by_place, first.by_place);
+        let by_place = [0, 1].map(|i| [0, 1].map(|k| to[i][0] * from[0][k] + to[i][1] * from[1][k]));
+        Bending { first, last, by_first: to, by_place }
+    }
+
+    #[inline(always)]
+    fn image(&self, [a, b]: [f64; 2]) -> [f64; 2] {
+        [self.focal[0] * a + self.shear * b + self.origin[0], self.focal[1] * b + self.origin[1]]
+    }
+
+    /// What moves a, b moves the image so.
+    #[inline(always)]
+    fn moved(&self, [a, b]: [f64; 2]) -> [f64; 2] {
+        [self.focal[0] * a + self.shear * b, self.focal[1] * b]
+    }
+
+    /// The image's partials by a parameter.
+    #[inline(always)]
+    fn by(&self, role: Role, seen: &Seen, bending: &Bending) -> [f64; 2] {
+        let [a, b] = bending.last.xy;
+        let through = |m: &Matrix2, v: [f64; 2]| self.moved(super::inverse::times(m, v));
+        match role {
+            Role::F => [a, b],
+            Role::Fx => [a + self.skew * b, 0.0],
+            Role::Fy => [0.0, b],
+            Role::Cx => [1.0, 0.0],
+            Role::Cy => [0.0, 1.0],
+            Role::W => [0.5, 0.0],
+            Role::H => [0.0, 0.5],
+            Role::B1 => [a, 0.0],
+            Role::B2 => [b, 0.0],
+            Role::Skew => [self.focal[0] * b, 0.0],
+            Role::Own(k) => through(&bending.by_place, seen.by_own.map(|row| row[k])),
+            Role::N(power) => through(&bending.by_first, bending.first.by_numerator(power as i32)),
+            Role::D(power) => through(&bending.by_first, bending.first.by_denominator(power as i32)),
+            Role::T(k) => self.moved(bending.last.by_tangential()[k]),
+            Role::S(k) => {
+                let own = bending.last.by_prism()[k % 2];
+                self.moved(if k < 2 { [own, 0.0] } else { [0.0, own] })
+            }
+        }
+    }
+}
+
+/// What a lens does in one or two stages: radial, then the rest.
+struct Bending {
+    first: Bent,
+    last: Bent,
+    /// What a lens gives by what its first stage gives, and by the place.
+    by_first: Matrix2,
+    by_place: Matrix2,
+}
+
+/// A model as a table; the projection, whether tangential and prism terms act on what the radial ones have bent, and the roles.
+trait Table<const N: usize>: Copy {
+    type Projection: RayProjection;
+    const STAGED: bool;
+    const ROLES: [Role; N];
+
+    fn values(&self) -> &[f64; N];
+
+    #[inline(always)]
+    fn parts(&self) -> Parts {
+        Parts::new(&Self::ROLES, self.values())
+    }
+
+    #[inline(always)]
+    fn place(&self, u: &Vector3) -> [f64; 2] {
+        let parts = self.parts();
+        let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
+        parts.image(parts.bend(seen.ab, Self::STAGED).last.xy)
+    }
+
+    #[inline(always)]
+    fn with_partials(&self, u: &Vector3) -> Image<[f64; N]> {
+        let parts = self.parts();
+        let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
+        let bending = parts.bend(seen.ab, Self::STAGED);
+        let by_ray = [0, 1, 2]
+            .map(|k| parts.moved(super::inverse::times(&bending.by_place, seen.by_ray.map(|row| row[k]))));
+        let by_u = |row: usize| Vector3::new(by_ray[0][row], -by_ray[1][row], -by_ray[2][row]);
+        let columns = Self::ROLES.map(|role| parts.by(role, &seen, &bending));
+        let by = |row: usize| std::array::from_fn(|k| columns[k][row]);
+        Image { xy: parts.image(bending.last.xy), by_u: [by_u(0), by_u(1)], by_parameters: [by(0), by(1)] }
+    }
+
+    fn sight(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
+        let parts = self.parts();
+        let b = (y - parts.origin[1]) / parts.focal[1];
+        let a = (x - parts.origin[0] - parts.shear * b) / parts.focal[0];
+        let ab = from_radial(&parts.lens.radial, [a, b], |place| {
+            let bending = parts.bend(place, Self::STAGED);
+            (bending.last.xy, bending.by_place)
+        })?;
+        let [x, y, z] = Self::Projection::ray(ab, parts.own)?;
+        Some(Vector3::new(x, -y, -z).normalize())
+    }
+
+    fn limit(&self) -> Option<RadialLimit> {
+        let parts = self.parts();
+        parts.lens.radial.limit().or_else(|| Self::Projection::limit(parts.own))
+    }
+}
+
+/// Declares cameras: name and number of parameters, what files call it, projection, formula of the lens, parameters with their roles. The
+/// last `constants` of them are never unknowns.
+macro_rules! cameras_of_vision {
+    ($($(#[$doc:meta])* $name:ident[$count:literal] = $said:literal, $projection:ident, $staged:literal, $constants:literal,
+       $formula:expr, [$($parameter:literal: $role:expr),* $(,)?];)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct $name {
+            /// Its parameters, in their order.
+            pub parameters: [f64; $count],
+        }
+
+        impl Table<$count> for $name {
+            type Projection = $projection;
+            const STAGED: bool = $staged;
+            const ROLES: [Role; $count] = [$($role),*];
+
+            #[inline(always)]
+            fn values(&self) -> &[f64; $count] {
+                &self.parameters
+            }
+        }
+
+        impl CameraModel for $name {
+            type Parameters = [f64; $count];
+
+            const NAME: &'static str = $said;
+            const PARAMETERS: &'static [(&'static str, Unit)] = &[$(($parameter, $role.unit())),*];
+            const CONSTANTS: usize = $constants;
+            const FORMULA: &'static str = $formula;
+
+            fn with_parameters(parameters: [f64; $count]) -> Self {
+                Self { parameters }
+            }
+
+            fn parameters(&self) -> [f64; $count] {
+                self.parameters
+            }
+
+            fn scale(&self) -> f64 {
+                self.parts().focal[0].abs()
+            }
+
+            fn image(&self, u: &Vector3) -> [f64; 2] {
+                self.place(u)
+            }
+
+            fn linearize(&self, u: &Vector3) -> Image<[f64; $count]> {
+                self.with_partials(u)
+            }
+
+            fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
+                self.sight(xy)
+            }
+
+            fn radial_limit(&self) -> Option<RadialLimit> {
+                self.limit()
+            }
+        }
+    )*};
+}
+
+/// (a, b) of a central perspective, and where the bent ones are in the image.
+macro_rules! central {
+    ($image:literal, $lens:literal) => {
+        concat!("(a, b) = (P1, -P2) / -P3, r^2 = a^2 + b^2, ", $lens, ", image = ", $image)
+    };
+}
+
+/// The same of an equidistant one.
+macro_rules! fisheye {
+    ($image:literal, $lens:literal) => {
+        concat!(
+            "(a, b) = theta (P1, -P2) / rho, rho = hypot(P1, P2), theta = atan2(rho, -P3), r^2 = a^2 + b^2, ",
+            $lens,
+            ", image = ",
+            $image
+        )
+    };
+}
+
+use Role::*;
+
+cameras_of_vision! {
+    /// SIMPLE_PINHOLE of COLMAP: a central perspective.
+    SimplePinhole[3] = "simple_pinhole", Central, false, 0,
+        central!("(f a + cx, f b + cy)", "no lens"),
+        ["f": F, "cx": Cx, "cy": Cy];
+    /// PINHOLE of COLMAP: pixels that are not square.
+    Pinhole[4] = "pinhole", Central, false, 0,
+        central!("(fx a + cx, fy b + cy)", "no lens"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy];
+    /// SIMPLE_RADIAL of COLMAP: one radial term.
+    SimpleRadial[4] = "simple_radial", Central, false, 0,
+        central!("(f A + cx, f B + cy)", "(A, B) = (a, b) (1 + k r^2)"),
+        ["f": F, "cx": Cx, "cy": Cy, "k": N(1)];
+    /// OPENCV of COLMAP: two radial and two tangential terms; p1, p2 are P2, P1 of photogrammetry.
+    Opencv[8] = "opencv", Central, false, 0,
+        central!("(fx A + cx, fy B + cy)",
+            "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4) + (2 p1 a b + p2 (r^2 + 2 a^2), p1 (r^2 + 2 b^2) + 2 p2 a b)"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0)];
+    /// FULL_OPENCV of COLMAP: a rational radial factor; k3 stands behind p2.
+    FullOpencv[12] = "full_opencv", Central, false, 0,
+        central!("(fx A + cx, fy B + cy)",
+            "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + (2 p1 a b + p2 (r^2 + 2 a^2), \
+             p1 (r^2 + 2 b^2) + 2 p2 a b)"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0), "k3": N(3), "k4": D(1), "k5": D(2),
+         "k6": D(3)];
+    /// The camera of OpenCV itself: that of [`FullOpencv`] with a thin prism; pixel centres are whole numbers.
+    OpencvPinhole[16] = "opencv_pinhole", Central, false, 0,
+        central!("(fx A + cx, fy B + cy)",
+            "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + (2 p1 a b + p2 (r^2 + 2 a^2), \
+             p1 (r^2 + 2 b^2) + 2 p2 a b) + (s1 r^2 + s2 r^4, s3 r^2 + s4 r^4)"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0), "k3": N(3), "k4": D(1), "k5": D(2),
+         "k6": D(3), "s1": S(0), "s2": S(1), "s3": S(2), "s4": S(3)];
+    /// FOV of COLMAP (Devernay and Faugeras 2001). At omega = 0 nothing depends on omega to first order: do not start there.
+    Fov[5] = "fov", FieldOfView, false, 0,
+        central!("(fx A + cx, fy B + cy)", "(A, B) = (a, b) atan(2 r tan(omega / 2)) / (r omega)"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "omega": Own(0)];
+    /// SIMPLE_FISHEYE of COLMAP: equidistant.
+    SimpleFisheye[3] = "simple_fisheye", Equidistant, false, 0,
+        fisheye!("(f a + cx, f b + cy)", "no lens"),
+        ["f": F, "cx": Cx, "cy": Cy];
+    /// FISHEYE of COLMAP: equidistant.
+    Fisheye[4] = "fisheye", Equidistant, false, 0,
+        fisheye!("(fx a + cx, fy b + cy)", "no lens"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy];
+    /// SIMPLE_RADIAL_FISHEYE of COLMAP: one radial term in theta.
+    SimpleRadialFisheye[4] = "simple_radial_fisheye", Equidistant, false, 0,
+        fisheye!("(f A + cx, f B + cy)", "(A, B) = (a, b) (1 + k r^2)"),
+        ["f": F, "cx": Cx, "cy": Cy, "k": N(1)];
+    /// RADIAL_FISHEYE of COLMAP: two radial terms in theta.
+    RadialFisheye[5] = "radial_fisheye", Equidistant, false, 0,
+        fisheye!("(f A + cx, f B + cy)", "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4)"),
+        ["f": F, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2)];
+    /// OPENCV_FISHEYE of COLMAP (Kannala and Brandt 2006): four radial terms in theta.
+    OpencvFisheye[8] = "opencv_fisheye", Equidistant, false, 0,
+        fisheye!("(fx A + cx, fy B + cy)", "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8)"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4)];
+    /// The fisheye of OpenCV itself: that of [`OpencvFisheye`] with a skew; pixel centres are whole numbers.
+    OpencvFisheyeSkew[9] = "opencv_fisheye_skew", Equidistant, false, 0,
+        fisheye!("(fx (A + skew B) + cx, fy B + cy)", "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8)"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "skew": Skew, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4)];
+    /// THIN_PRISM_FISHEYE of COLMAP; k3 stands behind p2.
+    ThinPrismFisheye[12] = "thin_prism_fisheye", Equidistant, false, 0,
+        fisheye!("(fx A + cx, fy B + cy)",
+            "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (2 p1 a b + p2 (r^2 + 2 a^2), p1 (r^2 + 2 b^2) + 2 p2 a b) + \
+             (sx1, sy1) r^2"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0), "k3": N(3), "k4": N(4), "sx1": S(0),
+         "sy1": S(2)];
+    /// RAD_TAN_THIN_PRISM_FISHEYE of COLMAP: tangential and prism terms act on what the radial ones have bent; p0, p1 are P1, P2 of
+    /// photogrammetry.
+    RadTanThinPrismFisheye[16] = "rad_tan_thin_prism_fisheye", Equidistant, true, 0,
+        fisheye!("(fx A + cx, fy B + cy)",
+            "(x, y) = (a, b) (1 + k0 r^2 + ... + k5 r^12), q^2 = x^2 + y^2, (A, B) = (x + p0 (2 x^2 + q^2) + 2 p1 x y + s0 q^2 + s1 q^4, \
+             y + 2 p0 x y + p1 (2 y^2 + q^2) + s2 q^2 + s3 q^4)"),
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k0": N(1), "k1": N(2), "k2": N(3), "k3": N(4), "k4": N(5), "k5": N(6), "p0": T(0),
+         "p1": T(1), "s0": S(0), "s1": S(1), "s2": S(2), "s3": S(3)];
+    /// SIMPLE_DIVISION of COLMAP (Fitzgibbon 2001).
+    SimpleDivision[4] = "simple_division", DivisionByRadius, false, 0,
+        "(A, B) = (P1, -P2) 2 / (-P3 + sqrt(P3^2 - 4 k (P1^2 + P2^2))), image = (f A + cx, f B + cy)",
+        ["f": F, "cx": Cx, "cy": Cy, "k": Own(0)];
+    /// DIVISION of COLMAP (Fitzgibbon 2001).
+    Division[5] = "division", DivisionByRadius, false, 0,
+        "(A, B) = (P1, -P2) 2 / (-P3 + sqrt(P3^2 - 4 k (P1^2 + P2^2))), image = (fx A + cx, fy B + cy)",
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k": Own(0)];
+    /// EUCM of COLMAP: the extended unified camera (Khomutenko, Garcia and Martinet 2016).
+    Eucm[6] = "eucm", ExtendedUnified, false, 0,
+        "d = sqrt(beta (P1^2 + P2^2) + P3^2), (A, B) = (P1, -P2) / (alpha d - (1 - alpha) P3), image = (fx A + cx, fy B + cy)",
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "alpha": Own(0), "beta": Own(1)];
+    /// The frame camera of Agisoft; cx, cy are counted from the centre of the picture of w by h pixels, p1, p2 are P1, P2 of photogrammetry.
+    AgisoftFrame[13] = "agisoft_frame", Central, false, 2,
+        central!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
+            "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b)"),
+        ["f": F, "cx": Cx, "cy": Cy, "b1": B1, "b2": B2, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4), "p1": T(0), "p2": T(1), "w": W,
+         "h": H];
+    /// The fisheye of Agisoft: [`AgisoftFrame`] with an equidistant projection.
+    AgisoftFisheye[13] = "agisoft_fisheye", Equidistant, false, 2,
+        fisheye!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
+            "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b)"),
+        ["f": F, "cx": Cx, "cy": Cy, "b1": B1, "b2": B2, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4), "p1": T(0), "p2": T(1), "w": W,
+         "h": H];
+}

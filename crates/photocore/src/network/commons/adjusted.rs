@@ -1,0 +1,82 @@
+//! Common unknowns after the adjustment.
+
+use nalgebra::{DMatrix, Vector3 as Column};
+
+use super::Common;
+use crate::adjustment::Adjustment;
+use crate::geometry::Matrix3;
+use crate::network::Network;
+use crate::network::problem::Assembled;
+
+/// An adjusted common unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdjustedCommon {
+    /// By how much its unknowns differ from what is given: observed minus adjusted is the negative of it.
+    pub change: Vec<f64>,
+    /// Its position, as in [`Common`]; of planes and lines the place that is given, moved along their own axes by the offsets, in
+    /// rectangular space.
+    pub position: [f64; 3],
+    /// Its rotation, as in [`Common`].
+    pub attitude: Matrix3,
+    /// Cofactors (a priori unit weight) of its unknowns, rotations being those about its own axes, row by row: zero for those that are
+    /// held; NaN where there are none.
+    pub cofactors: Vec<f64>,
+    /// Redundancy numbers of its unknowns as observations of themselves; zero unless weighted, NaN where there are no cofactors.
+    pub redundancy: Vec<f64>,
+    /// How many observations that took part, images of rigs among them, are of it.
+    pub observations: usize,
+}
+
+impl Network {
+    /// The adjusted common unknowns, in the order of the network.
+    pub(in crate::network) fn adjusted_commons(
+        &self,
+        Assembled { problem, .. }: &Assembled,
+        adjustment: &Adjustment,
+        unknowns: &[f64],
+    ) -> Vec<AdjustedCommon> {
+        let model = &problem.model;
+        let states = model.common_states(&unknowns[model.of_stations()]);
+        let each = |(index, common): (usize, &Common)| {
+            let (width, state) = (common.sd.len(), &states[index]);
+            let missing = if adjustment.cofactors.is_some() && common.is_held() { 0.0 } else { f64::NAN };
+            let mut found = AdjustedCommon {
+                change: vec![0.0; width],
+                position: common.position,
+                attitude: common.attitude,
+                cofactors: vec![missing; width * width],
+                redundancy: vec![missing; width],
+                observations: model.uses_of_commons[index],
+            };
+            let Some(block) = model.common_block[index] else { return found };
+            let range = model.of_block(block);
+            found.change = unknowns[range.clone()].to_vec();
+            (found.position, found.attitude) = model.commons[index].reported(state);
+            if found.observations == 0 {
+                return found;
+            }
+            if let Some(all) = &adjustment.cofactors {
+                let own = model.cofactors_of_block(all, block);
+                let steps: Vec<Column<f64>> = state.steps().map(|(_, turn)| turn).collect();
+                found.cofactors = about_own_axes(common, &steps, own);
+            }
+            if let Some(all) = &adjustment.prior_redundancy {
+                found.redundancy = all[range].to_vec();
+            }
+            found
+        };
+        self.commons.iter().enumerate().map(each).collect()
+    }
+}
+
+/// Takes cofactors of the components of r to those of turns about the own axes.
+fn about_own_axes(common: &Common, turns: &[Column<f64>], cofactors: &[f64]) -> Vec<f64> {
+    let components: Vec<usize> = common.kind.components().collect();
+    let width = components.len();
+    let taken = DMatrix::from_fn(width, width, |i, j| match components[i].checked_sub(3) {
+        None => f64::from(u8::from(i == j)),
+        Some(turn) => turns[j][turn],
+    });
+    let found = &taken * DMatrix::from_row_slice(width, width, cofactors) * taken.transpose();
+    ((&found + found.transpose()) / 2.0).as_slice().to_vec()
+}

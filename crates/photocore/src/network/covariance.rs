@@ -1,0 +1,340 @@
+//! Covariances of anything in an adjusted network with anything else, and the network in other datums, without adjusting again.
+
+use std::ops::ControlFlow;
+
+use rayon::ThreadPool;
+
+use super::problem::Assembled;
+use super::{InnerConstraints, Network, NetworkError, Options, Solution};
+use crate::adjustment::{Adjusted, CofactorError, Datum, Event, Factored, Phase};
+use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
+use crate::normals::{Function, Ordering};
+
+/// Where an adjustment of a network has ended: all that is needed to come back to it.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// The adjusted unknowns, in the order of the adjustment.
+    pub unknowns: Vec<f64>,
+    /// Those of them that were held for a datum.
+    pub held: Vec<usize>,
+    /// Points that were left out because they ran into a station, ascending.
+    pub collapsed: Vec<usize>,
+    /// The ordering in force.
+    pub ordering: Ordering,
+    /// The datum that it was taken to since; None for that of what was held, or of the observations.
+    pub datum: Option<NetworkDatum>,
+}
+
+/// What coordinates and their cofactors refer to.
+#[derive(Debug, Clone)]
+pub enum NetworkDatum {
+    /// Chosen points and photos are, together, as near to their given places as they come: of networks that are free.
+    Inner(InnerConstraints),
+    /// Cofactors are relative to a photo, as if its pose were held where it has been adjusted to. Nothing is moved, scale stays as it is
+    /// given or held, and the network need not be free.
+    RelativeToPhoto(usize),
+    /// The same with points, whose mean position and orientation count.
+    RelativeToPoints(Vec<usize>),
+}
+
+/// What has cofactors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Of {
+    /// The six unknowns of a photo's pose as they are reported: with angles, where poses are in angles.
+    Photo(usize),
+    /// Its position, and the rotation step rho about its own axes: A -> A Exp(rho).
+    PhotoStep(usize),
+    /// The coordinates of a point.
+    Point(usize),
+    /// The parameters of a camera.
+    Camera(usize),
+}
+
+/// An adjusted network whose normal equations are factored: cofactors of anything with anything.
+#[derive(Debug)]
+pub struct Covariances {
+    assembled: Assembled,
+    factored: Factored,
+    /// The place of each point among those that took part.
+    point: Vec<Option<usize>>,
+    /// A photo of each camera.
+    photo_of_camera: Vec<Option<usize>>,
+    memory: Option<usize>,
+}
+
+impl Network {
+    /// Prepares for covariances of an adjusted network, in the datum it is in or another.
+    ///
+    /// `options` are those of the adjustment, and `state` is where it ended ([`Solution::state`]).
+    ///
+    /// # Errors
+    /// A state that is not of this network, a network that is not determined there, a datum that it cannot be taken to; no memory; an
+    /// interruption.
+    pub fn covariances(
+        &self,
+        options: &Options,
+        state: &State,
+        datum: Option<&NetworkDatum>,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Covariances, NetworkError> {
+        let assembled = self.assembled_again(options, state, pool)?;
+        let datum = datum.or(state.datum.as_ref());
+        let factored = {
+            let mut between = forming(watch, &assembled);
+            let adjusted = state.adjusted(options);
+            match datum {
+                None => {
+                    let (problem, values, held) =
+                        (&assembled.problem, state.unknowns.clone(), state.held.clone());
+                    Factored::form(problem, adjusted.loss, values, held, pool, &mut between)
+                        .map_err(|error| NetworkError::new(error, &assembled))?
+                }
+                Some(datum) => {
+                    let (datum, _) = self.datum(&assembled, datum)?;
+                    Factored::in_datum(
+                        &assembled.problem,
+                        adjusted,
+                        &datum,
+                        &state.unknowns,
+                        pool,
+                        &mut between,
+                    )?
+                }
+            }
+        };
+        let mut point = vec![None; self.points.len()];
+        assembled.points.iter().enumerate().for_each(|(place, &index)| point[index] = Some(place));
+        let mut photo_of_camera = vec![None; self.cameras.len()];
+        self.photos.iter().enumerate().for_each(|(index, photo)| photo_of_camera[photo.camera] = Some(index));
+        Ok(Covariances { assembled, factored, point, photo_of_camera, memory: options.memory })
+    }
+
+    /// Takes an adjusted network to another datum without adjusting again: values, cofactors, redundancy numbers.
+    ///
+    /// # Errors
+    /// Those of [`Network::covariances`].
+    pub fn in_datum(
+        &self,
+        options: &Options,
+        state: &State,
+        datum: &NetworkDatum,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solution, NetworkError> {
+        let assembled = self.assembled_again(options, state, pool)?;
+        let (carried, reference) = self.datum(&assembled, datum)?;
+        let reference = reference.as_ref().unwrap_or(&state.unknowns);
+        let (problem, adjusted) = (&assembled.problem, state.adjusted(options));
+        let found = {
+            let mut between = forming(watch, &assembled);
+            Factored::in_datum(problem, adjusted, &carried, reference, pool, &mut between)?.into_datum(
+                problem,
+                pool,
+                &mut between,
+            )?
+        };
+        let lost = found.lost;
+        let adjustment = found.into_adjustment(problem, state.held.clone(), adjusted.loss, pool);
+        let mut solution = Solution::new(self, options, &assembled, adjustment, state.collapsed.clone());
+        solution.state.datum = Some(datum.clone());
+        solution.lost_digits = lost;
+        Ok(solution)
+    }
+
+    /// The problem whose solution a state is.
+    fn assembled_again(
+        &self,
+        options: &Options,
+        state: &State,
+        pool: &ThreadPool,
+    ) -> Result<Assembled, NetworkError> {
+        self.check()?;
+        let mut left_out = vec![false; self.points.len()];
+        for &point in &state.collapsed {
+            *left_out.get_mut(point).ok_or(NetworkError::State)? = true;
+        }
+        let options = Options { ordering: state.ordering, ..*options };
+        let screened = self.screen(&left_out);
+        let assembled = pool.install(|| self.assemble(&options, screened, None))?;
+        let count = assembled.problem.layout().unknowns();
+        if state.unknowns.len() != count || state.held.iter().any(|&unknown| unknown >= count) {
+            return Err(NetworkError::State);
+        }
+        assembled.check_memory(&options)?;
+        Ok(assembled)
+    }
+
+    /// What carries a datum, and the values that it stays near to; None where nothing is to move.
+    fn datum(
+        &self,
+        assembled: &Assembled,
+        datum: &NetworkDatum,
+    ) -> Result<(Datum, Option<Vec<f64>>), NetworkError> {
+        match datum {
+            NetworkDatum::Inner(inner) => {
+                self.check_carriers(inner)?;
+                let (datum, reference) = assembled.datum(inner);
+                Ok((datum, Some(reference)))
+            }
+            NetworkDatum::RelativeToPhoto(photo) => {
+                if *photo >= self.photos.len() {
+                    return Err(NetworkError::NoPhoto(*photo));
+                }
+                let pose = assembled.problem.model.of_block(*photo).take(6);
+                let carriers = pose.map(|unknown| (unknown, 1.0)).collect();
+                Ok((assembled.relative(carriers), None))
+            }
+            NetworkDatum::RelativeToPoints(points) => {
+                let inner = InnerConstraints { points: points.clone(), photos: vec![], scale: false };
+                Ok((assembled.relative(assembled.datum(&inner).0.carriers), None))
+            }
+        }
+    }
+}
+
+impl State {
+    fn adjusted(&self, options: &Options) -> Adjusted<'_> {
+        Adjusted { unknowns: &self.unknowns, held: &self.held, loss: options.adjustment.loss }
+    }
+}
+
+/// Tells of what is going on.
+fn forming(
+    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    assembled: &Assembled,
+) -> impl FnMut(usize) -> ControlFlow<()> {
+    let total = assembled.problem.layout().locals();
+    move |done| watch(Event::Progress { phase: Phase::Form, done, total })
+}
+
+impl Covariances {
+    /// The cofactors (a priori unit weight) of every two unknowns of what `rows` names, or of those with what `columns` names: a matrix
+    /// row by row.
+    ///
+    /// # Errors
+    /// Something that is not there or was left out, more memory than there may be, an interruption.
+    pub fn cofactors(
+        &self,
+        rows: &[Of],
+        columns: Option<&[Of]>,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Vec<f64>, NetworkError> {
+        let rows = self.unknowns(rows)?;
+        let columns = columns.map(|columns| self.unknowns(columns)).transpose()?;
+        self.of_functions(&rows, columns.as_deref(), pool, watch)
+    }
+
+    /// J Q J^T, for partials J of functions of the unknowns of what is named: a row for each function.
+    ///
+    /// # Errors
+    /// Those of [`Covariances::cofactors`]; rows that are not as long as there are unknowns.
+    pub fn propagate(
+        &self,
+        partials: &[f64],
+        of: &[Of],
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Vec<f64>, NetworkError> {
+        let unknowns = self.unknowns(of)?;
+        if unknowns.is_empty() || partials.len() % unknowns.len() != 0 {
+            return Err(NetworkError::Partials { unknowns: unknowns.len(), numbers: partials.len() });
+        }
+        let function = |row: &[f64]| -> Function {
+            let parts = row.iter().zip(&unknowns).filter(|(partial, _)| **partial != 0.0);
+            parts
+                .flat_map(|(partial, own)| {
+                    own.iter().map(move |&(unknown, value)| (unknown, partial * value))
+                })
+                .collect()
+        };
+        let functions: Vec<Function> = partials.chunks_exact(unknowns.len()).map(function).collect();
+        self.of_functions(&functions, None, pool, watch)
+    }
+
+    fn of_functions(
+        &self,
+        rows: &[Function],
+        columns: Option<&[Function]>,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Vec<f64>, NetworkError> {
+        let problem = &self.assembled.problem;
+        let total = problem.layout().locals();
+        let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
+        let found = self.factored.cofactors(problem, rows, columns, self.memory, pool, &mut between);
+        found.map_err(|error| match error {
+            CofactorError::Memory { needed, available } => NetworkError::Memory { needed, available },
+            CofactorError::Adjust(error) => NetworkError::new(error, &self.assembled),
+        })
+    }
+
+    /// How many unknowns something has.
+    ///
+    /// # Errors
+    /// It is not there, or was left out.
+    pub fn width(&self, of: Of) -> Result<usize, NetworkError> {
+        Ok(self.unknowns_of(of)?.len())
+    }
+
+    fn unknowns(&self, of: &[Of]) -> Result<Vec<Function>, NetworkError> {
+        let mut all = Vec::new();
+        for &each in of {
+            all.extend(self.unknowns_of(each)?);
+        }
+        Ok(all)
+    }
+
+    /// The unknowns of something, as functions of those of the adjustment.
+    fn unknowns_of(&self, of: Of) -> Result<Vec<Function>, NetworkError> {
+        let model = &self.assembled.problem.model;
+        let themselves = |unknowns: std::ops::Range<usize>| unknowns.map(|unknown| vec![(unknown, 1.0)]);
+        match of {
+            Of::Photo(photo) | Of::PhotoStep(photo) => {
+                if photo >= model.cameras.len() {
+                    return Err(NetworkError::NoPhoto(photo));
+                }
+                let first = model.of_block(photo).start;
+                let numbers = self.attitude(photo, matches!(of, Of::PhotoStep(_)));
+                let turned = |k: usize| (0..3).map(|m| (first + 3 + m, numbers[(k, m)])).collect();
+                Ok(themselves(first..first + 3).chain((0..3).map(turned)).collect())
+            }
+            Of::Point(point) => {
+                let index = self.point.get(point).ok_or(NetworkError::NoPoint(point))?;
+                let index = index.ok_or(NetworkError::LeftOut(point))?;
+                Ok(themselves(model.of_point(index)).collect())
+            }
+            Of::Camera(camera) => {
+                let photo = *self.photo_of_camera.get(camera).ok_or(NetworkError::CameraIndex(camera))?;
+                let Some(photo) = photo else { return Ok(vec![]) };
+                Ok(match model.camera_block[photo] {
+                    Some(block) => themselves(model.of_block(block)).collect(),
+                    None if model.has_own_camera(photo) => {
+                        themselves(model.of_block(photo)).skip(6).collect()
+                    }
+                    // What is held has cofactors of zero.
+                    None => vec![vec![]; model.cameras[photo].parameters().len()],
+                })
+            }
+        }
+    }
+
+    /// What leads from the last three unknowns of a photo to its angles as they are reported, or to its rotation step; NaN for angles
+    /// that are not determined, phi being 90 degrees.
+    fn attitude(&self, photo: usize, step: bool) -> Matrix3 {
+        let model = &self.assembled.problem.model;
+        let PoseNumbers::Angles(sense) = model.poses else { return Matrix3::identity() };
+        let pose = &self.factored.values()[model.of_block(photo)];
+        let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [pose[3], pose[4], pose[5]]);
+        match (model.turning_sense(photo).is_some(), step) {
+            (true, true) | (false, false) => Matrix3::identity(),
+            (false, true) => numbers.rates(angles),
+            (true, false) => {
+                let inverse = numbers.rates(angles).try_inverse();
+                let inverse = inverse.filter(|_| !numbers.is_singular(angles));
+                inverse.unwrap_or_else(|| Matrix3::repeat(f64::NAN))
+            }
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! Cofactors of linear functions of the unknowns, any with any other: f^T N^-1 g.
+//!
+//! With the local blocks l reduced out of N, N_ll = L_l L_l^T, V = L_l^-1 N_lo and N_r = L L^T what is left of the others o, a function
+//! f is known by y = L_l^-1 f_l and e = f_o - V^T y:
+//!
+//! f^T N^-1 g = y_f^T y_g + e_f^T N_r^-1 e_g = y_f^T y_g + z_f^T z_g,    z = L^-1 e.
+//!
+//! Half of a solution does for all of them, and what it gives is symmetric and positive by construction.
+
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+
+use pulp::Simd;
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::equations::{Equations, Prior};
+use super::factor::Factor;
+use super::layout::Layout;
+use super::products::Products;
+use super::stack::{Stack, dot};
+use super::symbolic::Symbolic;
+use super::system::System;
+use super::triangle::Triangle;
+use super::vectorised::{Kernel, run};
+use super::watch::{Between, Control, Stopped, watched};
+use super::workspace::zeros;
+
+/// A linear function of the unknowns: unknowns that it takes, with their coefficients.
+pub type Function = Vec<(usize, f64)>;
+
+/// A function with the local blocks reduced out.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Reduced {
+    /// e: places in the order of elimination, ascending, with their values.
+    pub entries: Vec<(usize, f64)>,
+    /// y of each local block that it takes, ascending.
+    locals: Vec<(usize, [f64; 3])>,
+}
+
+/// Functions ready for their cofactors: all rows of a matrix, and, unless they are to be combined with each other, all its columns.
+#[derive(Debug)]
+pub struct Functions {
+    rows: Vec<Reduced>,
+    columns: Option<Vec<Reduced>>,
+}
+
+/// Local blocks that a thread takes at a time.
+const CHUNK: usize = 64;
+/// So many times more functions on one side, and the other side is solved for to its end: each solution then serves all of them.
+const FEW: usize = 8;
+/// Solutions at a time.
+const TOGETHER: usize = 16;
+
+impl System {
+    /// Reduces the local blocks out of linear functions.
+    ///
+    /// `columns` is None where the cofactors of every two of `rows` are asked for. `equations` and `prior` must be those that the factor
+    /// comes from; what is held must not be taken.
+    pub fn reduce<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        equations: &E,
+        prior: &Prior,
+        rows: &[Function],
+        columns: Option<&[Function]>,
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Functions> {
+        watched(pool, between, |control| {
+            let places = self.symbolic.places(&self.layout);
+            let work = Reduction { system: self, equations, prior, places: &places, control };
+            let rows = work.reduced(rows);
+            Some(Functions { rows, columns: columns.map(|columns| work.reduced(columns)) })
+        })
+    }
+
+    /// Bytes that their cofactors take at the most, the matrix counted.
+    pub fn memory_of(&self, functions: &Functions) -> usize {
+        let (rows, columns) = (functions.rows.len(), functions.columns.as_ref().map_or(0, Vec::len));
+        let matrix = rows * if functions.columns.is_some() { columns } else { rows };
+        let others = match functions.few() {
+            Some((few, _, _)) => few.len().min(TOGETHER) * self.symbolic.unknowns(),
+            None => Products::new(&self.symbolic, functions.all()).numbers(),
+        };
+        size_of::<f64>() * (matrix + others)
+    }
+
+    /// The cofactors f^T N^-1 g of functions: a matrix row by row; the same bits for any number of threads.
+    pub fn cofactors_of(
+        &self,
+        pool: &ThreadPool,
+        factor: &Factor,
+        functions: &Functions,
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Vec<f64>> {
+        watched(pool, between, |control| {
+            let rows = &functions.rows;
+            let columns = functions.columns.as_ref().unwrap_or(rows);
+            let mut matrix = control.allocated(zeros(rows.len() * columns.len()))?;
+            match functions.few() {
+                Some((few, many, transposed)) => {
+                    let mut target = Target { matrix: &mut matrix, width: columns.len(), transposed };
+                    self.solve_few(factor, few, many, &mut target, control)?;
+                }
+                None => {
+                    let split = functions.columns.is_some().then_some(rows.len());
+                    let products = Products::new(&self.symbolic, functions.all());
+                    products.add(factor, split, &mut matrix, control)?;
+                }
+            }
+            add_locals(&mut matrix, rows, columns);
+            Some(matrix)
+        })
+    }
+
+    /// e_f^T N_r^-1 e_g with a solution for each of a few functions.
+    fn solve_few(
+        &self,
+        factor: &Factor,
+        few: &[Reduced],
+        many: &[Reduced],
+        target: &mut Target<'_>,
+        control: &Control,
+    ) -> Option<()> {
+        let count = self.symbolic.unknowns();
+        for (batch, functions) in few.chunks(TOGETHER).enumerate() {
+            let mut solutions = control.allocated(zeros(functions.len() * count))?;
+            for (solution, function) in solutions.chunks_exact_mut(count.max(1)).zip(functions) {
+                function.entries.iter().for_each(|&(place, value)| solution[place] = value);
+            }
+            solutions.par_chunks_mut(count.max(1)).for_each(|solution| {
+                if !control.stopped() {
+                    factor.solve_columns(solution);
+                }
+            });
+            for (i, solution) in solutions.chunks_exact(count.max(1)).enumerate() {
+                for (j, function) in many.iter().enumerate() {
+                    let product = |&(place, value): &(usize, f64)| value * solution[place];
+                    target.put(batch * TOGETHER + i, j, function.entries.iter().map(product).sum());
+                }
+            }
+        }
+        Some(())
+    }
+}
+
+impl Functions {
+    /// The few and the many, and whether the few are the columns; None where neither is.
+    fn few(&self) -> Option<(&[Reduced], &[Reduced], bool)> {
+        let (rows, columns) = (&self.rows, self.columns.as_ref()?);
+        if rows.len() * FEW <= columns.len() {
+            Some((rows, columns, false))
+        } else {
+            (columns.len() * FEW <= rows.len()).then_some((columns, rows, true))
+        }
+    }
+
+    fn all(&self) -> Vec<&Reduced> {
+        self.rows.iter().chain(self.columns.iter().flatten()).collect()
+    }
+}
+
+/// A matrix that is written row by row, or column by column.
+struct Target<'a> {
+    matrix: &'a mut [f64],
+    width: usize,
+    transposed: bool,
+}
+
+impl Target<'_> {
+    fn put(&mut self, i: usize, j: usize, value: f64) {
+        let (row, column) = if self.transposed { (j, i) } else { (i, j) };
+        self.matrix[row * self.width + column] = value;
+    }
+}
+
+/// Adds y_f^T y_g of all functions.
+fn add_locals(matrix: &mut [f64], rows: &[Reduced], columns: &[Reduced]) {
+    let mut by_local: HashMap<usize, Vec<(usize, &[f64; 3])>> = HashMap::new();
+    for (j, function) in columns.iter().enumerate() {
+        function.locals.iter().for_each(|(local, y)| by_local.entry(*local).or_default().push((j, y)));
+    }
+    for (row, function) in matrix.chunks_exact_mut(columns.len().max(1)).zip(rows) {
+        for (local, own) in &function.locals {
+            for (j, y) in by_local.get(local).into_iter().flatten() {
+                row[*j] += dot(own, *y);
+            }
+        }
+    }
+}
+
+impl Symbolic {
+    /// The place of every unknown that is not local, counted from the first of these, in the order of elimination.
+    fn places(&self, layout: &Layout) -> Vec<usize> {
+        let mut places = vec![0; self.unknowns()];
+        let first = layout.all_locals().end;
+        for position in 0..self.blocks() {
+            for (unknown, place) in self.unknowns_at(layout, position).zip(self.range(position)) {
+                places[unknown - first] = place;
+            }
+        }
+        places
+    }
+}
+
+struct Reduction<'a, E> {
+    system: &'a System,
+    equations: &'a E,
+    prior: &'a Prior,
+    places: &'a [usize],
+    control: &'a Control,
+}
+
+/// What the functions take of a local block: the function and its coefficients.
+type Taken = Vec<(usize, [f64; 3])>;
+
+/// What a function becomes at a local block: its number, y, and what goes to e.
+type Found = (usize, [f64; 3], Vec<(usize, f64)>);
+
+impl<E: Equations> Reduction<'_, E> {
+    fn reduced(&self, functions: &[Function]) -> Vec<Reduced> {
+        let layout = &self.system.layout;
+        let (end, dim) = (layout.all_locals().end, layout.local_dim());
+        let mut reduced = vec![Reduced::default(); functions.len()];
+        let mut taken: HashMap<usize, Taken> = HashMap::new();
+        for (index, function) in functions.iter().enumerate() {
+            for &(unknown, coefficient) in function.iter().filter(|(_, coefficient)| *coefficient != 0.0) {
+                if unknown >= end {
+                    reduced[index].entries.push((self.places[unknown - end], coefficient));
+                    continue;
+                }
+                let of_local = taken.entry(unknown / dim).or_default();
+                if of_local.last().is_none_or(|last| last.0 != index) {
+                    of_local.push((index, [0.0; 3]));
+                }
+                if let Some((_, coefficients)) = of_local.last_mut() {
+                    coefficients[unknown % dim] += coefficient;
+                }
+            }
+        }
+        let mut taken: Vec<(usize, Taken)> = taken.into_iter().collect();
+        taken.sort_unstable_by_key(|&(local, _)| local);
+        let found: Vec<(usize, Vec<Found>)> =
+            taken.par_chunks(CHUNK).flat_map_iter(|taken| self.at_locals(taken)).collect();
+        for (local, found) in found {
+            for (index, y, entries) in found {
+                reduced[index].locals.push((local, y));
+                reduced[index].entries.extend(entries);
+            }
+        }
+        reduced.par_iter_mut().for_each(|function| unite(&mut function.entries));
+        reduced
+    }
+
+    fn at_locals(&self, taken: &[(usize, Taken)]) -> Vec<(usize, Vec<Found>)> {
+        let layout = &self.system.layout;
+        let mut stack = Stack::default();
+        let at_local = |(local, taken): &(usize, Taken)| {
+            let mut found = Vec::with_capacity(taken.len());
+            stack.gather(self.system, self.equations, &[*local as u32]);
+            stack.eliminate(layout, self.prior, 0.0);
+            let symbolic = &*self.system.symbolic;
+            run(layout, stack.kept_dim(), AtLocal { stack: &stack, symbolic, taken, found: &mut found });
+            self.control.count(1);
+            (*local, found)
+        };
+        taken.iter().take_while(|_| !self.control.stopped()).map(at_local).collect()
+    }
+}
+
+/// Sorts entries by their place and adds up those of the same.
+fn unite(entries: &mut Vec<(usize, f64)>) {
+    entries.sort_by_key(|&(place, _)| place);
+    entries.dedup_by(|next, kept| {
+        let same = next.0 == kept.0;
+        if same {
+            kept.1 += next.1;
+        }
+        same
+    });
+}
+
+/// Computes y and -V^T y of functions of one local block.
+struct AtLocal<'a> {
+    stack: &'a Stack,
+    symbolic: &'a Symbolic,
+    taken: &'a Taken,
+    found: &'a mut Vec<Found>,
+}
+
+impl Kernel for AtLocal<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+        for &(index, coefficients) in self.taken {
+            let mut y = coefficients;
+            let triangle: &Triangle = &self.stack.triangles[0];
+            triangle.forward::<L>(&mut y[..L], 1);
+            let mut entries = Vec::new();
+            for (range, v) in self.stack.couplings::<L, D>(self.symbolic) {
+                let width = range.len().max(1);
+                let mut sums = vec![0.0; range.len()];
+                for (row, factor) in v.values.chunks_exact(width).zip(&y[..L]) {
+                    sums.iter_mut().zip(row).for_each(|(sum, value)| *sum -= factor * value);
+                }
+                entries.extend(range.zip(sums));
+            }
+            self.found.push((index, y, entries));
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! An aerial block with GNSS and IMU against golden figures of an independent program, read where they are at hand.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
+
+mod golden;
+
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+
+use nalgebra::{DMatrix, Matrix6};
+use photocore::adjustment::{self, Method, Status, Stop};
+use photocore::geometry::{AttitudeNumbers, Matrix3, ObjectSpace, Perspective, PoseNumbers, RotationSense};
+use photocore::network::observations::{Attitude, Control, Position, Quantity};
+use photocore::network::{
+    AdjustedObservation, AdjustedPhoto, Camera, Common, CommonKind, Image, Network, Observation, Options,
+    Photo, Point, Precision, Solution,
+};
+use serde_json::Value;
+
+use golden::{golden, list, rows};
+
+const SENSE: RotationSense = RotationSense::GroundToPhoto;
+const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(SENSE);
+const FREE: f64 = f64::INFINITY;
+
+/// A network with the index of every block by name, without images and observations.
+struct File<'a> {
+    file: &'a Value,
+    network: Network,
+    index: HashMap<String, usize>,
+}
+
+fn matrix(value: &Value) -> Matrix3 {
+    Matrix3::from_row_slice(&rows(value).concat())
+}
+
+impl<'a> File<'a> {
+    /// Photos are the poses whose names begin so.
+    fn new(file: &'a Value, photo: &str, cameras: Vec<Camera>) -> Self {
+        let (mut index, mut photos, mut points) = (HashMap::new(), vec![], vec![]);
+        let blocks = file["inputs"]["initial"].as_object().unwrap();
+        for (name, block) in blocks.iter().filter(|(name, _)| name.starts_with(photo)) {
+            let numbers = NUMBERS.numbers(&matrix(&block["matrix_photo_to_object"]));
+            let pose = [list(&block["position"]), numbers.to_vec()].concat().try_into().unwrap();
+            index.insert(name.clone(), photos.len());
+            photos.push(Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 });
+        }
+        for (name, block) in blocks.iter().filter(|(name, _)| name.starts_with("point")) {
+            index.insert(name.clone(), points.len());
+            points.push(Point { coordinates: list(&block["value"]).try_into().unwrap(), sd: [FREE; 3] });
+        }
+        let network = Network {
+            space: ObjectSpace::Rectangular,
+            poses: PoseNumbers::Angles(SENSE),
+            refraction: None,
+            cameras,
+            photos,
+            points,
+            images: vec![],
+            observations: vec![],
+            commons: vec![],
+            mounts: vec![],
+        };
+        Self { file, network, index }
+    }
+
+    /// What the observations of a kind are of, what was observed, and their covariances.
+    fn observed(&self, kind: &str) -> Vec<(Vec<&'a str>, &'a Value, DMatrix<f64>)> {
+        let own = &self.file["inputs"]["observations"][kind];
+        let (all, each) = (&own["covariance"]["all"], own["covariance"]["each"].as_array());
+        let between = own["between"].as_array().unwrap().iter().zip(own["observed"].as_array().unwrap());
+        let found = between.enumerate().map(|(k, (names, observed))| {
+            let covariance = rows(each.map_or(all, |each| &each[k]));
+            let covariance = DMatrix::from_fn(covariance.len(), covariance.len(), |i, j| covariance[i][j]);
+            (
+                names.as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect(),
+                observed,
+                covariance,
+            )
+        });
+        found.collect()
+    }
+
+    fn add_common(&mut self, name: &str, kind: CommonKind, sd: f64) {
+        let block = &self.file["inputs"]["initial"][name];
+        let vector = |value: &Value| -> [f64; 3] {
+            if value.is_null() { [0.0; 3] } else { list(value).try_into().unwrap() }
+        };
+        let (position, attitude) = match kind {
+            CommonKind::Boresight => ([0.0; 3], matrix(&block["matrix"])),
+            CommonKind::Sensor => (vector(&block["position"]), matrix(&block["matrix_photo_to_object"])),
+            _ => (vector(&block["value"]), Matrix3::identity()),
+        };
+        self.index.insert(name.to_owned(), self.network.commons.len());
+        let sd = vec![sd; kind.unknowns().len()];
+        self.network.commons.push(Common { kind, position, attitude, sd });
+    }
+
+    fn add_images(&mut self, kind: &str, photo: impl Fn(&HashMap<String, usize>, &[&str]) -> usize) {
+        for (names, observed, covariance) in self.observed(kind) {
+            let sd = [covariance[(0, 0)].sqrt(), covariance[(1, 1)].sqrt()];
+            let point = self.index[*names.last().unwrap()];
+            let xy = list(observed).try_into().unwrap();
+            self.network.images.push(Image { photo: photo(&self.index, &names), point, xy, sd });
+        }
+    }
+
+    fn control(&self) -> Vec<Observation> {
+        let control = |(names, observed, covariance): (Vec<&str>, &Value, DMatrix<f64>)| {
+            let coordinates = list(observed).try_into().unwrap();
+            Control { point: self.index[names[0]], coordinates, precision: Precision::Covariance(covariance) }
+                .into()
+        };
+        self.observed("control").into_iter().map(control).collect()
+    }
+}
+
+fn adjusted(network: &Network) -> Solution {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let method = Method::Damped(Stop::Fraction(1e-9));
+    let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
+    let options = Options { adjustment, ..Options::default() };
+    let solution = network.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).unwrap();
+    assert_eq!(solution.adjustment.status, Status::Converged);
+    assert!(solution.adjustment.iterations.len() <= 10, "{}", solution.adjustment.iterations.len());
+    solution
+}
+
+fn by_step(photo: &AdjustedPhoto) -> Matrix6<f64> {
+    let [.., omega, phi, kappa] = photo.pose;
+    let mut rates = Matrix6::identity();
+    rates.fixed_view_mut::<3, 3>(3, 3).copy_from(&NUMBERS.rates([omega, phi, kappa]));
+    rates * Matrix6::from_row_slice(&photo.cofactors) * rates.transpose()
+}
+
+fn assert_cofactors(own: &[f64], golden: &Value, what: &str) {
+    let golden = rows(golden);
+    for (i, row) in golden.iter().enumerate() {
+        for (j, expected) in row.iter().enumerate() {
+            let (scale, found) = ((golden[i][i] * golden[j][j]).sqrt(), own[i * golden.len() + j]);
+            assert!((found - expected).abs() <= 1e-8 * scale, "{what} {i} {j}: {found} {expected}");
+        }
+    }
+}
+
+fn assert_position(found: &[f64], block: &Value, what: &str) {
+    let (position, sd) =
+        if block["position"].is_null() { ("value", "sd") } else { ("position", "sd_position") };
+    let sd = list(&block[sd]);
+    for (k, expected) in list(&block[position]).into_iter().enumerate() {
+        assert!((found[k] - expected).abs() < 1e-6 * sd[k], "{what}: {} {expected}", found[k]);
+    }
+}
+
+fn assert_attitude(found: &Matrix3, expected: &Value, what: &str) {
+    let apart = (found - matrix(expected)).amax();
+    assert!(apart < 1e-11, "{what}: {apart:e}");
+}
+
+/// Unknowns, their cofactors, and the figures of the whole.
+fn assert_solution(file: &File<'_>, solution: &Solution) {
+    let golden = &file.file["solution"];
+    let number = |name: &str| golden[name].as_f64().unwrap();
+    assert_eq!(solution.degrees_of_freedom as f64, number("degrees_of_freedom"));
+    let sigma0 = solution.variance_of_unit_weight.unwrap().sqrt();
+    assert!((sigma0 / number("sigma0") - 1.0).abs() < 1e-10, "sigma0 {sigma0}");
+    let square = solution.sums_of_squares.total();
+    assert!((square / number("sum_of_squares") - 1.0).abs() < 1e-9, "{square}");
+    for (name, block) in golden["unknowns_solved"].as_object().unwrap() {
+        let cofactors = &golden["cofactors"][name];
+        let own: Vec<f64> = if name.starts_with("photo") || name.starts_with("frame") {
+            let photo = &solution.photos[file.index[name]];
+            let [x, y, z, angles @ ..] = photo.pose;
+            assert_position(&[x, y, z], block, name);
+            assert_attitude(&NUMBERS.attitude(angles), &block["matrix_photo_to_object"], name);
+            by_step(photo).as_slice().to_vec()
+        } else if name.starts_with("point") {
+            let point = solution.points[file.index[name]].unwrap();
+            assert_position(&point.coordinates, block, name);
+            point.cofactors.as_flattened().to_vec()
+        } else {
+            let common = &solution.commons[file.index[name]];
+            match file.network.commons[file.index[name]].kind {
+                CommonKind::Boresight => assert_attitude(&common.attitude, &block["matrix"], name),
+                CommonKind::Sensor => {
+                    assert_position(&common.position, block, name);
+                    assert_attitude(&common.attitude, &block["matrix_photo_to_object"], name);
+                }
+                _ => assert_position(&common.position, block, name),
+            }
+            common.cofactors.clone()
+        };
+        if !cofactors.is_null() {
+            assert_cofactors(&own, cofactors, name);
+        }
+    }
+}
+
+/// Residuals, redundancy numbers and standardized residuals of one kind.
+fn assert_kind<'s>(
+    file: &File<'_>,
+    kind: &str,
+    found: impl Iterator<Item = (&'s [f64], &'s [f64], &'s [f64])>,
+) {
+    let golden = &file.file["solution"]["kinds"][kind];
+    let figures = ["residuals", "redundancy", "standardized"].map(|name| rows(&golden[name]));
+    let mut count = 0;
+    for (row, (residuals, redundancy, standardized)) in found.enumerate() {
+        for k in 0..residuals.len() {
+            let [v, r, w] = [0, 1, 2].map(|figure| figures[figure][row][k]);
+            assert!((redundancy[k] - r).abs() < 1e-8, "{kind} {row}: {} {r}", redundancy[k]);
+            assert!((standardized[k] - w).abs() < 1e-5, "{kind} {row}: {} {w}", standardized[k]);
+            assert!((residuals[k] - v).abs() < 1e-7 * (1.0 + v.abs()), "{kind} {row}: {} {v}", residuals[k]);
+        }
+        count += residuals.len();
+    }
+    assert_eq!(count as f64, golden["rows"].as_f64().unwrap(), "{kind}");
+}
+
+fn of_images<'s>(
+    solution: &'s Solution,
+    range: std::ops::Range<usize>,
+) -> impl Iterator<Item = (&'s [f64], &'s [f64], &'s [f64])> {
+    let images = solution.images[range].iter().map(|image| image.as_ref().unwrap());
+    images.map(|image| (&image.residual[..], &image.redundancy[..], &image.standardized[..]))
+}
+
+fn of_kind<'s>(
+    network: &Network,
+    solution: &'s Solution,
+    kind: &str,
+) -> impl Iterator<Item = (&'s [f64], &'s [f64], &'s [f64])> {
+    let own = network.observations.iter().zip(&solution.observations);
+    let own: Vec<&AdjustedObservation> =
+        own.filter(|(own, _)| own.kind() == kind).map(|(_, adjusted)| adjusted.as_ref().unwrap()).collect();
+    own.into_iter().map(|own| (&own.residual[..], &own.redundancy[..], &own.standardized[..]))
+}
+
+#[test]
+fn an_aerial_block_with_lever_arm_shifts_drifts_and_boresight() {
+    let Some(data) = golden("aerial.json") else { return };
+    let camera = Camera::held(Perspective { principal_distance: -100.0 }.into());
+    let mut file = File::new(&data, "photo", vec![camera]);
+    let prior = &file.observed("lever arm prior")[0];
+    let lever_arm_sd = prior.2[(0, 0)].sqrt();
+    file.add_common("lever arm", CommonKind::LeverArm, lever_arm_sd);
+    file.add_common("boresight", CommonKind::Boresight, FREE);
+    for strip in 1..4 {
+        file.add_common(&format!("shift{strip}"), CommonKind::Shift, FREE);
+        file.add_common(&format!("drift{strip}"), CommonKind::Drift, FREE);
+    }
+    file.add_images("image", |index, names| index[names[0]]);
+    let times = list(&data["inputs"]["observations"]["gnss"]["dt"]);
+    let mut observations = vec![];
+    for ((names, observed, covariance), time) in file.observed("gnss").into_iter().zip(times) {
+        observations.push(Observation::from(Position {
+            photo: file.index[names[0]],
+            coordinates: list(observed).try_into().unwrap(),
+            lever_arm: Quantity::Common(file.index[names[1]]),
+            shift: Some(file.index[names[2]]),
+            drift: Some(file.index[names[3]]),
+            time,
+            precision: Precision::Covariance(covariance),
+        }));
+    }
+    for (names, observed, covariance) in file.observed("imu") {
+        observations.push(
+            Attitude {
+                photo: file.index[names[0]],
+                attitude: matrix(observed),
+                boresight: Quantity::Common(file.index[names[1]]),
+                precision: Precision::Covariance(covariance),
+            }
+            .into(),
+        );
+    }
+    observations.extend(file.control());
+    file.network.observations = observations;
+    let solution = adjusted(&file.network);
+    assert_solution(&file, &solution);
+    assert_kind(&file, "image", of_images(&solution, 0..solution.images.len()));
+    assert_kind(&file, "gnss", of_kind(&file.network, &solution, "position"));
+    assert_kind(&file, "imu", of_kind(&file.network, &solution, "attitude"));
+    assert_kind(&file, "control", of_kind(&file.network, &solution, "control"));
+    let lever_arm = &solution.commons[file.index["lever arm"]];
+    let residuals: Vec<f64> = lever_arm.change.iter().map(|change| -change).collect();
+    let standardized: Vec<f64> =
+        residuals.iter().zip(&lever_arm.redundancy).map(|(v, r)| v / (lever_arm_sd * r.sqrt())).collect();
+    let own = (&residuals[..], &lever_arm.redundancy[..], &standardized[..]);
+    assert_kind(&file, "lever arm prior", std::iter::once(own));
+}

@@ -1,0 +1,53 @@
+//! Unknowns that observations have in common, and rigs.
+
+use photocore::geometry::Matrix3;
+use photocore::network::commons::Measure;
+use photocore::network::{AdjustedCommon, Common, CommonKind, Mount};
+use pyo3::prelude::*;
+
+use crate::options::unknown;
+
+/// Adds the names of the types and of their unknowns to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let facts = |kind: &CommonKind| {
+        let unknowns: Vec<(&str, &str)> =
+            kind.unknowns().iter().map(|&(name, _, measure)| (name, measured(measure))).collect();
+        (kind.name(), unknowns)
+    };
+    module.add("UNKNOWNS", CommonKind::ALL.iter().map(facts).collect::<Vec<_>>())
+}
+
+fn measured(measure: Measure) -> &'static str {
+    match measure {
+        Measure::Length => "length",
+        Measure::Speed => "speed",
+        Measure::Angle => "angle",
+        Measure::Ratio => "ratio",
+    }
+}
+
+/// Type, position, rotation matrix row by row, standard deviations.
+pub type CommonRow = (String, [f64; 3], [f64; 9], Vec<f64>);
+
+/// The common unknown of a row.
+pub fn common((kind, position, attitude, sd): CommonRow) -> PyResult<Common> {
+    let kind = CommonKind::named(&kind).ok_or_else(|| unknown("kind of unknown", &kind))?;
+    Ok(Common { kind, position, attitude: Matrix3::from_row_slice(&attitude), sd })
+}
+
+/// Indices of a photo, of the photo that stands for its frame, and of its sensor among the unknowns.
+pub type MountRow = (usize, usize, usize);
+
+/// The mount of a row.
+pub fn mount((photo, frame, sensor): MountRow) -> Mount {
+    Mount { photo, frame, sensor }
+}
+
+/// Change, position, rotation matrix row by row, cofactors row by row, redundancy numbers, number of observations.
+pub type AdjustedRow = (Vec<f64>, [f64; 3], Vec<f64>, Vec<f64>, Vec<f64>, usize);
+
+/// What has become of a common unknown, for Python.
+pub fn adjusted_row(common: &AdjustedCommon) -> AdjustedRow {
+    let AdjustedCommon { change, position, attitude, cofactors, redundancy, observations } = common.clone();
+    (change, position, attitude.transpose().as_slice().to_vec(), cofactors, redundancy, observations)
+}

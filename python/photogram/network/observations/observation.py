@@ -1,0 +1,222 @@
+"""What all kinds of observation have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram.arguments.arrays import names, shaped, shown
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.network.unknowns import Unknown, rotation
+
+__all__ = ["AXES", "ROTATIONS", "Group", "Observation", "observation_rows"]
+
+Group = tuple[str, Indices, Indices, Indices, Floats, Floats]
+"""A kind, (k, p) indices of points, (k, q) photos, (k, c) unknowns; (k, v) values, (k, r, r) covariances."""
+
+AXES = ("X", "Y", "Z")
+ROTATIONS = ("rotation x", "rotation y", "rotation z")
+_SYMMETRIC = 1e-9
+"""What a covariance matrix may be unsymmetric by, relative to its diagonal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """An observation of points, photos and unknowns that it has in common with others.
+
+    A kind is a class of its own: fields for what it is of, what was observed and how well (`sd` or
+    `covariance`), and the names below.
+
+    Attributes
+    ----------
+    points, photos
+        Names of what it is of.
+    unknowns
+        Its common unknowns; None for those that it does without.
+    observed
+        (v,) what was observed, as the core takes it.
+    precision
+        (r, r) covariance matrix of its r components.
+    """
+
+    KIND: ClassVar[str] = ""
+    """The name under which results know the kind."""
+    POINTS: ClassVar[tuple[str, ...]] = ()
+    """Fields that name points."""
+    PHOTOS: ClassVar[tuple[str, ...]] = ()
+    """Fields that name photos."""
+    UNKNOWNS: ClassVar[tuple[tuple[str, type[Unknown]], ...]] = ()
+    """Fields that may be common unknowns, with their type."""
+    VALUES: ClassVar[tuple[tuple[str, tuple[int, ...]], ...]] = ()
+    """Fields that are numbers, with their shapes, in the order in which the core takes them: of fields that
+    are common unknowns what is known instead."""
+    COMPONENTS: ClassVar[tuple[str, ...]] = ()
+    """What its components are called: rotations are in radians, all others in the linear unit."""
+    LOCAL: ClassVar[bool] = False
+    """Whether in geographic space these are east, north and up."""
+    MISSING: ClassVar[bool] = False
+    """Whether NaN stands for components that were not observed."""
+
+    points: tuple[str, ...] = field(init=False, repr=False)
+    photos: tuple[str, ...] = field(init=False, repr=False)
+    unknowns: tuple[Unknown | None, ...] = field(init=False, repr=False)
+    observed: Floats = field(init=False, repr=False)
+    precision: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for what, fields in (("points", self.POINTS), ("photos", self.PHOTOS)):
+            self._set(what, tuple(names(self.KIND, [getattr(self, name) for name in fields])))
+        self._set("unknowns", tuple(self._unknown(name, kind) for name, kind in self.UNKNOWNS))
+        for what, own in (("point", self.points), ("photo", self.photos)):
+            if len(set(own)) < len(own):
+                raise InputError(f"{self.name} is of one {what} alone")
+        known = [id(each) for each in self.unknowns if each is not None]
+        if len(set(known)) < len(known):
+            raise InputError(f"{self.name} is of one unknown alone")
+        values = [np.ravel(self._value(name, shape)) for name, shape in self.VALUES]
+        self._set("observed", np.concatenate(values) if values else np.zeros(0))
+        use = np.ones(len(self.own_components), dtype=bool)
+        if self.MISSING:
+            use = ~np.isnan(self.observed)
+        if not use.any():
+            raise InputError(f"{self.name} has no component that was observed")
+        self._set("precision", self._covariance(use))
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    @property
+    def of(self) -> tuple[str, ...]:
+        """What it is of, by name: points and photos or, where there are none, unknowns."""
+        return self.points + self.photos or tuple(each.name for each in self.unknowns if each is not None)
+
+    @property
+    def name(self) -> str:
+        """Its kind and what it is of, for reports."""
+        return f"{self.KIND} {' - '.join(self.of)}"
+
+    @property
+    def label(self) -> str:
+        """Under which observations stand together in results."""
+        return self.KIND
+
+    def units(self, linear_unit: str) -> tuple[str, ...]:
+        """Return the units of its components; nothing for plain numbers."""
+        return tuple("rad" if name in ROTATIONS else linear_unit for name in self.own_components)
+
+    @property
+    def own_components(self) -> tuple[str, ...]:
+        """The names of its components, in rectangular space."""
+        return self.COMPONENTS
+
+    def components(self, *, geographic: bool) -> tuple[str, ...]:
+        """Return the names of its components; of places in geographic space those of local axes."""
+        own = self.own_components
+        return ("east", "north", "up")[: len(own)] if geographic and self.LOCAL else own
+
+    @classmethod
+    def values_of(cls, observations: Sequence[Observation]) -> Floats:
+        """Return (k, v) what the core takes of observations of this kind, all of a block."""
+        return np.stack([each.observed for each in observations])
+
+    def _unknown(self, name: str, kind: type[Unknown]) -> Unknown | None:
+        value = getattr(self, name)
+        if isinstance(value, kind):
+            return value
+        known = value is None or name in dict(self.VALUES)
+        if isinstance(value, Unknown) or not known:
+            raise InputError(f"{name} of {self.KIND} is no {kind.__name__}: {shown(value)}")
+        return None
+
+    def _value(self, name: str, shape: tuple[int, ...]) -> Floats:
+        """Check a field and return its numbers; of common unknowns what stands where they are known."""
+        value = getattr(self, name)
+        turns = shape == (3, 3)
+        if isinstance(value, Unknown) or (value is None and turns):
+            return np.eye(3) if turns else np.zeros(shape)
+        array = shaped(f"{name} of {self.name}", value, shape, missing=self.MISSING)
+        if (np.isinf(array) if self.MISSING else ~np.isfinite(array)).any():
+            raise InputError(f"{name} of {self.name} is not finite: {array.tolist()}")
+        if turns:
+            rotation(f"{name} of {self.name}", array)
+        self._set(name, array if shape else float(array))
+        return array
+
+    def _covariance(self, use: NDArray[np.bool_]) -> Floats:
+        """Return the covariance matrix; `use` says which components were observed."""
+        r = len(self.own_components)
+        sd: ArrayLike | None = getattr(self, "sd", None)
+        covariance: ArrayLike | None = getattr(self, "covariance", None)
+        if sd is not None and covariance is None:
+            deviations = shaped(f"sd of {self.name}", sd, (r,), missing=True)
+            own = deviations[use]
+            if not ((own > 0) & np.isfinite(own)).all():
+                raise InputError(f"sd of {self.name} is not positive and finite: {deviations.tolist()}")
+            return np.asarray(np.diag(np.where(use, deviations, 1.0) ** 2))
+        if sd is not None or covariance is None:
+            raise InputError(f"{self.name} needs either sd or covariance")
+        matrix = shaped(f"covariance of {self.name}", covariance, (r, r), missing=True)
+        if not _definite(matrix[np.ix_(use, use)]):
+            raise InputError(
+                f"covariance of {self.name} is not symmetric and positive definite: {matrix.tolist()}"
+            )
+        return matrix
+
+
+def _definite(matrix: Floats) -> bool:
+    """Whether a matrix is that of covariances."""
+    variances = np.diag(matrix)
+    if not (np.isfinite(matrix).all() and (variances > 0).all()):
+        return False
+    correlations = matrix / np.sqrt(np.outer(variances, variances))
+    symmetric = np.abs(correlations - correlations.T).max() <= _SYMMETRIC
+    return bool(symmetric and np.linalg.eigvalsh(correlations).min() > 0)
+
+
+def observation_rows(
+    observations: Sequence[Observation],
+    points: Sequence[str],
+    photos: Sequence[str],
+    unknowns: Sequence[Unknown],
+) -> list[tuple[list[int], Group]]:
+    """Return observations kind by kind: their rows among the given ones, and what the core takes.
+
+    Raises
+    ------
+    InputError
+        A point or photo that is not there.
+    """
+    if not observations:
+        return []
+    of_points, of_photos = ({name: row for row, name in enumerate(each)} for each in (points, photos))
+    of_unknowns = {id(each): row for row, each in enumerate(unknowns)}
+
+    def places(each: Observation, own: tuple[str, ...], known: dict[str, int], what: str) -> list[int]:
+        for name in own:
+            if name not in known:
+                raise InputError(
+                    f"the observation {each.name} is of the {what} {name}, which the block has not"
+                )
+        return [known[name] for name in own]
+
+    by_label: dict[str, list[int]] = {}
+    for row, each in enumerate(observations):
+        by_label.setdefault(each.label, []).append(row)
+    groups: list[tuple[list[int], Group]] = []
+    for rows in by_label.values():
+        own = [observations[row] for row in rows]
+        indices = (
+            [places(each, each.points, of_points, "point") for each in own],
+            [places(each, each.photos, of_photos, "photo") for each in own],
+            [[-1 if one is None else of_unknowns[id(one)] for one in each.unknowns] for each in own],
+        )
+        first, second, third = (np.array(table, dtype=np.int64) for table in indices)
+        values = type(own[0]).values_of(own)
+        covariances = np.stack([each.precision for each in own])
+        groups.append((rows, (own[0].KIND, first, second, third, values, covariances)))
+    return groups

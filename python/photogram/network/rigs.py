@@ -1,0 +1,75 @@
+"""Rigs: photos that were taken together by cameras on one frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from photogram.arguments.arrays import names, shown
+from photogram.errors import InputError
+from photogram.network.unknowns import Sensor, Unknown
+
+__all__ = ["Mount", "MountRow", "checked_mounts", "mount_rows"]
+
+MountRow = tuple[int, int, int]
+"""Indices of a photo, of the photo that stands for its frame, and of its sensor among the unknowns."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mount:
+    """That a photo was taken by a sensor on a frame: A = A_f A_s, C = C_f + A_f c.
+
+    Its pose has no unknowns of its own: of what the block gives for it nothing counts but where it is about.
+
+    Parameters
+    ----------
+    photo
+        Its name.
+    frame
+        The name of the photo that stands for the frame: that of the first sensor. It may have no images.
+    sensor
+        The pose of the sensor in the frame, one object for all photos that it took.
+    """
+
+    photo: str
+    frame: str
+    sensor: Sensor
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.sensor, Sensor):
+            raise InputError(f"the sensor of the photo {self.photo} is no Sensor: {shown(self.sensor)}")
+        for name, value in zip(("photo", "frame"), names("mount", (self.photo, self.frame)), strict=True):
+            object.__setattr__(self, name, value)
+
+
+def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:
+    """Return mounts that agree with each other and with the photos of a block.
+
+    Raises
+    ------
+    InputError
+        What is no mount, a photo that is not there, one that is mounted twice or has others mounted on it.
+    """
+    if not isinstance(mounts, Sequence):
+        raise InputError(f"mounts is no list: {shown(mounts)}")
+    known, frames, seen = set(photos), set(), set()
+    for row, each in enumerate(mounts):
+        if not isinstance(each, Mount):
+            raise InputError(f"mounts[{row}] is no Mount: {shown(each)}")
+        for name in (each.photo, each.frame):
+            if name not in known:
+                raise InputError(f"the block has no photo {name}, which a mount names")
+        if each.photo in seen:
+            raise InputError(f"the photo {each.photo} is mounted twice")
+        seen.add(each.photo)
+        frames.add(each.frame)
+    if both := sorted(seen & frames):
+        raise InputError(f"the photo {both[0]} is mounted on a frame and stands for one")
+    return tuple(mounts)
+
+
+def mount_rows(mounts: Sequence[Mount], photos: Sequence[str], unknowns: Sequence[Unknown]) -> list[MountRow]:
+    """Return what the core takes."""
+    places = {name: row for row, name in enumerate(photos)} if mounts else {}
+    sensors = {id(each): row for row, each in enumerate(unknowns)}
+    return [(places[each.photo], places[each.frame], sensors[id(each.sensor)]) for each in mounts]

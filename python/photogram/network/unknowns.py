@@ -1,0 +1,413 @@
+"""Unknowns that observations have in common: lever arms, shifts, drifts, boresights, instruments, surfaces.
+
+Each is an object with a name; the observations that it is given to share it. Its values are where the
+adjustment starts from and, where its standard deviations are neither 0 (known) nor infinite (free), observed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram import _photocore
+from photogram.arguments.arrays import names, number, shaped
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+
+__all__ = [
+    "Boresight",
+    "Drift",
+    "Instrument",
+    "Level",
+    "LeverArm",
+    "Line",
+    "Plane",
+    "PlumbLine",
+    "Sensor",
+    "Shift",
+    "Unknown",
+    "UnknownRow",
+    "different_unknowns",
+    "rotation",
+]
+
+UnknownRow = tuple[str, list[float], list[float], list[float]]
+"""Type, position, rotation matrix row by row and standard deviations, as the core takes an unknown."""
+
+_ORTHONORMAL = 1e-6
+_UNKNOWNS = dict(_photocore.UNKNOWNS)
+
+
+def rotation(name: str, value: ArrayLike) -> Floats:
+    """Return a (3, 3) rotation matrix.
+
+    Raises
+    ------
+    InputError
+        What is none: rows that are not orthonormal to six digits, a mirrored matrix.
+    """
+    matrix = shaped(name, value, (3, 3))
+    if not np.abs(matrix.T @ matrix - np.eye(3)).max() < _ORTHONORMAL:
+        raise InputError(f"{name} is no rotation matrix: {matrix.tolist()}")
+    if np.linalg.det(matrix) < 0:
+        raise InputError(f"{name} is mirrored: its determinant is -1")
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Unknown:
+    """What all have in common.
+
+    Attributes
+    ----------
+    name
+        For reports.
+    position, attitude
+        (3,) and (3, 3) what the core takes: where it is, and its own axes as columns.
+    deviations
+        (k,) standard deviations of its unknowns.
+    """
+
+    KIND: ClassVar[str] = ""
+    """The name under which results know the type."""
+
+    position: Floats = field(init=False, repr=False)
+    attitude: Floats = field(init=False, repr=False)
+    deviations: Floats = field(init=False, repr=False)
+    name: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", names(f"name of a {self.KIND}", [self.name])[0])
+        self._set("position", self._position())
+        self._set("attitude", self._attitude())
+        deviations = shaped(f"sd of {self.title}", getattr(self, "sd"), (len(self.components),))  # noqa: B009
+        if not (deviations >= 0).all():
+            raise InputError(f"sd of {self.title} is no standard deviation: {deviations.tolist()}")
+        self._set("deviations", deviations)
+
+    def _set(self, name: str, value: Floats) -> None:
+        if not np.isfinite(value).all() and name != "deviations":
+            raise InputError(f"{self.title} has a value that is not finite: {value.tolist()}")
+        object.__setattr__(self, name, value)
+
+    def _position(self) -> Floats:
+        return shaped(f"value of {self.title}", getattr(self, "value"), (3,))  # noqa: B009
+
+    def _attitude(self) -> Floats:
+        return np.eye(3)
+
+    @property
+    def title(self) -> str:
+        """Its type and name."""
+        return f"{self.KIND} {self.name}"
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """The names of its k unknowns."""
+        return tuple(name for name, _ in _UNKNOWNS[self.KIND])
+
+    def units(self, linear_unit: str) -> tuple[str, ...]:
+        """Return the units of its unknowns; nothing for plain numbers."""
+        units = {"length": linear_unit, "speed": f"{linear_unit}/s", "angle": "rad", "ratio": ""}
+        return tuple(units[measure] for _, measure in _UNKNOWNS[self.KIND])
+
+    @property
+    def is_held(self) -> bool:
+        """Whether nothing of it is unknown."""
+        return not self.deviations.any()
+
+    def row(self) -> UnknownRow:
+        """Return what the core takes."""
+        return self.KIND, self.position.tolist(), self.attitude.ravel().tolist(), self.deviations.tolist()
+
+
+@dataclass(frozen=True, eq=False)
+class LeverArm(Unknown):
+    """The vector l from the projection centre to the antenna, in the axes of the photo.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value
+        (3,) x right, y up, z back towards the viewer, in the linear unit.
+    sd
+        (3,) standard deviations of the same, or one for all.
+    """
+
+    KIND = "lever arm"
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Shift(Unknown):
+    """The vector s that GNSS positions of a strip, a flight or a session are off by.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value
+        (3,) along X, Y, Z or, in geographic space, east, north and up amid the photos, in the linear unit.
+    sd
+        (3,) standard deviations of the same, or one for all.
+    """
+
+    KIND = "shift"
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Drift(Unknown):
+    """The vector d by which that grows in a second, from the mean time of its observations on.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value
+        (3,) in the axes of a shift, in the linear unit a second.
+    sd
+        (3,) standard deviations of the same, or one for all.
+    """
+
+    KIND = "drift"
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Boresight(Unknown):
+    """The rotation B from an inertial unit to the photo.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value
+        (3, 3) body to the axes of the photo; the transposed mounting where nothing better is known.
+    sd
+        (3,) standard deviations of rotations about the axes of the body in radians, or one for all.
+    """
+
+    KIND = "boresight"
+
+    value: ArrayLike = field(default_factory=lambda: np.eye(3))
+    sd: ArrayLike = np.inf
+
+    def _position(self) -> Floats:
+        return np.zeros(3)
+
+    def _attitude(self) -> Floats:
+        return rotation(f"value of {self.title}", self.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Instrument(Unknown):
+    """The scale m and constant k of an instrument for distances: it shows m s + k.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    scale, constant
+        m, a number, and k in the linear unit.
+    sd
+        (2,) standard deviations of the same, or one for both.
+    """
+
+    KIND = "instrument"
+
+    scale: float = 1.0
+    constant: float = 0.0
+    sd: ArrayLike = np.inf
+
+    def _position(self) -> Floats:
+        scale = number(f"scale of {self.title}", self.scale)
+        return np.array([scale, number(f"constant of {self.title}", self.constant), 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Level(Unknown):
+    """A height h that points have in common: a water line, a levelling instrument.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    height
+        Z, or the height above the ellipsoid in geographic space, in the linear unit.
+    sd
+        Its standard deviation.
+    """
+
+    KIND = "level"
+
+    height: float
+    sd: ArrayLike = np.inf
+
+    def _position(self) -> Floats:
+        return np.array([0.0, 0.0, number(f"height of {self.title}", self.height)])
+
+
+@dataclass(frozen=True, eq=False)
+class PlumbLine(Unknown):
+    """A vertical line.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    through
+        (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height.
+    sd
+        (2,) standard deviations of its offset from there along X and Y or, in geographic space, east and
+        north.
+    """
+
+    KIND = "plumb line"
+
+    through: ArrayLike
+    sd: ArrayLike = np.inf
+
+    def _position(self) -> Floats:
+        return shaped(f"through of {self.title}", self.through, (3,))
+
+
+@dataclass(frozen=True, eq=False)
+class Line(Unknown):
+    """A straight line.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    direction
+        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`.
+    through
+        (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height.
+    sd
+        (4,) standard deviations of its offsets from there along two axes of its own, across it (columns of
+        `attitude`), and of rotations about these in radians.
+    """
+
+    KIND = "line"
+
+    direction: ArrayLike
+    through: ArrayLike
+    sd: ArrayLike = np.inf
+
+    def _position(self) -> Floats:
+        return shaped(f"through of {self.title}", self.through, (3,))
+
+    def _attitude(self) -> Floats:
+        return _across(f"direction of {self.title}", self.direction)
+
+
+@dataclass(frozen=True, eq=False)
+class Plane(Unknown):
+    """A plane.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    normal
+        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`.
+    through
+        (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height.
+    sd
+        (3,) standard deviations of its distance from there along the normal, and of rotations about two axes
+        of its own in it (columns of `attitude`) in radians.
+    """
+
+    KIND = "plane"
+
+    normal: ArrayLike
+    through: ArrayLike
+    sd: ArrayLike = np.inf
+
+    def _position(self) -> Floats:
+        return shaped(f"through of {self.title}", self.through, (3,))
+
+    def _attitude(self) -> Floats:
+        return _across(f"normal of {self.title}", self.normal)
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor(Unknown):
+    """The pose of a camera on a frame (see :class:`photogram.network.rigs.Mount`).
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value
+        (3,) c, its position in the axes of the frame (x right, y up, z back), in the linear unit.
+    matrix
+        (3, 3) its axes in those of the frame, as columns.
+    sd
+        (6,) standard deviations of c, then of rotations about the sensor's own axes in radians.
+    """
+
+    KIND = "sensor"
+
+    value: ArrayLike
+    matrix: ArrayLike = field(default_factory=lambda: np.eye(3))
+    sd: ArrayLike = np.inf
+
+    def _attitude(self) -> Floats:
+        return rotation(f"matrix of {self.title}", self.matrix)
+
+    @classmethod
+    def from_colmap(
+        cls, name: str, matrix: ArrayLike, translation: ArrayLike, sd: ArrayLike = np.inf
+    ) -> Self:
+        """Return the sensor of COLMAP's `sensor_from_rig`: R (3, 3) and t (3,), y down and z forward.
+
+        A = F R' F and c = -F R' t with F = diag(1, -1, -1).
+        """
+        turned = rotation(f"matrix of sensor {name}", matrix).T
+        flip = np.diag([1.0, -1.0, -1.0])
+        value = -flip @ turned @ shaped(f"translation of sensor {name}", translation, (3,))
+        return cls(name, value, flip @ turned @ flip, sd)
+
+
+def _across(name: str, value: ArrayLike) -> Floats:
+    """Return axes of which the third has a direction."""
+    third = shaped(name, value, (3,))
+    length = float(np.linalg.norm(third))
+    if not (length > 0 and np.isfinite(length)):
+        raise InputError(f"{name} is no direction: {third.tolist()}")
+    third = third / length
+    first = np.cross(np.eye(3)[np.abs(third).argmin()], third)
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(third, first), third])
+
+
+def different_unknowns(unknowns: Iterable[Unknown]) -> list[Unknown]:
+    """Return unknowns, each once, in the order in which they come.
+
+    Raises
+    ------
+    InputError
+        Two of one type and name.
+    """
+    found = list({id(each): each for each in unknowns}.values())
+    titles: set[str] = set()
+    for each in found:
+        if each.title in titles:
+            raise InputError(
+                f"two unknowns are called {each.title}: observations that have one in common take one object"
+            )
+        titles.add(each.title)
+    return found

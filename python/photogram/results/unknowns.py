@@ -1,0 +1,151 @@
+"""Adjusted unknowns that observations have in common, in the order of the block."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.arguments.arrays import standard_deviations
+from photogram.arguments.types import Floats
+from photogram.network.block import Block
+from photogram.network.unknowns import Unknown
+from photogram.show.angles import ARCSEC
+
+if TYPE_CHECKING:
+    from photogram import _photocore
+
+__all__ = ["AdjustedUnknown", "adjusted_unknowns", "unknown_lines"]
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustedUnknown:
+    """An unknown of several observations after the adjustment, with k components. Arrays cannot be written.
+
+    Attributes
+    ----------
+    given
+        The unknown as it was given.
+    components, units
+        (k,) names and units: the linear unit, the linear unit a second, radians, or nothing.
+    change
+        (k,) adjusted minus given; of rotations the rotation vector r about the axes that are given,
+        R = R0 Exp(r).
+    position
+        (3,) adjusted: l, s, d, (m, k, 0) of an instrument, c of a sensor; of levels, planes and lines a place
+        on them.
+    attitude
+        (3, 3) adjusted: the axes of a boresight, sensor, line or plane (the third along it, or its normal).
+    cofactors
+        (k, k) for a priori unit weight, of rotations about the adjusted axes; zero for held ones, NaN without
+        covariances.
+    covariance
+        (k, k) cofactors times the variance of unit weight.
+    redundancy
+        (k,) redundancy numbers of weighted components as observations; 0 unless weighted.
+    observations
+        How many observations, and images of photos on frames, are of it.
+    """
+
+    given: Unknown
+    components: tuple[str, ...]
+    units: tuple[str, ...]
+    change: Floats
+    position: Floats
+    attitude: Floats
+    cofactors: Floats
+    covariance: Floats
+    redundancy: Floats
+    observations: int
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    @property
+    def name(self) -> str:
+        """Its own name."""
+        return self.given.name
+
+    @property
+    def kind(self) -> str:
+        """The name of its type."""
+        return self.given.KIND
+
+    @property
+    def sd(self) -> Floats:
+        """(k,) standard deviations; 0 where held."""
+        return standard_deviations(self.covariance)
+
+    @property
+    def values(self) -> Floats:
+        """(k,) components of `position` where they are its own, else `change`."""
+        own = {"x": 0, "y": 1, "z": 2, "scale": 0, "constant": 1, "height": 2}
+        vectors = ("lever arm", "shift", "drift", "instrument", "level", "sensor")
+        if self.kind not in vectors:
+            return self.change
+        found = [
+            self.position[own[name]] if name in own else self.change[k]
+            for k, name in enumerate(self.components)
+        ]
+        return np.array(found)
+
+    @property
+    def standardized(self) -> Floats:
+        """(k,) given minus adjusted, over its standard deviation; NaN unless weighted."""
+        sd = self.given.deviations
+        tested = (sd > 0) & np.isfinite(sd) & (self.redundancy > 0)
+        found = np.full(len(sd), np.nan)
+        found[tested] = -self.change[tested] / (sd[tested] * np.sqrt(self.redundancy[tested]))
+        return found
+
+
+def adjusted_unknowns(
+    block: Block, solution: _photocore.BlockSolution, scale: float
+) -> tuple[AdjustedUnknown, ...]:
+    """Return the adjusted unknowns of a block, covariances scaled."""
+    found = []
+    for given, row in zip(block.unknowns, solution.adjusted_unknowns, strict=True):
+        change, position, attitude, cofactors, redundancy, observations = row
+        k = len(change)
+        matrix = np.array(cofactors).reshape(k, k)
+        found.append(
+            AdjustedUnknown(
+                given=given,
+                components=given.components,
+                units=given.units(block.linear_unit),
+                change=np.array(change),
+                position=np.array(position),
+                attitude=np.array(attitude).reshape(3, 3),
+                cofactors=matrix,
+                covariance=matrix * scale,
+                redundancy=np.array(redundancy),
+                observations=observations,
+            )
+        )
+    return tuple(found)
+
+
+def unknown_lines(unknowns: Sequence[AdjustedUnknown]) -> list[str]:
+    """Write a line for each component, rotations in arcsec."""
+    if not unknowns:
+        return []
+    columns = ("value", "change", "sd given", "sd", "redundancy")
+    lines = [f"{'unknown':<28}{'component':<22}" + "".join(f"{column:>15}" for column in columns)]
+    for each in unknowns:
+        sd_given = np.where(np.isfinite(each.given.deviations), each.given.deviations, np.nan)
+        parts = (each.values, each.change, sd_given, each.sd)
+        for k, (name, unit) in enumerate(zip(each.components, each.units, strict=True)):
+            outward = 1.0 / ARCSEC if unit == "rad" else 1.0
+            cells = "".join(_cell(part[k] * outward, 6) for part in parts) + _cell(each.redundancy[k], 3)
+            shown = f"{name} {'arcsec' if unit == 'rad' else unit}".rstrip()
+            lines.append(f"{each.given.title:<28}{shown:<22}{cells}")
+    return lines
+
+
+def _cell(value: float, decimals: int) -> str:
+    return f"{value:>15.{decimals}f}" if math.isfinite(value) else f"{'-':>15}"
