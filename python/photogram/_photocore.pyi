@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 
 _Floats = NDArray[np.float64]
 _Indices = NDArray[np.int64]
+FoundRow = tuple[
+    _Floats, _Floats, list[tuple[str, int, int]], _Floats, NDArray[np.bool_], int | None, float | None
+]
+"""What `find_first_values` returns."""
 
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
@@ -449,15 +453,7 @@ def find_first_values(
     direction_sd: _Floats,
     *,
     threads: int,
-) -> tuple[
-    _Floats,
-    _Floats,
-    list[tuple[str, int, int]],
-    _Floats,
-    NDArray[np.bool_],
-    int | None,
-    float | None,
-]:
+) -> FoundRow:
     """Find poses of photos from what is known, in cartesian object space (`docs/first-values.md`).
 
     Parameters
