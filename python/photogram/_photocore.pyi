@@ -12,11 +12,19 @@ from numpy.typing import NDArray
 
 _Floats = NDArray[np.float64]
 _Indices = NDArray[np.int64]
+FoundRow = tuple[
+    _Floats, _Floats, list[tuple[str, int, int]], _Floats, NDArray[np.bool_], int | None, float | None
+]
+"""What `find_first_values` returns."""
 
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
-FailureRow = tuple[str, str, list[list[int]], list[int], list[list[int]], list[list[int]]]
+CombinationRow = tuple[list[int], list[int], list[int], list[tuple[int, int]], list[str]]
+"""Photos; cameras that several of them share; common unknowns; cameras with parameters that take a notable part; parts of
+poses that do: positions `along` and `across` the directions of view, `tilt`, `swing` about these."""
+
+FailureRow = tuple[str, str, list[CombinationRow], list[int]]
 """Why a network cannot be adjusted, as in :class:`BlockError`."""
 
 CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
@@ -426,10 +434,10 @@ def refraction_shift(
 class BlockError(Exception):
     """A block that cannot be adjusted.
 
-    `args` is (kind, message, photos, points, cameras, unknowns): kind is `undetermined points`, `undetermined
-    photos`, `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or
-    `input`; photos, cameras and common unknowns are lists of indices for each undetermined combination of
-    unknowns, points a list of point indices.
+    `args` is (kind, message, combinations, points): kind is `undetermined points`, `undetermined photos`,
+    `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or `input`;
+    combinations are what undetermined combinations of unknowns move (of `coarse`, the photos concerned, in
+    one), points a list of point indices.
     """
 
 def find_first_values(
@@ -445,15 +453,7 @@ def find_first_values(
     direction_sd: _Floats,
     *,
     threads: int,
-) -> tuple[
-    _Floats,
-    _Floats,
-    list[tuple[str, int, int]],
-    _Floats,
-    NDArray[np.bool_],
-    int | None,
-    float | None,
-]:
+) -> FoundRow:
     """Find poses of photos from what is known, in cartesian object space (`docs/first-values.md`).
 
     Parameters
@@ -1491,7 +1491,7 @@ class StellarProblem:
         """Right ascension and declination (m, 2) of every image at the initial values."""
 
 class CollectionError(Exception):
-    """A collection cannot be adjusted: (kind, message, photos of each combination, points).
+    """A collection cannot be adjusted: (kind, message, combinations, points).
 
     The kinds are those of :class:`BlockError`, without `no intersection`.
     """

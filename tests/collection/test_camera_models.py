@@ -92,7 +92,7 @@ def test_every_model_of_the_crate_can_be_named():
 
 
 def test_models_that_cannot_be_are_refused_by_name():
-    with pytest.raises(InputError, match="camera is one of perspective, bal, radial, .*, not 'x'"):
+    with pytest.raises(InputError, match=r"camera is one of perspective, bal, radial, .*, not 'x'"):
         MADE.collection.replace(camera="x")
     with pytest.raises(InputError, match=r"photo_parameters has the shape \(8, 9\), not \(8, 11\)"):
         MADE.collection.replace(camera="radial")
@@ -123,7 +123,8 @@ def random_cameras(rng):
 def test_images_rays_and_partials_of_every_model_belong_together():
     for name, values, u in random_cameras(np.random.default_rng(11)):
         xy, by_u, by_parameters = _photocore.camera_partials(name, values, u)
-        assert by_u.shape == (50, 2, 3) and by_parameters.shape == (50, 2, len(values))
+        assert by_u.shape == (50, 2, 3)
+        assert by_parameters.shape == (50, 2, len(values))
         np.testing.assert_array_equal(xy, _photocore.camera_images(name, values, u))
         assert np.abs(np.einsum("nij,nj->ni", by_u, u)).max() < 1e-9
         rays = _photocore.camera_rays(name, values, xy)
@@ -142,5 +143,6 @@ def test_where_a_lens_ends_there_is_no_ray():
     np.testing.assert_allclose([radius, distorted], [np.sqrt(1 / 0.9), 2 / 3 * np.sqrt(1 / 0.9)], rtol=1e-14)
     edges = 600.0 + 1000.0 * distorted * np.array([0.99, 1.01])
     rays = _photocore.camera_rays("simple_radial", values, np.column_stack([edges, [400.0, 400.0]]))
-    assert np.isfinite(rays[0]).all() and np.isnan(rays[1]).all()
+    assert np.isfinite(rays[0]).all()
+    assert np.isnan(rays[1]).all()
     assert _photocore.radial_domain("pinhole", np.ones(4)) is None

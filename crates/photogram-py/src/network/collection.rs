@@ -123,6 +123,7 @@ fn adjust_collection(
         start: Start::Given,
         hold_unused: true,
         memory,
+        minimum: None,
     };
     let solution = adjusted(py, &network, &options, threads, progress)?;
     solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| match error {
