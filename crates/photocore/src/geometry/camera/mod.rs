@@ -1,6 +1,7 @@
 //! Cameras: from a direction in the photo's axes to an image position, with all partials.
 //!
-//! Each camera is a file with a type that implements [`CameraModel`], and a line of `cameras!` below.
+//! Each camera is a type that implements [`CameraModel`] in a file of its own, or in one with others of its family, and a line of
+//! `cameras!` below.
 
 pub mod backward;
 mod inverse;
@@ -9,7 +10,9 @@ mod radial_tangential;
 
 use super::Vector3;
 
+pub use brown::BrownCorrection;
 pub use inverse::{Matrix2, RadialLimit};
+pub use orthogonal::{Ebner12, Gruen44, Orthogonal, OrthogonalSet};
 
 /// How a camera maps u, a point in the photo's axes (it looks along -z), to image coordinates.
 ///
