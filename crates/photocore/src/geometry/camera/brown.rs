@@ -23,14 +23,10 @@ pub struct BrownCorrection<const AFTER: bool> {
     pub principal_distance: f64,
     /// xp, yp.
     pub principal_point: [f64; 2],
-    /// K1, K2, K3.
-    pub radial: [f64; 3],
-    /// P1, P2.
-    pub tangential: [f64; 2],
+    /// K1, K2, K3, P1, P2, r0.
+    pub terms: BrownTerms,
     /// b1, b2.
     pub affinity: [f64; 2],
-    /// r0.
-    pub balance: f64,
 }
 
 /// [`BrownCorrection`] with affinity and shear first.
@@ -39,15 +35,6 @@ pub type Brown = BrownCorrection<false>;
 pub type BrownAffinityAfter = BrownCorrection<true>;
 
 impl<const AFTER: bool> BrownCorrection<AFTER> {
-    #[inline(always)]
-    fn lens(&self) -> RadialTangential {
-        RadialTangential {
-            radial: balanced(self.radial, self.balance),
-            tangential: self.tangential,
-            prism: [[0.0; 2]; 2],
-        }
-    }
-
     /// What affinity and shear do to the argument of the lens, and what they add to its value.
     #[inline(always)]
     fn affine(&self) -> ([f64; 2], [f64; 2]) {
@@ -63,12 +50,39 @@ impl<const AFTER: bool> BrownCorrection<AFTER> {
     }
 }
 
-/// 1 + R as a function of r^2.
-#[inline(always)]
-pub fn balanced([k1, k2, k3]: [f64; 3], balance: f64) -> RadialFactor {
-    let at = balance * balance;
-    let constant = 1.0 - at * (k1 + at * (k2 + at * k3));
-    RadialFactor { numerator: [constant, k1, k2, k3, 0.0, 0.0, 0.0], denominator: [1.0, 0.0, 0.0, 0.0] }
+/// Radial terms that vanish at a radius r0, and tangential ones.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BrownTerms {
+    /// K1, K2, K3.
+    pub radial: [f64; 3],
+    /// P1, P2.
+    pub tangential: [f64; 2],
+    /// r0.
+    pub balance: f64,
+}
+
+impl BrownTerms {
+    /// The lens that they are: 1 + R is its radial factor.
+    #[inline(always)]
+    pub(super) fn lens(&self) -> RadialTangential {
+        let ([k1, k2, k3], at) = (self.radial, self.balance * self.balance);
+        let constant = 1.0 - at * (k1 + at * (k2 + at * k3));
+        let numerator = [constant, k1, k2, k3, 0.0, 0.0, 0.0];
+        let radial = RadialFactor { numerator, denominator: [1.0, 0.0, 0.0, 0.0] };
+        RadialTangential { radial, tangential: self.tangential, prism: [[0.0; 2]; 2] }
+    }
+
+    /// Partials of where a place goes by K1, K2, K3, P1, P2.
+    #[inline(always)]
+    pub(super) fn partials(&self, bent: &Bent, place: [f64; 2]) -> [[f64; 2]; 5] {
+        let square = self.balance * self.balance;
+        let [k1, k2, k3] = [1, 2, 3].map(|power| {
+            let (free, whole) = (square.powi(power), bent.by_numerator(power));
+            [whole[0] - free * place[0], whole[1] - free * place[1]]
+        });
+        let [p1, p2] = bent.by_tangential();
+        [k1, k2, k3, p1, p2]
+    }
 }
 
 impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
@@ -101,17 +115,15 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
         Self {
             principal_distance,
             principal_point: [xp, yp],
-            radial: [k1, k2, k3],
-            tangential: [p1, p2],
+            terms: BrownTerms { radial: [k1, k2, k3], tangential: [p1, p2], balance },
             affinity: [b1, b2],
-            balance,
         }
     }
 
     fn parameters(&self) -> [f64; 11] {
-        let ([xp, yp], [k1, k2, k3]) = (self.principal_point, self.radial);
-        let ([p1, p2], [b1, b2]) = (self.tangential, self.affinity);
-        [self.principal_distance, xp, yp, k1, k2, k3, p1, p2, b1, b2, self.balance]
+        let BrownTerms { radial: [k1, k2, k3], tangential: [p1, p2], balance } = self.terms;
+        let ([xp, yp], [b1, b2]) = (self.principal_point, self.affinity);
+        [self.principal_distance, xp, yp, k1, k2, k3, p1, p2, b1, b2, balance]
     }
 
     fn principal_distance(&self) -> f64 {
@@ -122,22 +134,16 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
     fn correct(&self, measured: [f64; 2]) -> Corrected<[f64; 11]> {
         let ([dx, dy], place) = self.place(measured);
         let ([a1, a2], [b1, b2]) = self.affine();
-        let bent = self.lens().bend(place);
+        let bent = self.terms.lens().bend(place);
         let [[xx, xy], [yx, yy]] = bent.by_place;
         let by_measured = [[xx * (1.0 + a1) + b1, xx * a2 + xy + b2], [yx * (1.0 + a1), yx * a2 + yy]];
         let by_affinity = |along: [f64; 2]| along.map(|d| if AFTER { [d, 0.0] } else { [xx * d, yx * d] });
-        let ([by_b1, by_b2], [by_p1, by_p2]) = (by_affinity([dx, dy]), bent.by_tangential());
-        let square = self.balance * self.balance;
-        let by_radial = |power: i32| {
-            let (free, whole) = (square.powi(power), bent.by_numerator(power));
-            [whole[0] - free * place[0], whole[1] - free * place[1]]
-        };
+        let [by_b1, by_b2] = by_affinity([dx, dy]);
+        let by_terms = self.terms.partials(&bent, place);
         // r0 is never free.
         let row = |k: usize| {
-            let [to_x, to_y] = by_measured[k];
-            let radial = [1, 2, 3].map(|power| by_radial(power)[k]);
-            let [k1, k2, k3] = radial;
-            [0.0, -to_x, -to_y, k1, k2, k3, by_p1[k], by_p2[k], by_b1[k], by_b2[k], 0.0]
+            let ([to_x, to_y], [k1, k2, k3, p1, p2]) = (by_measured[k], by_terms.map(|by| by[k]));
+            [0.0, -to_x, -to_y, k1, k2, k3, p1, p2, by_b1[k], by_b2[k], 0.0]
         };
         Corrected {
             xy: [bent.xy[0] + b1 * dx + b2 * dy, bent.xy[1]],
@@ -148,7 +154,7 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
 
     fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]> {
         let ([a1, a2], [b1, b2]) = self.affine();
-        let lens = self.lens();
+        let lens = self.terms.lens();
         let [x, y] = from_radial(&lens.radial, corrected, |[x, y]| {
             let Bent { xy, by_place: [by_x, by_y], .. } = lens.bend([x, y]);
             ([xy[0] + b1 * x + b2 * y, xy[1]], [[by_x[0] + b1, by_x[1] + b2], by_y])
@@ -159,10 +165,10 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
 
     fn folds(&self, measured: [f64; 2]) -> bool {
         let (_, [x, y]) = self.place(measured);
-        self.lens().radial.folds(x.hypot(y))
+        self.terms.lens().radial.folds(x.hypot(y))
     }
 
     fn radial_limit(&self) -> Option<RadialLimit> {
-        self.lens().radial.limit()
+        self.terms.lens().radial.limit()
     }
 }

@@ -1,8 +1,8 @@
 //! Brown's terms on ideal coordinates, as AICON has them.
 
-use super::brown::balanced;
+use super::brown::BrownTerms;
 use super::inverse::{RadialLimit, from_radial, times};
-use super::radial_tangential::{Bent, RadialTangential};
+use super::radial_tangential::Bent;
 use super::{CameraModel, Image, Matrix2, Perspective, Unit};
 use crate::geometry::Vector3;
 
@@ -22,14 +22,10 @@ pub struct BrownForward {
     pub principal_distance: f64,
     /// xp, yp.
     pub principal_point: [f64; 2],
-    /// A1, A2, A3.
-    pub radial: [f64; 3],
-    /// B1, B2.
-    pub tangential: [f64; 2],
+    /// A1, A2, A3, B1, B2, r0.
+    pub terms: BrownTerms,
     /// C1, C2.
     pub affinity: [f64; 2],
-    /// r0.
-    pub balance: f64,
 }
 
 impl BrownForward {
@@ -37,14 +33,9 @@ impl BrownForward {
         Perspective { principal_distance: self.principal_distance }
     }
 
-    fn lens(&self) -> RadialTangential {
-        let radial = balanced(self.radial, self.balance);
-        RadialTangential { radial, tangential: self.tangential, prism: [[0.0; 2]; 2] }
-    }
-
     /// The lens at an ideal place; its value with affinity and shear, and its partials with these.
     fn bent(&self, place: [f64; 2]) -> (Bent, [f64; 2], Matrix2) {
-        let (bent, [c1, c2]) = (self.lens().bend(place), self.affinity);
+        let (bent, [c1, c2]) = (self.terms.lens().bend(place), self.affinity);
         let [by_x, by_y] = bent.by_place;
         let xy = [bent.xy[0] + c1 * place[0] + c2 * place[1], bent.xy[1]];
         (bent, xy, [[by_x[0] + c1, by_x[1] + c2], by_y])
@@ -73,21 +64,14 @@ impl CameraModel for BrownForward {
          image = (xp + X + X R + B1 (r^2 + 2 X^2) + 2 B2 X Y + C1 X + C2 Y, yp + Y + Y R + B2 (r^2 + 2 Y^2) + 2 B1 X Y)";
 
     fn with_parameters([principal_distance, xp, yp, a1, a2, a3, b1, b2, c1, c2, balance]: [f64; 11]) -> Self {
-        let (principal_point, radial) = ([xp, yp], [a1, a2, a3]);
-        Self {
-            principal_distance,
-            principal_point,
-            radial,
-            tangential: [b1, b2],
-            affinity: [c1, c2],
-            balance,
-        }
+        let terms = BrownTerms { radial: [a1, a2, a3], tangential: [b1, b2], balance };
+        Self { principal_distance, principal_point: [xp, yp], terms, affinity: [c1, c2] }
     }
 
     fn parameters(&self) -> [f64; 11] {
-        let ([xp, yp], [a1, a2, a3]) = (self.principal_point, self.radial);
-        let ([b1, b2], [c1, c2]) = (self.tangential, self.affinity);
-        [self.principal_distance, xp, yp, a1, a2, a3, b1, b2, c1, c2, self.balance]
+        let BrownTerms { radial: [a1, a2, a3], tangential: [b1, b2], balance } = self.terms;
+        let ([xp, yp], [c1, c2]) = (self.principal_point, self.affinity);
+        [self.principal_distance, xp, yp, a1, a2, a3, b1, b2, c1, c2, balance]
     }
 
     fn scale(&self) -> f64 {
@@ -103,18 +87,13 @@ impl CameraModel for BrownForward {
         let Image { xy: place, by_u: [by_x, by_y], by_parameters } = self.perspective().linearize(u);
         let (bent, [x, y], by_place) = self.bent(place);
         let by_distance = times(&by_place, by_parameters.map(|[by_c]| by_c));
-        let square = self.balance * self.balance;
-        let by_radial = [1, 2, 3].map(|power| {
-            let (free, whole) = (square.powi(power), bent.by_numerator(power));
-            [whole[0] - free * place[0], whole[1] - free * place[1]]
-        });
-        let [b1, b2] = bent.by_tangential();
+        let by_terms = self.terms.partials(&bent, place);
         // r0 is never free.
         let row = |k: usize| {
-            let [a1, a2, a3] = by_radial.map(|by| by[k]);
+            let [a1, a2, a3, b1, b2] = by_terms.map(|by| by[k]);
             let point = [f64::from(k == 0), f64::from(k == 1)];
             let affinity = if k == 0 { place } else { [0.0; 2] };
-            [by_distance[k], point[0], point[1], a1, a2, a3, b1[k], b2[k], affinity[0], affinity[1], 0.0]
+            [by_distance[k], point[0], point[1], a1, a2, a3, b1, b2, affinity[0], affinity[1], 0.0]
         };
         Image {
             xy: [self.principal_point[0] + x, self.principal_point[1] + y],
@@ -125,7 +104,7 @@ impl CameraModel for BrownForward {
 
     fn direction(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
         let target = [x - self.principal_point[0], y - self.principal_point[1]];
-        let ideal = from_radial(&self.lens().radial, target, |place| {
+        let ideal = from_radial(&self.terms.lens().radial, target, |place| {
             let (_, xy, by_place) = self.bent(place);
             (xy, by_place)
         })?;
@@ -134,10 +113,10 @@ impl CameraModel for BrownForward {
 
     fn folds(&self, u: &Vector3, _: [f64; 2]) -> bool {
         let [x, y] = self.perspective().image(u);
-        self.lens().radial.folds(x.hypot(y))
+        self.terms.lens().radial.folds(x.hypot(y))
     }
 
     fn radial_limit(&self) -> Option<RadialLimit> {
-        self.lens().radial.limit()
+        self.terms.lens().radial.limit()
     }
 }

@@ -10,7 +10,7 @@ mod radial_tangential;
 
 use super::Vector3;
 
-pub use brown::BrownCorrection;
+pub use brown::{BrownCorrection, BrownTerms};
 pub use inverse::{Matrix2, RadialLimit};
 pub use orthogonal::{Ebner12, Gruen44, Orthogonal, OrthogonalSet};
 
