@@ -328,3 +328,46 @@ def test_photos_turned_about_their_axes_tell_the_principal_point():
 def test_combinations_that_have_a_name(names, poses, said):
     assert said in in_words(names, poses)
     assert bool(said) == bool(in_words(names, poses))
+
+
+def test_images_beyond_where_a_lens_ends_are_named(example, block):
+    """1 + 3 K1 r^2 vanishes at 45.6 mm: what is measured at 60 mm is corrected to what lies nearer."""
+    camera = example.TRUTH.replace(parameters={"c": -24.3, "K1": -1.6e-4}, name="barrel")
+    xy, sd = block.image_xy.copy(), np.full(block.image_sd.shape, 0.5)
+    known = block.replace(cameras=[camera], image_sd=sd)
+    assert not any("one-to-one" in str(message) for message in adjust(known).messages)
+    xy[7], sd[7] = [60.0, 0.0], 1e6
+    messages = [str(message) for message in adjust(known.replace(image_xy=xy, image_sd=sd)).messages]
+    said = next(message for message in messages if "one-to-one" in message)
+    assert said.startswith("1 image point lies beyond")
+    photo, point = block.photo_ids[block.image_photos[7]], block.point_ids[block.image_points[7]]
+    assert said.endswith(f"points {point} on photos {photo}")
+
+
+def test_a_fisheye_sees_behind_its_own_plane():
+    """Directions up to 130 degrees from the axis, from two sides of a ring of points."""
+    turns = np.radians(np.arange(0.0, 360.0, 24.0))
+    heights = np.where(np.arange(len(turns)) % 2 == 0, 0.8, -2.0)
+    points = np.column_stack([np.cos(turns), np.sin(turns), heights])
+    stations = np.array([[-0.2, 0.0, 0.0], [0.25, 0.1, 0.1], [0.0, -0.2, -0.1]])
+    camera = Camera("opencv_fisheye", {"fx": 400.0, "fy": 401.0, "cx": 960.0, "cy": 540.0, "k1": 0.01})
+    photos, seen = (each.ravel() for each in np.indices((3, len(points))))
+    block = Block(
+        photo_ids=["1", "2", "3"],
+        photo_positions=stations + 0.005,
+        photo_attitudes=np.full((3, 3), 0.01),
+        cameras=[camera],
+        point_ids=[f"P{i}" for i in range(len(points))],
+        point_positions=points,
+        point_sd=np.where(np.arange(len(points)) < 4, 1e-4, np.inf)[:, np.newaxis] * np.ones(3),
+        image_photos=photos,
+        image_points=seen,
+        image_xy=camera.project(points[seen] - stations[photos]),
+        image_sd=np.full((len(photos), 2), 0.3),
+    )
+    result = adjust(block)
+    assert result.converged
+    assert (points[seen] - stations[photos])[:, 2].max() > 0.5
+    np.testing.assert_allclose(result.photo_positions, stations, atol=1e-6)
+    np.testing.assert_allclose(result.photo_attitudes, 0.0, atol=1e-6)
+    assert not any("behind" in str(message) for message in result.messages)

@@ -721,6 +721,10 @@ class BlockSolution(_NetworkSolution):
         """Indices of the images whose point stands behind the camera, ascending."""
 
     @property
+    def images_folded(self) -> _Indices:
+        """Indices of the images beyond where the lens of their camera is one-to-one, ascending."""
+
+    @property
     def weak(self) -> list[tuple[int, int]]:
         """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
 
