@@ -28,7 +28,7 @@ SD = 0.001
 """Of everything that is measured at the building, metres."""
 SCALE, CONSTANT = 1.0004, 0.012
 """Of the instrument."""
-WALL, EDGE, GUTTER, PLINTH = range(0, 12), range(12, 16), range(16, 21), range(21, 26)
+WALL, EDGE, GUTTER, PLINTH = range(12), range(12, 16), range(16, 21), range(21, 26)
 """The points on the wall, on its edge, on the gutter above it and on the plinth, which is level."""
 
 

@@ -2,8 +2,10 @@
 
 use std::ops::ControlFlow;
 
+use nalgebra::Matrix6;
 use rayon::ThreadPool;
 
+use super::mounts::Mounted;
 use super::problem::Assembled;
 use super::{InnerConstraints, Network, NetworkError, Options, Solution};
 use crate::adjustment::{Adjusted, CofactorError, Datum, Event, Factored, Phase};
@@ -48,6 +50,8 @@ pub enum Of {
     Point(usize),
     /// The parameters of a camera.
     Camera(usize),
+    /// The unknowns of a common one, rotations being those about its own axes.
+    Common(usize),
 }
 
 /// An adjusted network whose normal equations are factored: cofactors of anything with anything.
@@ -181,7 +185,9 @@ impl Network {
                 if *photo >= self.photos.len() {
                     return Err(NetworkError::NoPhoto(*photo));
                 }
-                let pose = assembled.problem.model.of_block(*photo).take(6);
+                let model = &assembled.problem.model;
+                // A photo on a frame stands and falls with that.
+                let pose = model.of_block(model.carrier(*photo)).take(6);
                 let carriers = pose.map(|unknown| (unknown, 1.0)).collect();
                 Ok((assembled.relative(carriers), None))
             }
@@ -295,6 +301,9 @@ impl Covariances {
                 if photo >= model.cameras.len() {
                     return Err(NetworkError::NoPhoto(photo));
                 }
+                if model.mount(photo).is_some() {
+                    return Ok(self.of_mounted(photo, matches!(of, Of::PhotoStep(_))));
+                }
                 let first = model.of_block(photo).start;
                 let numbers = self.attitude(photo, matches!(of, Of::PhotoStep(_)));
                 let turned = |k: usize| (0..3).map(|m| (first + 3 + m, numbers[(k, m)])).collect();
@@ -317,7 +326,36 @@ impl Covariances {
                     None => vec![vec![]; model.cameras[photo].parameters().len()],
                 })
             }
+            Of::Common(common) => {
+                let own = model.commons.get(common).ok_or(NetworkError::NoCommon(common))?;
+                let width = own.kind.unknowns().len();
+                let Some(block) = model.common_block[common] else { return Ok(vec![vec![]; width]) };
+                let range = model.of_block(block);
+                let by_unknowns = own.at(&self.factored.values()[range.clone()]).about_own_axes();
+                let row = |i: usize| range.clone().zip(by_unknowns.row(i).iter().copied()).collect();
+                Ok((0..width).map(row).collect())
+            }
         }
+    }
+
+    /// The unknowns of the pose of a photo on a frame, as functions of those of the frame and its sensor.
+    fn of_mounted(&self, photo: usize, step: bool) -> Vec<Function> {
+        let model = &self.assembled.problem.model;
+        let unknowns = &self.factored.values()[model.of_stations()];
+        let Some((orientation, Mounted { by_frame, by_sensor, .. })) = model.on_frame(photo, unknowns) else {
+            return vec![];
+        };
+        let taken = match step {
+            true => Matrix6::identity(),
+            false => model.reported(&orientation).1.unwrap_or_else(|| Matrix6::repeat(f64::NAN)),
+        };
+        let parts = model.blocks_of_pose(photo).zip([taken * by_frame, taken * by_sensor]);
+        let parts: Vec<_> = parts.map(|(block, by)| (model.of_block(block), by)).collect();
+        let row = |i: usize| {
+            let parts = parts.iter();
+            parts.flat_map(|(range, by)| (0..6).map(move |k| (range.start + k, by[(i, k)]))).collect()
+        };
+        (0..6).map(row).collect()
     }
 
     /// What leads from the last three unknowns of a photo to its angles as they are reported, or to its rotation step; NaN for angles

@@ -44,6 +44,9 @@ pub enum NetworkError {
     /// A camera has more or fewer standard deviations than parameters.
     #[error("camera {0} has not as many standard deviations as parameters")]
     CameraDeviations(usize),
+    /// A common unknown that is not there.
+    #[error("there is no common unknown {0}")]
+    NoCommon(usize),
     /// A common unknown has more or fewer standard deviations than unknowns.
     #[error("common unknown {0} has not as many standard deviations as unknowns")]
     CommonDeviations(usize),
