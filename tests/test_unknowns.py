@@ -356,6 +356,10 @@ def test_a_block_refuses_mounts_and_names_that_contradict_it(scripts):
         block.replace(mounts=[first, Mount("left 1", "left 2", sensor)])
     with pytest.raises(InputError, match=r"mounts\[0\] is no Mount"):
         block.replace(mounts=["right 1"])
+    with pytest.raises(
+        InputError, match="photo_position_sd of right 1 is weighted or fixed, but the photo is on"
+    ):
+        block.replace(photo_position_sd=1.0)
     other = Sensor("right", [0.5, 0, 0])
     with pytest.raises(InputError, match="two unknowns are called sensor right"):
         block.replace(observations=[Base(None, other, 0.5, 0.1)])
