@@ -1,6 +1,6 @@
 //! Free networks with common unknowns and rigs: these move along with the rest, and what is not determined is named.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -97,12 +97,12 @@ fn deviations(sd: &[f64]) -> Precision {
 }
 
 const PLANE: usize = 0;
-const LINE: usize = 1;
-const INSTRUMENT: usize = 2;
-const SENSOR: usize = 3;
+const INSTRUMENT: usize = 1;
+const SENSOR: usize = 2;
 
-/// A network whose place, orientation and scale nothing gives, with a plane, a line, an instrument and a rig.
-fn free() -> Network {
+/// A network whose place, orientation and scale nothing gives, with a plane, an instrument and a rig; `errors` are those of all
+/// observations in their standard deviations.
+fn free(errors: f64) -> Network {
     let places = places();
     let sensor = Pose { position: Vector3::new(0.4, 0.1, -0.1), attitude: rotation([0.1, -0.2, 0.15]) };
     let mut poses = around(5);
@@ -113,32 +113,32 @@ fn free() -> Network {
             attitude: attitude * sensor.attitude,
         });
     }
-    let mut network = network(&poses, &places, 1.0);
-    let along = (places[7] - places[6]).normalize();
-    let across = along.cross(&Vector3::z()).normalize();
-    let line = Matrix3::from_columns(&[across, along.cross(&across), along]) * rotation([0.02, -0.03, 0.0]);
+    let mut network = network(&poses, &places, errors);
     let plane = rotation([0.3, -0.6, 0.2]) * rotation([0.05, 0.04, 0.3]);
     network.commons = vec![
         common(CommonKind::Plane, places[0] + 0.05 * noises(3), plane),
-        common(CommonKind::Line, places[6] + 0.05 * noises(4), line),
         common(CommonKind::Instrument, Vector3::new(1.0, 0.0, 0.0), Matrix3::identity()),
         common(CommonKind::Sensor, sensor.position + 0.02 * noises(5), sensor.attitude),
     ];
     network.mounts =
         vec![Mount { photo: 5, frame: 0, sensor: SENSOR }, Mount { photo: 6, frame: 2, sensor: SENSOR }];
     let plane = |point: usize| {
-        let distance = 1e-3 * noise(60 + point);
+        let distance = errors * 1e-3 * noise(60 + point);
         Observation::from(OnPlane { point, plane: PLANE, distance, sd: 1e-3 })
     };
-    let line = |point: usize| OnLine { point, line: LINE, precision: deviations(&[1e-3, 2e-3]) }.into();
     let length = |points: [usize; 2]| {
-        let length =
-            1.3 * (places[points[1]] - places[points[0]]).norm() + 0.02 + 1e-3 * noise(70 + points[0]);
+        let length = 1.3 * (places[points[1]] - places[points[0]]).norm()
+            + 0.02
+            + errors * 1e-3 * noise(70 + points[0]);
         Distance { points, length, sd: 1e-3, instrument: Some(INSTRUMENT) }.into()
     };
-    network.observations = (0..6).map(plane).chain((6..9).map(line)).collect();
+    network.observations = (0..6).map(plane).collect();
     network.observations.extend([[0, 3], [6, 8], [9, 13], [1, 12]].map(length));
     network
+}
+
+fn base() -> Observation {
+    Base { first: None, second: SENSOR, length: 0.43, sd: 1e-3 }.into()
 }
 
 fn options() -> Options {
@@ -154,17 +154,18 @@ fn adjust(network: &Network) -> Result<Solution, NetworkError> {
 
 #[test]
 fn common_unknowns_move_with_a_free_network() {
-    let network = free();
+    let mut network = free(1.0);
+    // Points off a plane by so many metres would rather be nearer to each other: something must give the scale.
+    network.observations.push(base());
     let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let mut go = |_| ControlFlow::Continue(());
     let minimal = adjust(&network).unwrap();
     assert_eq!(minimal.adjustment.status, Status::Converged);
-    // Distances of an instrument with a scale of its own give none.
-    assert_eq!(minimal.datum.len(), 7, "{:?}", minimal.datum);
+    assert_eq!(minimal.datum.len(), 6, "{:?}", minimal.datum);
     assert!(minimal.datum.iter().all(|&(photo, _)| photo < 5), "frames are held, not photos on them");
 
     let datum = |points: std::ops::Range<usize>| {
-        NetworkDatum::Inner(InnerConstraints { points: points.collect(), photos: vec![], scale: true })
+        NetworkDatum::Inner(InnerConstraints { points: points.collect(), photos: vec![], scale: false })
     };
     let (first, second) = (datum(0..7), datum(7..14));
     let by_first = network.in_datum(&options(), &minimal.state, &first, &pool, &mut go).unwrap();
@@ -187,7 +188,7 @@ fn common_unknowns_move_with_a_free_network() {
             assert!((a.cofactors[k] - b.cofactors[k]).abs() < 1e-7 * scale);
         }
     }
-    // What observations say does not depend on the datum, and lengths of the network go with the scale of the instrument.
+    // What observations say does not depend on the datum.
     let scaled = |solution: &Solution| {
         let at = |point: usize| Vector3::from(solution.points[point].unwrap().coordinates);
         let scale = solution.commons[INSTRUMENT].position[0];
@@ -213,20 +214,38 @@ fn common_unknowns_move_with_a_free_network() {
 
 #[test]
 fn the_base_of_a_rig_gives_the_scale() {
-    let mut network = free();
-    let (first, second) = (None, SENSOR);
-    network.observations.push(Base { first, second, length: 0.43, sd: 1e-3 }.into());
+    let mut network = free(1.0);
+    network.observations.push(base());
     assert_eq!(adjust(&network).unwrap().datum.len(), 6);
-    // Two points on a plumb line, or three at one height, give the tilts.
+    // Three points at one height give the tilts.
     let mut upright = network.clone();
     upright.commons.push(common(CommonKind::Level, Vector3::zeros(), Matrix3::identity()));
-    let level = |point: usize| OnLevel { point, level: 4, difference: noise(point), sd: 1e-3 }.into();
+    let level = |point: usize| OnLevel { point, level: 3, difference: noise(point), sd: 1e-3 }.into();
     upright.observations.extend([9, 10, 11].map(level));
     assert_eq!(adjust(&upright).unwrap().datum.len(), 4);
-    network.commons.push(common(CommonKind::PlumbLine, Vector3::zeros(), Matrix3::identity()));
-    let plumb = |point: usize| OnPlumbLine { point, line: 4, precision: deviations(&[1e-3; 2]) }.into();
-    network.observations.extend([9, 10].map(plumb));
-    assert_eq!(adjust(&network).unwrap().datum.len(), 4);
+}
+
+/// Residuals of points on lines turn with the network where the axes of the lines do not: exact points, no residuals.
+#[test]
+fn points_on_lines_that_are_exact() {
+    let places = places();
+    let mut network = free(0.0);
+    let along = (places[7] - places[6]).normalize();
+    let across = along.cross(&Vector3::z()).normalize();
+    let line = Matrix3::from_columns(&[across, along.cross(&across), along]) * rotation([0.02, -0.03, 0.0]);
+    network.commons.push(common(CommonKind::Line, places[6] + 0.05 * noises(4), line));
+    let on_line = |point: usize| OnLine { point, line: 3, precision: deviations(&[1e-3, 2e-3]) }.into();
+    network.observations.extend((6..9).map(on_line));
+    let (found, mut at_the_end) = from_the_end(&network);
+    assert_eq!(adjust(&at_the_end).unwrap().datum.len(), 7);
+    let (first, second) = (None, SENSOR);
+    let length = Vector3::from(found.commons[SENSOR].position).norm();
+    at_the_end.observations.push(Base { first, second, length, sd: 1e-3 }.into());
+    let [x, y, z] = found.points[9].unwrap().coordinates;
+    at_the_end.commons.push(common(CommonKind::PlumbLine, Vector3::new(x, y, z), Matrix3::identity()));
+    let plumb = OnPlumbLine { point: 9, line: 4, precision: deviations(&[1e-3; 2]) };
+    at_the_end.observations.push(plumb.into());
+    assert_eq!(adjust(&at_the_end).unwrap().datum.len(), 6, "one point on a plumb line says nothing");
 }
 
 /// A strip along X, as uniform as asked for, with positions whose shift and drift are unknown.
@@ -301,27 +320,47 @@ fn a_lever_arm_and_a_shift_of_parallel_photos_are_named() {
     assert_eq!(adjust(&network).err().is_some(), true, "they are still parallel");
 }
 
+/// A network adjusted, and the same starting from there: at other values points are not yet on planes and lines.
+fn from_the_end(network: &Network) -> (Solution, Network) {
+    let found = adjust(network).unwrap();
+    let mut at_the_end = network.clone();
+    for (own, adjusted) in at_the_end.commons.iter_mut().zip(&found.commons) {
+        (own.position, own.attitude) = (adjusted.position, adjusted.attitude);
+    }
+    for (photo, adjusted) in at_the_end.photos.iter_mut().zip(&found.photos) {
+        (photo.pose, photo.observed) = (adjusted.pose, adjusted.pose);
+    }
+    (found, at_the_end)
+}
+
+/// What is open of a network without errors.
+fn open_of_exact(network: &Network) -> usize {
+    adjust(&from_the_end(network).1).unwrap().datum.len()
+}
+
 #[test]
 fn a_boresight_of_photos_that_nothing_else_turns_is_named() {
-    let mut network = free();
+    let mut network = free(1.0);
     network.commons.push(common(CommonKind::Boresight, Vector3::zeros(), Matrix3::identity()));
     let imu = |photo: usize| -> Observation {
         let attitude = NUMBERS.attitude(std::array::from_fn(|k| network.photos[photo].pose[3 + k]));
-        let boresight = Quantity::Common(4);
+        let boresight = Quantity::Common(3);
         Attitude { photo, attitude, boresight, precision: deviations(&[1e-3; 3]) }.into()
     };
     let observed = imu(0);
     let mut one = network.clone();
     one.observations.push(observed.clone());
-    // One attitude and its boresight: they say nothing together, and the datum is as free as without.
-    let held = adjust(&one);
-    let (free, named) = (held.as_ref().ok().map(|found| found.datum.len()), held.as_ref().err().cloned());
-    let combination = Combination { commons: vec![4], ..Combination::default() };
-    assert!(free == Some(7) || named == Some(NetworkError::Undetermined(vec![combination; 3])), "{named:?}");
+    one.observations.push(base());
+    // One attitude and its boresight say nothing together: the network turns, and the boresight back.
+    let Err(NetworkError::Undetermined(found)) = adjust(&one) else { panic!("determined") };
+    assert_eq!(found.len(), 3);
+    assert!(found.iter().any(|combination| combination.commons.contains(&3)), "{found:?}");
     // Photos on one frame tell each other's attitude as one observation of both.
     let pose = Pose { position: Vector3::new(0.4, 0.1, -0.1), attitude: rotation([0.1, -0.2, 0.15]) };
-    network.commons.pop();
+    let mut network = free(0.0);
+    // Exact distances of an instrument with a scale of its own, and of points from a plane, give no scale.
+    assert_eq!(open_of_exact(&network), 7);
     let relative = Relative { photos: [0, 5], pose, precision: deviations(&[1e-3; 6]) };
     network.observations.push(relative.into());
-    assert_eq!(adjust(&network).unwrap().datum.len(), 6, "a pose on the frame has a length");
+    assert_eq!(open_of_exact(&network), 6, "a pose on the frame has a length");
 }
