@@ -151,6 +151,7 @@ impl Network {
         }
         let origin = self.origin();
         let mut model = self.bundle(&screened, images_on.clone(), origin)?;
+        model.minimum = options.minimum;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
             let turns = |photo: usize| self.turns(photo) && !unused(photo) && model.mount(photo).is_none();
@@ -298,6 +299,7 @@ impl Network {
             observations: vec![],
             placed,
             anchor,
+            minimum: None,
         };
         bundle.observations = self.tied_observations(screened, &bundle)?;
         Ok(bundle)
