@@ -186,6 +186,7 @@ fn adjusted_from(
         start,
         hold_unused: true,
         memory: None,
+        minimum: None,
     };
     collection.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
 }

@@ -433,7 +433,7 @@ impl Bundle {
     }
 
     /// The orientation of a photo, its pose given, with the columns of its unknowns.
-    fn orientation(&self, photo: usize, pose: &[f64; 6]) -> Orientation {
+    pub fn orientation(&self, photo: usize, pose: &[f64; 6]) -> Orientation {
         let [x, y, z, omega, phi, kappa] = *pose;
         match self.turning_sense(photo) {
             Some(sense) => {

@@ -154,7 +154,8 @@ impl Network {
         model.minimum = options.minimum;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
-            model.turning = (0..self.photos.len()).map(|i| self.turns(i) && !unused(i)).collect();
+            let turns = |photo: usize| self.turns(photo) && !unused(photo) && model.mount(photo).is_none();
+            model.turning = (0..self.photos.len()).map(turns).collect();
         }
         let local = |pose: [f64; 6]| match self.poses {
             PoseNumbers::Angles(_) => {

@@ -52,6 +52,8 @@ class Observation:
     """Fields that name photos."""
     UNKNOWNS: ClassVar[tuple[tuple[str, type[Unknown]], ...]] = ()
     """Fields that may be common unknowns, with their type."""
+    NEEDS: ClassVar[frozenset[str]] = frozenset()
+    """Those that it cannot do without."""
     VALUES: ClassVar[tuple[tuple[str, tuple[int, ...]], ...]] = ()
     """Fields that are numbers, with their shapes, in the order in which the core takes them: of fields that
     are common unknowns what is known instead."""
@@ -128,7 +130,7 @@ class Observation:
         value = getattr(self, name)
         if isinstance(value, kind):
             return value
-        known = value is None or name in dict(self.VALUES)
+        known = (value is None and name not in self.NEEDS) or name in dict(self.VALUES)
         if isinstance(value, Unknown) or not known:
             raise InputError(f"{name} of {self.KIND} is no {kind.__name__}: {shown(value)}")
         return None
