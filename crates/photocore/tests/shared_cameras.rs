@@ -361,6 +361,7 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
             Of::Photo(photo) | Of::PhotoStep(photo) => 6 * photo..6 * photo + 6,
             Of::Point(point) => dense.point(point),
             Of::Camera(camera) => dense.camera(camera),
+            Of::Common(_) => 0..0,
         };
         of.iter().flat_map(own).collect()
     };
