@@ -198,7 +198,7 @@ impl<M: Model> Problem<M> {
     }
 
     /// The unknowns to hold at given values; none where there is a datum.
-    pub(super) fn to_hold(&self, values: &[f64], pool: &ThreadPool) -> Vec<usize> {
+    pub(crate) fn to_hold(&self, values: &[f64], pool: &ThreadPool) -> Vec<usize> {
         let motions = pool.install(|| self.model.motions(values));
         let open = motions.and_then(|motions| self.open(values, &motions, pool));
         open.map_or(vec![], |open| open.hold)

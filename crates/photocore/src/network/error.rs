@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::model::Owner;
+use super::naming::PosePart;
 use super::observations::Fault;
 use super::precision::Coarse;
 use super::problem::Assembled;
@@ -128,6 +129,10 @@ pub struct Combination {
     pub photos: Vec<usize>,
     /// Cameras that several photos share.
     pub cameras: Vec<usize>,
+    /// Cameras and their parameters that take a notable part; none where this was not looked into.
+    pub parameters: Vec<(usize, usize)>,
+    /// Parts of the poses of photos that do.
+    pub poses: Vec<PosePart>,
     /// Common unknowns.
     pub commons: Vec<usize>,
 }
