@@ -101,6 +101,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
+        | Failure::CameraCovariance(_)
         | Failure::CommonDeviations(_)
         | Failure::Mount(_)
         | Failure::NoPhoto(_)
