@@ -122,6 +122,13 @@ def good(tmp_path_factory):
             "AsPublished": {"percent": 5.0, "max_iterations": 4},
             "Attitudes": {"matrices": np.eye(3)[None], "step_covariances": np.eye(3)[None]},
             "Block": {name: getattr(block, name) for name in photogram.Block.__dataclass_fields__},
+            "Camera": {
+                "model": "brown",
+                "parameters": {"c": -150.0, "K1": 1e-8},
+                "sd": {"c": 0.1},
+                "name": "A",
+                "unit": "mm",
+            },
             "Refraction": {"air": "giant", "water": None, "water_level": 0.0, "refractive_index": 1.34},
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},

@@ -8,7 +8,8 @@ import time
 import numpy as np
 import pytest
 
-from photogram import Block, InputError, geometry
+import photogram
+from photogram import Block, Camera, InputError, geometry
 from photogram.network.geometry import Spheroid
 from photogram.network.simulation import simulate
 
@@ -293,3 +294,36 @@ def test_other_control_patterns():
 def test_arguments_out_of_range(argument):
     with pytest.raises(InputError, match=next(iter(argument))):
         simulate(**argument)
+
+
+def test_cameras_take_the_photos_in_turn():
+    """Errors are as large in angle as without; an adjustment finds the cameras within their deviations."""
+    terms = {"k1": -1e-2, "k2": 2e-3, "p1": 1e-4, "p2": -2e-4}
+    true = [
+        Camera("opencv", {"fx": 8000.0, "fy": 8000.0, "cx": 6010.0, "cy": 5990.0, **terms}, name="left"),
+        Camera("opencv", {"fx": 8020.0, "fy": 8020.0, "cx": 5980.0, "cy": 6020.0, "k1": 5e-3}, name="right"),
+    ]
+    free = dict.fromkeys(true[0].names, np.inf)
+    known = {"fx": 8000.0, "fy": 8000.0, "cx": 6000.0, "cy": 6000.0}
+    start = [Camera("opencv", known, free, name=each.name) for each in true]
+    plain = simulate(seed=3)
+    made = simulate(seed=3, cameras=true, start_cameras=start)
+    assert [made.block.cameras[camera].name for camera in made.block.photo_cameras[:3]] == [
+        "left",
+        "right",
+        "left",
+    ]
+    first = made.block.photo_cameras[made.block.image_photos] == 0
+    ratio = 8000.0 / 152.74
+    np.testing.assert_allclose(
+        (made.block.image_xy - made.truth.image_xy)[first],
+        ratio * (plain.block.image_xy - plain.truth.image_xy)[first],
+        atol=1e-9,
+    )
+    result = photogram.adjust(made.block)
+    assert result.converged
+    assert result.variance_of_unit_weight == pytest.approx(1.0, abs=0.05)
+    for camera, truth in zip(result.cameras, true, strict=True):
+        assert (np.abs(camera.values - truth.values) < 4 * camera.sd).all()
+    with pytest.raises(InputError, match="as many as cameras"):
+        simulate(cameras=true, start_cameras=start[:1])

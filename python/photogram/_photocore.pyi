@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 
 _Floats = NDArray[np.float64]
 _Indices = NDArray[np.int64]
+FoundRow = tuple[
+    _Floats, _Floats, list[tuple[str, int, int]], _Floats, NDArray[np.bool_], int | None, float | None
+]
+"""What `find_first_values` returns."""
 
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
@@ -99,7 +103,7 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     NaN for arguments that cannot be.
     """
 
-def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str]]]:
+def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str, str]]]:
     """Return the models of cameras, `CAMERAS`, by their names.
 
     Returns
@@ -155,6 +159,39 @@ def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
     ------
     ValueError
         A model that there is not or that is forward, other shapes or numbers of parameters.
+    """
+
+def camera_partials(model: str, parameters: _Floats, u: _Floats) -> tuple[_Floats, _Floats, _Floats]:
+    """Images of directions with their partials; arguments as in :func:`camera_images`.
+
+    Returns
+    -------
+    (n, 2) images, (n, 2, 3) their partials by u, (n, 2, k) by the parameters, 0 for those that are constants of
+    a lens; not finite where there are none. Those of a backward camera are the ones of the measured position
+    that corresponds to u.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, other shapes or numbers of parameters.
+    """
+
+def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None:
+    """Return the radius up to which the radial part of a lens is one-to-one, and what it becomes.
+
+    Of a forward camera the radius is the tangent of the angle from the axis, of a fisheye the angle (rad), and
+    becomes what the focal length multiplies; `brown_forward` has lengths in the image. Of a backward camera it
+    is that of the measured position from the principal point, which becomes that of the corrected one.
+    Infinite where only the image ends.
+
+    Returns
+    -------
+    None where the lens is one-to-one everywhere.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, or another number of parameters.
     """
 
 def attitudes_from_numbers(
@@ -416,15 +453,7 @@ def find_first_values(
     direction_sd: _Floats,
     *,
     threads: int,
-) -> tuple[
-    _Floats,
-    _Floats,
-    list[tuple[str, int, int]],
-    _Floats,
-    NDArray[np.bool_],
-    int | None,
-    float | None,
-]:
+) -> FoundRow:
     """Find poses of photos from what is known, in cartesian object space (`docs/first-values.md`).
 
     Parameters
@@ -1479,22 +1508,13 @@ UNKNOWNS: list[tuple[str, list[tuple[str, str]]]]
 CAMERAS: list[str]
 """What the models of cameras are called."""
 
-def camera_model(camera: str) -> tuple[str, list[tuple[str, bool]]]:
-    """Return the formula of a model of cameras, and its parameters: name, whether a length in the image.
-
-    Raises
-    ------
-    ValueError
-        No model has this name.
-    """
-
 def collection_images(camera: str, photo_parameters: _Floats, points: _Floats) -> _Floats:
     """Image coordinates of points, row by row: point i on the photo of row i.
 
     Parameters
     ----------
     camera
-        The model, one of `CAMERAS`; `docs/collection.md` has their formulas.
+        The model, one of `CAMERAS`; `docs/cameras.md` has their formulas.
     photo_parameters
         (n, 6 + k) angle-axis vector w (rad) and t, so that P = R(w) X + t in the photo's axes (x right, y up,
         looking along -z), then the k parameters of the camera.

@@ -127,6 +127,37 @@ def test_a_photo_with_too_few_points_is_named():
     assert started.messages[-1].text.startswith("not started: F3: ")
 
 
+def test_mirrored_photos_do_not_fit_control():
+    positions, angles, points = networks.strips(55, relief=300.0)
+    mirrored = [
+        block.replace(image_xy=block.image_xy * [-1, 1])
+        for step in (4, 40)
+        for block in [networks.network(positions, angles, points, seed=56, control=range(0, 400, step))[0]]
+    ]
+    with pytest.raises(AdjustmentError, match=r"started: (?s:.*)\n  hint: probably the photos are mirrored"):
+        first_values(mirrored[0])
+    # Few points in space may still find a place, behind which most of them do not fit.
+    assert "probably the photos are mirrored" in str(first_values(mirrored[1]).messages[0])
+
+
+def test_control_that_does_not_fit_is_said():
+    positions, angles, points = networks.strips(57)
+    control = range(0, 400, 40)
+    block, _, _ = networks.network(positions, angles, points, seed=58, control=control)
+    moved = block.point_positions.copy()
+    moved[control[6:]] += np.random.default_rng(59).uniform(100, 200, (4, 3))
+    said = str(first_values(block.replace(point_positions=moved)).messages[0])
+    assert "images of control points do not fit: look at the control" in said
+
+
+def test_wrong_control_does_not_stop_the_rest():
+    """A photo resected from four points of which one is wrong gives way to the model of all others."""
+    positions, angles, points = networks.ring(109, photos=7, points=57)
+    block, truth, _ = networks.network(positions, angles, points, seed=9, control=range(4), wrong=0.3)
+    started = whole(first_values(block))
+    agree(started.usable(), pairs_without(started, truth))
+
+
 def test_given_poses_stay():
     positions, angles, points = networks.strips(61)
     block, truth, _ = networks.network(positions, angles, points, seed=62)

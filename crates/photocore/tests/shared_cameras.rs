@@ -362,6 +362,7 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
             Of::Photo(photo) | Of::PhotoStep(photo) => 6 * photo..6 * photo + 6,
             Of::Point(point) => dense.point(point),
             Of::Camera(camera) => dense.camera(camera),
+            Of::Common(common) => panic!("common unknown {common}"),
         };
         of.iter().flat_map(own).collect()
     };
@@ -481,6 +482,16 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
     let solution = adjust(&network, TIGHT).unwrap();
     assert!((solution.cameras[1].cofactors[0].sqrt() - 0.1).abs() < 1e-9);
     assert!(solution.cameras[1].redundancy[0].abs() < 1e-8);
+}
+
+#[test]
+fn constants_of_a_camera_are_never_unknown() {
+    for sd in [FREE, 0.1] {
+        let mut network = network();
+        network.cameras[5].sd[10] = sd;
+        let error = NetworkError::CameraConstant { camera: 5, parameter: "r0" };
+        assert_eq!(adjust(&network, TIGHT).unwrap_err(), error);
+    }
 }
 
 /// The same with poses in angles: what takes part is named.

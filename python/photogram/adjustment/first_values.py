@@ -24,6 +24,8 @@ __all__ = ["FirstValues", "first_values"]
 
 NEEDED = 4
 """Known points of a photo that is resected."""
+DOUBTFUL = 0.3
+"""Part of the images of control that is set aside where the control, or the start, is doubted."""
 IN_COMMON = 3
 """What a model must have in common with what is known."""
 SOURCES = {
@@ -149,24 +151,15 @@ def first_values(block: Block) -> FirstValues:
         raise InputError(f"block is not a Block but of the type {type(block).__name__}")
     axes = Cartesian.of(block)
     known = Known.of(block, axes)
-    positions, attitudes, how, points, aside, first, misfit = _photocore.find_first_values(
-        known.positions,
-        known.attitudes,
-        known.observed_positions,
-        known.observed_attitudes,
-        known.points,
-        known.point_sd,
-        block.image_photos,
-        block.image_points,
-        image_directions(block),
-        direction_deviations(block),
-        threads=0,
-    )
+    directions = image_directions(block)
+    positions, attitudes, how, points, aside, first, misfit = _found(block, known, directions)
     names = block.photo_ids
     missing = {photo: _reason(*why) for photo, why in zip(names, how, strict=True) if why[0] not in SOURCES}
     sources = {photo: why[0] for photo, why in zip(names, how, strict=True) if why[0] in SOURCES}
+    mirrored = _mirrored(block, known, directions, len(sources), aside)
     if not sources:
-        raise AdjustmentError(f"no photo could be started: {_reasons(missing)}")
+        hints = "".join(f"\n  hint: {hint}" for hint in mirrored)
+        raise AdjustmentError(f"no photo could be started: {_reasons(missing)}{hints}")
     if first is not None:
         scale = _scale(block, points)
         positions, points = positions * scale, points * scale
@@ -178,8 +171,54 @@ def first_values(block: Block) -> FirstValues:
         set_aside=aside,
         misfit=np.nan if misfit is None else misfit,
         first_photo=None if first is None else names[first],
-        messages=_messages(block, sources, missing, aside, None if first is None else names[first]),
+        messages=[
+            *mirrored,
+            *_messages(block, sources, missing, aside, None if first is None else names[first]),
+        ],
     )
+
+
+def _found(block: Block, known: Known, directions: Floats) -> _photocore.FoundRow:
+    return _photocore.find_first_values(
+        known.positions,
+        known.attitudes,
+        known.observed_positions,
+        known.observed_attitudes,
+        known.points,
+        known.point_sd,
+        block.image_photos,
+        block.image_points,
+        directions,
+        direction_deviations(block),
+        threads=0,
+    )
+
+
+def _mirrored(block: Block, known: Known, directions: Floats, started: int, aside: Bools) -> list[Message]:
+    """Say where control does not fit, and whether it would if photos were mirrored.
+
+    Relative orientation does not see a mirrored photo; control that is not in a plane does.
+    """
+    control = np.asarray(np.isfinite(known.point_sd).all(axis=1))
+    of_control = control[block.image_points]
+    against = int(np.count_nonzero(aside & of_control))
+    doubtful = DOUBTFUL * np.count_nonzero(of_control) < against
+    if np.count_nonzero(control) < NEEDED or not (doubtful or started < len(block.photo_ids)):
+        return []
+    found = _found(block, known, directions * [-1.0, 1.0, 1.0])
+    others = sum(why[0] in SOURCES for why in found[2])
+    still = int(np.count_nonzero(found[4] & of_control))
+    if others >= max(started, len(block.photo_ids) // 2) and (others > 2 * started or 5 * still < against):
+        return [
+            Message(
+                "probably the photos are mirrored: with the other sign of x (or of y) they fit the control,"
+                " as they are they do not"
+            )
+        ]
+    if not doubtful:
+        return []
+    count = np.count_nonzero(of_control)
+    return [Message(f"{against} of {count} images of control points do not fit: look at the control")]
 
 
 def _started(

@@ -24,11 +24,12 @@ from photogram.adjustment.regression import (
     view,
 )
 from photogram.adjustment.resection import Observed, solve
+from photogram.adjustment.weights import weight_hints
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, OutOfMemoryError
 from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
-from photogram.network.directions import image_directions, without_lenses
+from photogram.network.directions import without_lenses
 from photogram.network.geometry import rotation_matrix
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
@@ -44,6 +45,8 @@ EACH = 0.5
 """What it must fall to on each photo that does not fit as it is."""
 AS_GOOD = 1.5
 """Another hypothesis is as good when its misfit is below so many times the least."""
+SLIGHT = float(np.radians(1.0))
+"""Attitudes that differ from resected ones by less are right."""
 CLEARLY = 5.0
 """So many times nearer to the resected attitudes must those of a rival reading be."""
 BAD = 5.0
@@ -77,13 +80,15 @@ class Verdict:
             self.text = f"it cannot be told which of these is so{where}: {rivals}: {fall}"
 
 
-def hints(block: Block) -> list[Message]:
+def hints(block: Block | Result) -> list[Message]:
     """Look for mistakes in the conventions of data: units, axes, signs, angles.
 
     Parameters
     ----------
     block
-        A block whose photos have positions and attitudes, be they rough.
+        A block whose photos have positions and attitudes, be they rough; or the result of an adjustment,
+        whose block is looked at, and, where nothing is found, the standard deviations of each kind of
+        observation.
 
     Returns
     -------
@@ -93,7 +98,7 @@ def hints(block: Block) -> list[Message]:
     Raises
     ------
     InputError
-        What is no block, or has photos without a pose.
+        What is no block and no result, or has photos without a pose.
 
     Examples
     --------
@@ -106,8 +111,10 @@ def hints(block: Block) -> list[Message]:
     >>> print(hints(down)[0])  # doctest: +ELLIPSIS
     probably y of the images has the wrong sign: it is counted down, not up: images would miss ...
     """
-    block = without_lenses(checked(block))
+    if isinstance(block, Result):
+        return hints(block.block) or (weight_hints(block) if block.converged else [])
     with np.errstate(all="ignore"):
+        block = without_lenses(checked(block))
         found = [Message(verdict.text) for verdict in verdicts(block)]
         return [*found, *_latitudes(block), *(_readings(block) if not found else []), *_bars(block)]
 
@@ -126,7 +133,7 @@ def with_hints(result: Result) -> Result:
     fits = variance is None or variance <= BAD**2
     if (result.converged and fits) or result.loss is not None:
         return result
-    found = hints(result.block)
+    found = hints(result)
     return replace(result, messages=[*found, *result.messages]) if found else result
 
 
@@ -230,7 +237,7 @@ def _readings(block: Block) -> list[Message]:
         (_apart(matrices[rows], turned), text) for text, matrices in attitude_readings(block).values()
     )
     (least, text), (second, _) = rivals[:2]
-    if CLEARLY * least > min(own, second):
+    if own < SLIGHT or CLEARLY * least > min(own, second):
         return []
     return [
         Message(
@@ -245,15 +252,12 @@ def _resected(block: Block, photo: int) -> Floats | None:
     rows = np.flatnonzero((block.image_photos == photo) & given_points(block)[block.image_points])
     points = block.image_points[rows]
     count = len(rows)
-    # As a camera without distortion would have them.
-    distance = -float(block.camera_scales()[photo])
-    directions = image_directions(block)[rows]
     observed = Observed(
         block.point_positions[points],
         np.zeros((count, 3)),
-        distance * directions[:, :2] / directions[:, 2:],
+        block.image_xy[rows],
         block.image_sd[rows],
-        distance,
+        float(block.known_distances("hints")[photo]),
         [block.point_ids[point] for point in points],
     )
     try:

@@ -10,6 +10,11 @@ from photogram.network.block import Block
 
 __all__ = ["direction_deviations", "image_directions", "without_lenses"]
 
+_SIDE = -0.02
+"""u3 of unit directions that are seen well in front of the camera."""
+_SMALL = 1e-6
+"""Radians off the axis, where no lens distorts."""
+
 
 def image_directions(block: Block) -> Floats:
     """(m, 3) unit directions of the images of a block in the axes of their photos; NaN where there is none.
@@ -26,29 +31,46 @@ def image_directions(block: Block) -> Floats:
     return directions
 
 
-def direction_deviations(block: Block) -> Floats:
-    """(m,) standard deviations of these directions, radians: those of images over the principal distance."""
-    deviations = np.sqrt((block.image_sd**2).mean(axis=1)) / block.camera_scales()[block.image_photos]
-    return np.asarray(deviations)
-
-
 def without_lenses(block: Block) -> Block:
-    """Return a block as cameras without distortion would have seen it, each with its given parameters.
+    """Return a block as cameras without distortion would have seen it, in the unit of its images.
 
-    Images that no direction has, at these parameters, are left out.
+    A block that has principal distances is returned as it is. Where most images have no direction (they may
+    be in another unit) lenses are left out, and cameras are everywhere what they are near the axis; else
+    images without a direction in front of the camera are left out.
     """
-    if not block.cameras:
+    if not block.cameras or block.photo_cameras is None:
         return block
-    directions, scales = image_directions(block), block.camera_scales()
-    seen = np.isfinite(directions).all(axis=1)
-    photos = block.image_photos[seen]
-    ideal = directions[seen, :2] / -directions[seen, 2:]
+    directions = image_directions(block)
+    seen = directions[:, 2] < _SIDE
+    if 2 * np.count_nonzero(seen) < len(seen):
+        tangents, seen = _near_axis(block), np.ones(len(seen), dtype=bool)
+    else:
+        tangents = -directions[:, :2] / directions[:, 2:]
+    scales = block.camera_scales()
     return block.replace(
         cameras=(),
         photo_cameras=None,
         principal_distances=-scales,
-        image_photos=photos,
+        image_photos=block.image_photos[seen],
         image_points=block.image_points[seen],
-        image_xy=ideal * scales[photos, np.newaxis],
+        image_xy=(scales[block.image_photos, np.newaxis] * tangents)[seen],
         image_sd=block.image_sd[seen],
     )
+
+
+def _near_axis(block: Block) -> Floats:
+    """(m, 2) tangents -u1/u3, -u2/u3 of images, as if cameras were everywhere what they are near the axis."""
+    tangents = np.empty_like(block.image_xy)
+    of_images = np.asarray(block.photo_cameras)[block.image_photos]
+    for row, camera in enumerate(block.cameras):
+        middle, right, up = camera.project([[0.0, 0.0, -1.0], [_SMALL, 0.0, -1.0], [0.0, _SMALL, -1.0]])
+        linear = np.column_stack([right - middle, up - middle]) / _SMALL
+        own = of_images == row
+        tangents[own] = np.linalg.solve(linear, (block.image_xy[own] - middle).T).T
+    return tangents
+
+
+def direction_deviations(block: Block) -> Floats:
+    """(m,) standard deviations of these directions, radians: those of images over the principal distance."""
+    deviations = np.sqrt((block.image_sd**2).mean(axis=1)) / block.camera_scales()[block.image_photos]
+    return np.asarray(deviations)

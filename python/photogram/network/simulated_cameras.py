@@ -40,26 +40,25 @@ def photographed(
     InputError
         What are no cameras of one unit, another number of them to start with, a point that no image shows.
     """
-    true = checked_cameras(cameras)
-    start = true if start_cameras is None else checked_cameras(start_cameras)
-    if len(start) != len(true) or start[0].unit != true[0].unit:
+    start = cameras if start_cameras is None else checked_cameras(start_cameras)
+    if len(start) != len(cameras) or start[0].unit != cameras[0].unit:
         raise InputError("start_cameras are as many as cameras, and in their unit")
     distance = truth.known_distances("the simulation")[0]
-    photo_cameras = np.arange(len(truth.photo_ids)) % len(true)
+    photo_cameras = np.arange(len(truth.photo_ids)) % len(cameras)
     of_images = photo_cameras[truth.image_photos]
     directions = np.column_stack([truth.image_xy, np.full(len(truth.image_xy), distance)])
     # The camera looks along -z, whatever the sign of the principal distance.
-    images = images_of(true, of_images, -np.sign(distance) * directions)
+    images = images_of(cameras, of_images, -np.sign(distance) * directions)
     if not np.isfinite(images).all():
-        name = true[of_images[np.flatnonzero(~np.isfinite(images).all(axis=1))[0]]].title
+        name = cameras[of_images[np.flatnonzero(~np.isfinite(images).all(axis=1))[0]]].title
         raise InputError(f"the camera {name} has no image of some points: they are beyond its lens terms")
-    larger = np.array([each.scale for each in true])[of_images, np.newaxis] / abs(distance)
+    larger = np.array([each.scale for each in cameras])[of_images, np.newaxis] / abs(distance)
     changes = {
         "principal_distances": None,
         "photo_cameras": photo_cameras,
         "image_sd": truth.image_sd * larger,
     }
     return (
-        truth.replace(**changes, cameras=true, image_xy=images),
+        truth.replace(**changes, cameras=cameras, image_xy=images),
         block.replace(**changes, cameras=start, image_xy=images + larger * (block.image_xy - truth.image_xy)),
     )

@@ -22,7 +22,7 @@ from photogram.errors import InputError
 from photogram.memory import available_memory
 from photogram.network import geometry
 from photogram.network.block import Block
-from photogram.network.cameras import Camera
+from photogram.network.cameras import Camera, checked_cameras
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Refraction
 from photogram.network.simulated_cameras import photographed
@@ -308,8 +308,8 @@ def simulate(
         point_positions=np.where(known, ground + np.where(held, control_noise, 0.0), np.nan),
         image_xy=measured,
     )
-    if cameras:
-        truth, block = photographed(truth, block, cameras, start_cameras)
+    if taking := checked_cameras(cameras):
+        truth, block = photographed(truth, block, taking, start_cameras)
     return Simulation(block, truth, faults)
 
 

@@ -28,6 +28,9 @@ pub enum NetworkError {
     /// There is no camera of this index.
     #[error("there is no camera {0}")]
     CameraIndex(usize),
+    /// There is no common unknown of this index.
+    #[error("there is no common unknown {0}")]
+    NoCommon(usize),
     /// The point took no part in the adjustment.
     #[error("point {0} was left out of the adjustment")]
     LeftOut(usize),

@@ -83,7 +83,7 @@ use crate::normals::Ordering;
 pub use cameras::AdjustedCamera;
 pub use commons::{AdjustedCommon, Common, CommonKind};
 pub use covariance::{Covariances, NetworkDatum, Of, State};
-pub use datum::InnerConstraints;
+pub use datum::{InnerConstraints, Minimum};
 pub use error::{Combination, NetworkError};
 pub use mounts::Mount;
 pub use naming::PosePart;
@@ -227,6 +227,8 @@ pub struct Options {
     pub hold_unused: bool,
     /// Bytes that the adjustment may take (see [`crate::normals::System::memory`]); None for any number.
     pub memory: Option<usize>,
+    /// What to hold where nothing else gives a datum; None for what is best held.
+    pub minimum: Option<Minimum>,
 }
 
 impl Default for Options {
@@ -239,6 +241,7 @@ impl Default for Options {
             start: Start::default(),
             hold_unused: false,
             memory: None,
+            minimum: None,
         }
     }
 }

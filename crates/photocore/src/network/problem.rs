@@ -151,6 +151,7 @@ impl Network {
         }
         let origin = self.origin();
         let mut model = self.bundle(&screened, images_on.clone(), origin)?;
+        model.minimum = options.minimum;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
             model.turning = (0..self.photos.len()).map(|i| self.turns(i) && !unused(i)).collect();
@@ -298,6 +299,7 @@ impl Network {
             observations: vec![],
             placed,
             anchor,
+            minimum: None,
         };
         bundle.camera_priors = self.camera_priors(&bundle);
         bundle.observations = self.tied_observations(screened, &bundle)?;

@@ -1,6 +1,7 @@
 //! Networks of photos: blocks and collections; their documentation is in `_photocore.pyi`.
 
 mod block;
+mod block_network;
 mod collection;
 mod first_values;
 mod solution;
@@ -34,6 +35,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("BlockError", module.py().get_type::<BlockError>())?;
     module.add("CollectionError", module.py().get_type::<CollectionError>())?;
     block::register(module)?;
+    block_network::register(module)?;
     collection::register(module)?;
     first_values::register(module)?;
     solution::register(module)
@@ -96,24 +98,26 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
             ("coarse", vec![combination_row(&photos)], points.clone())
         }
         Failure::Empty => ("empty", vec![], vec![]),
+        error if block_network::has_datum(error) => ("not free", vec![], vec![]),
+        Failure::Datum(_) => ("datum", vec![], vec![]),
+        Failure::LeftOut(point) => ("left out", vec![], vec![*point]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
         Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
         | Failure::CameraCovariance(_)
-        | Failure::CommonDeviations(_)
-        | Failure::Mount(_)
         | Failure::NoPhoto(_)
         | Failure::NoPoint(_)
         | Failure::CameraIndex(_)
-        | Failure::LeftOut(_)
+        | Failure::NoCommon(_)
         | Failure::Partials { .. }
         | Failure::State
+        | Failure::CommonDeviations(_)
+        | Failure::Mount(_)
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
-        | Failure::Datum(_)
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
     };

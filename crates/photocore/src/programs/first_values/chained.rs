@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::model::Model;
+use super::model::{FITS, Model};
 use super::{FirstValuesError, Search, Source};
 use crate::geometry::{Matrix3, Pose, Vector3};
 use crate::network::median;
@@ -14,7 +14,7 @@ pub(super) const COMMON: usize = 8;
 const TRIED: usize = 12;
 /// Angles at which rays meet count up to this, radians: wider ones are no better.
 const WIDE: f64 = 0.5;
-/// A pair holds when half of its points fit within this angle, radians.
+/// A pair holds when two fifths of its points fit within this angle, radians.
 const LIMIT: f64 = 0.01;
 
 struct Pair {
@@ -97,6 +97,7 @@ impl Search<'_> {
         let pose = |position, attitude| Some((Pose { position, attitude }, Source::Oriented));
         model.poses[first] = pose(Vector3::zeros(), Matrix3::identity());
         model.poses[second] = pose(candidate.oriented.base, candidate.oriented.attitude);
+        model.tolerance = (FITS * candidate.misfit).max(f64::MIN_POSITIVE);
         model.intersect(self);
         self.adjust(&mut model)?;
         Ok(model)

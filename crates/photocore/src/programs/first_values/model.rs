@@ -8,7 +8,7 @@ use crate::programs::similarity::Similarity;
 /// Rays of a point must meet at this angle, radians: below it their point says little along them.
 const LEAST_ANGLE: f64 = 0.01;
 /// An image fits within this multiple of the standard deviation that the median of all says, and of its own.
-const FITS: f64 = 6.0;
+pub(super) const FITS: f64 = 6.0;
 const FITS_OWN: f64 = 4.0;
 /// Pairs of rays that are tried where not all rays of a point meet, at the most.
 const PAIRS: usize = 45;

@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import InputError, RankError, Spheroid, adjust, hints, simulate
+from photogram import Camera, InputError, RankError, Spheroid, adjust, hints, simulate
 from photogram.adjustment.hints import verdicts
 from photogram.adjustment.regression import eligible, regressions, spread, view
+from photogram.geometry import project
 from photogram.giant import Project, check
+from photogram.network.directions import image_directions, without_lenses
 from photogram.network.observations import Distance
 
 IDENTITY = [[1, 0], [0, 1]]
@@ -104,6 +106,28 @@ def test_small_angles_hide_what_they_mean():
     assert hints(made["sign of phi"]) == hints(made["phi-omega-kappa"]) == []
 
 
+def test_what_cannot_be_told_is_said():
+    """Of vertical photos the other sense of the angles is the other sign of kappa."""
+    block = aerial(12)
+    known = np.isfinite(block.point_positions).all(axis=1)
+    points = np.where(known[:, np.newaxis], block.point_positions, 0.0)
+    angles = np.tile([0.0, 0.0, 0.8], (len(block.photo_ids), 1))
+    seen = known[block.image_points]
+    photos, of_points = block.image_photos[seen], block.image_points[seen]
+    distances = np.full(len(photos), block.principal_distances[0])
+    vertical = block.replace(
+        photo_attitudes=angles,
+        image_photos=photos,
+        image_points=of_points,
+        image_xy=project(points[of_points], block.photo_positions[photos], angles[photos], distances),
+        image_sd=0.005,
+    )
+    assert hints(vertical) == []
+    (verdict,) = verdicts(vertical.replace(photo_attitudes=-angles))
+    assert sorted(verdict.names) == ["sense", "sign of kappa"]
+    assert verdict.text.startswith("it cannot be told which of these is so: ")
+
+
 @pytest.mark.parametrize("network", LOOKED_AT)
 def test_start_values_without_mistakes(network):
     assert hints(mistakes.golden(network)) == []
@@ -156,6 +180,49 @@ def test_a_single_photo():
     (hint,) = hints(block.replace(image_xy=xy))
     assert "photos are mirrored" in str(hint)
     assert f"(on photo {block.photo_ids[4]})" in str(hint)
+
+
+@pytest.mark.parametrize(
+    "mistake", ["none", "pixels", "y down", "mirrored", "feet", "t", "principal distance"]
+)
+def test_cameras_with_lenses(mistake):
+    """A camera in millimetres with a principal point and distortion sees like one without."""
+    given = mistakes.golden("selfcal")
+    made = mistakes.mistakes(given, mistakes.HALF["selfcal"])[mistake]
+    distance = made.principal_distances[0]
+    lens = {"c": float(distance), "xp": 0.05, "yp": -0.03, "K1": -1e-4}
+    found = verdicts_of(made.replace(principal_distances=None, cameras=[Camera("brown", lens)]))
+    assert found == ([[NAMED[mistake]]] if mistake != "none" else [])
+
+
+def test_cameras_in_pixels():
+    block = aerial(6)
+    camera = Camera("radial", {"f": 25000, "cx": 19000, "cy": 19000, "k1": 0.01})
+    directions = image_directions(block)
+    pixels = block.replace(
+        principal_distances=None, cameras=[camera], image_xy=camera.project(directions), image_sd=1.0
+    )
+    assert hints(pixels) == []
+    upward = pixels.replace(image_xy=pixels.image_xy * [1, -1] + [0, 38000])
+    assert verdicts_of(upward) == [["y down"]]
+
+
+def verdicts_of(block):
+    return [verdict.names for verdict in verdicts(without_lenses(block))]
+
+
+def test_standard_deviations_that_are_wrong():
+    right = aerial(11)
+    assert hints(adjust(right)) == []
+    (small,) = hints(adjust(right.replace(image_sd=right.image_sd / 3)))
+    assert str(small).startswith("standard deviations of image coordinates are about 3 times too small: ")
+    (large,) = hints(adjust(right.replace(image_sd=right.image_sd * 4)))
+    assert "about 4 times too large" in str(large)
+    xy = right.image_xy.copy()
+    xy[100] += 0.5
+    assert hints(adjust(right.replace(image_xy=xy))) == []
+    told = adjust(right.replace(image_sd=right.image_sd / 8)).messages
+    assert str(told[0]).startswith("standard deviations of image coordinates are about ")
 
 
 def test_longitude_and_latitude():

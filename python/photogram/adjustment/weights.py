@@ -1,0 +1,77 @@
+"""Standard deviations that an adjustment contradicts, kind by kind: one step of variance components."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.messages import Message
+from photogram.results.result import Result
+from photogram.statistics import global_test
+
+__all__ = ["weight_hints"]
+
+LEAST_REDUNDANCY = 10.0
+"""Of a kind whose standard deviations are judged."""
+NOTABLE = 1.5
+"""Standard deviations that are wrong by this factor, in the mean and in the median."""
+MEDIAN = 0.6745
+"""Of the size of a normal variable with standard deviation 1: a few blunders do not move it."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Kind:
+    name: str
+    sum_of_squares: float
+    redundancy: float
+    standardized: Floats
+
+
+def weight_hints(result: Result) -> list[Message]:
+    """Name kinds of observations whose standard deviations are too small or too large.
+
+    With v'Pv the sum of squares of a kind and r the sum of its redundancy numbers, the factor is the root of
+    v'Pv / r. It is told where v'Pv is beyond its limits, and where the median of the standardized residuals
+    says the same.
+    """
+    found = []
+    for kind in _kinds(result):
+        if not kind.redundancy >= LEAST_REDUNDANCY:
+            continue
+        test = global_test(kind.sum_of_squares, round(kind.redundancy))
+        if test is None:
+            continue
+        factor = math.sqrt(kind.sum_of_squares / kind.redundancy)
+        finite = kind.standardized[np.isfinite(kind.standardized)]
+        middle = float(np.median(np.abs(finite))) / MEDIAN if finite.size else math.nan
+        if test.rejected_high and min(factor, middle) > NOTABLE:
+            found.append(_hint(kind, middle, "small"))
+        elif test.rejected_low and max(factor, middle) < 1 / NOTABLE:
+            found.append(_hint(kind, 1 / middle, "large"))
+    return found
+
+
+def _hint(kind: _Kind, factor: float, which: str) -> Message:
+    return Message(
+        f"standard deviations of {kind.name} are about {factor:.2g} times too {which}: the sum of squares is"
+        f" {kind.sum_of_squares:.4g} for a redundancy of {kind.redundancy:.4g}"
+    )
+
+
+def _kinds(result: Result) -> Iterator[_Kind]:
+    redundancy = float(np.nansum(result.redundancy))
+    yield _Kind("image coordinates", result.sums_of_squares.plates, redundancy, result.standardized)
+    for name, observed in (("control", result.control), ("positions and attitudes", result.stations)):
+        square = float(np.nansum((observed.residuals / observed.sd) ** 2))
+        yield _Kind(name, square, float(np.nansum(observed.redundancy)), observed.standardized)
+    for kind in result.kinds.values():
+        yield _Kind(
+            f"observations of the kind {kind.kind}",
+            kind.sum_of_squares,
+            float(np.nansum(kind.redundancy)),
+            kind.standardized,
+        )
