@@ -96,6 +96,31 @@ def test_weights_count(block):
     assert loose.cameras[0].redundancy[c] > 0.999
 
 
+def test_cameras_of_one_block_are_observations_of_another(example):
+    """Two blocks together know what the sum of their weights says."""
+    first, second = (adjust(example.measured(seed=seed), unit_variance="unity") for seed in (11, 12))
+    prior = first.cameras[0].observed()
+    rows = first.cameras[0].estimated
+    assert prior.prior_covariance.shape == (8, 8)
+    both = adjust(example.measured(seed=12).replace(cameras=[prior]), unit_variance="unity")
+    camera = both.cameras[0]
+    weights = [np.linalg.inv(each.cameras[0].covariance[np.ix_(rows, rows)]) for each in (first, second)]
+    expected = np.linalg.inv(sum(weights))
+    scale = np.sqrt(np.diag(expected))
+    found = camera.covariance[np.ix_(rows, rows)]
+    np.testing.assert_allclose(found / np.outer(scale, scale), expected / np.outer(scale, scale), atol=0.02)
+    values = expected @ sum(
+        weight @ each.cameras[0].values[rows] for weight, each in zip(weights, (first, second), strict=True)
+    )
+    np.testing.assert_allclose((camera.values[rows] - values) / scale, 0, atol=0.05)
+    shares = 1 - np.diag(found @ np.linalg.inv(prior.prior_covariance))
+    np.testing.assert_allclose(camera.redundancy[rows], shares, atol=1e-6)
+    sums = both.redundancy.sum() + both.point_redundancy[both.used_points].sum() + camera.redundancy.sum()
+    assert sums == pytest.approx(both.degrees_of_freedom, rel=1e-7)
+    pickled = pickle.loads(pickle.dumps(prior))
+    np.testing.assert_array_equal(pickled.prior_covariance, prior.prior_covariance)
+
+
 def test_principal_distances_are_perspective_cameras_that_are_held(small_block):
     distance = float(small_block.principal_distances[0])
     camera = Camera("perspective", {"c": distance})
@@ -188,6 +213,13 @@ def test_tables_name_cameras(block):
         ({"sd": -1.0}, "no standard deviation"),
         ({"sd": {"f": 1.0}}, "brown has no f"),
         ({"sd": {"r0": 1.0}}, "r0 of the camera .* is a constant"),
+        ({"covariance": 5}, "no pair of names and a matrix"),
+        ({"covariance": (["c"], np.eye(2))}, "has the shape"),
+        ({"covariance": (["c", "c"], np.eye(2))}, "more than once"),
+        ({"covariance": (["f"], np.eye(1))}, "brown has no f"),
+        ({"covariance": (["c", "xp"], np.ones((2, 2)))}, "not symmetric and positive definite"),
+        ({"covariance": (["c"], np.eye(1)), "sd": {"c": 2.0}}, "not that of its covariance"),
+        ({"covariance": (["r0"], np.eye(1))}, "r0 of the camera .* is a constant"),
         ({"unit": "inch"}, "unit"),
         ({"name": 5}, "name"),
     ],
