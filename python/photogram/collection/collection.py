@@ -76,7 +76,8 @@ class Collection:
             "point_sd": (points, 3),
         }
         if np.ndim(self.photo_sd) == 0:
-            object.__setattr__(self, "photo_sd", np.where(self._constant, 0.0, self.photo_sd))
+            of_each = np.where(self._constant, 0.0, self.photo_sd)
+            object.__setattr__(self, "photo_sd", np.broadcast_to(of_each, shapes["photo_sd"]))
         for name, shape in shapes.items():
             object.__setattr__(self, name, shaped(name, getattr(self, name), shape))
         for name in ("photo_parameters", "point_positions", "image_xy"):
