@@ -7,7 +7,7 @@ use super::naming::PosePart;
 use super::observations::Fault;
 use super::precision::Coarse;
 use super::problem::Assembled;
-use crate::adjustment::{AdjustError, DatumError, gib};
+use crate::adjustment::{AdjustError, CofactorError, DatumError, gib};
 use crate::normals::LayoutError;
 
 /// Why a network cannot be adjusted, or has no cofactors. Photos, cameras and points are indices into the network.
@@ -108,6 +108,9 @@ pub enum NetworkError {
         /// Bytes that it may take.
         available: usize,
     },
+    /// More cofactors than there may be.
+    #[error(transparent)]
+    Cofactors(CofactorError),
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,

@@ -102,7 +102,9 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Datum(_) => ("datum", vec![], vec![]),
         Failure::LeftOut(point) => ("left out", vec![], vec![*point]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
-        Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
+        Failure::Memory { .. } | Failure::OutOfMemory(_) | Failure::Cofactors(_) => {
+            ("memory", vec![], vec![])
+        }
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
