@@ -21,8 +21,8 @@ IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
 CombinationRow = tuple[list[int], list[int], list[int], list[tuple[int, int]], list[str]]
-"""Photos; cameras that several of them share; common unknowns; cameras with parameters that take a notable part; parts of
-poses that do: positions `along` and `across` the directions of view, `tilt`, `swing` about these."""
+"""Photos; cameras that several of them share; common unknowns; cameras with parameters that take a notable
+part; parts of poses that do: positions `along` and `across` the view, `tilt`, `swing` about the view."""
 
 FailureRow = tuple[str, str, list[CombinationRow], list[int]]
 """Why a network cannot be adjusted, as in :class:`BlockError`."""
@@ -494,7 +494,7 @@ def block_network(
     photo_position_sd: _Floats,
     photo_attitude_sd: _Floats,
     photo_cameras: _Indices,
-    cameras: list[tuple[str, list[float], list[float]]],
+    cameras: list[tuple[str, list[float], list[float], list[float] | None]],
     point_positions: _Floats,
     point_sd: _Floats,
     image_photos: _Indices,
@@ -534,7 +534,8 @@ def block_network(
     photo_cameras
         (P,) indices into the cameras; photos with the same one share its unknowns.
     cameras
-        Model, parameters in its order and their standard deviations.
+        Model, parameters in its order and their standard deviations, covariance matrix of those that are
+        weighted row by row, None where these were observed one by one.
     point_positions, point_sd
         (n, 3) coordinates, NaN where unknown, and standard deviations, finite for held components.
     image_photos, image_points

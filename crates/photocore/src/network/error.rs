@@ -48,6 +48,9 @@ pub enum NetworkError {
     /// A camera has more or fewer standard deviations than parameters.
     #[error("camera {0} has not as many standard deviations as parameters")]
     CameraDeviations(usize),
+    /// A camera has a covariance matrix that is not one of its weighted parameters.
+    #[error("camera {0} has a covariance matrix that is not that of its weighted parameters")]
+    CameraCovariance(usize),
     /// A common unknown has more or fewer standard deviations than unknowns.
     #[error("common unknown {0} has not as many standard deviations as unknowns")]
     CommonDeviations(usize),

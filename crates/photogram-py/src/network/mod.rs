@@ -108,6 +108,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
+        | Failure::CameraCovariance(_)
         | Failure::NoPhoto(_)
         | Failure::NoPoint(_)
         | Failure::CameraIndex(_)
