@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from photogram import Block, simulate
 from photogram.cli import app
+from shared_data import SHARED
 
-SHARED = Path(__file__).parents[2] / "shared" / "data"
 STRASBOURG = SHARED / "strasbourg"
 
 

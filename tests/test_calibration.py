@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from conftest import SHARED
 from example_scripts import load
 from photogram import Block, Camera, adjust
 from photogram.results.calibration import calibrations
 from photogram.results.distortion import distortion_curve
 from photogram.results.lens_field import lens_field
+from shared_data import SHARED
 
 FREE = np.inf
 NAMES = ("c", "xp", "yp", "K1", "K2", "K3", "P1", "P2")

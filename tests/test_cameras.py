@@ -9,6 +9,7 @@ import pytest
 
 from example_scripts import load
 from photogram import Block, Camera, InputError, RankError, adjust, predict
+from photogram.adjustment.undetermined import in_words
 from photogram.checks.rays import Rays
 from photogram.giant import Project
 from photogram.network.geometry import project
@@ -268,3 +269,62 @@ def test_what_is_not_determined_names_the_camera(small_block):
         adjust(single)
     assert caught.value.cameras == ["unused"]
     assert "unused" in str(caught.value)
+
+
+def vertical(names, turned=False):
+    """Return three vertical photos of a plane with control, some parameters of their camera free."""
+    plane = np.array([[x, y, 0.0] for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0, 2.0)])
+    stations = np.array([[0.5, 1.0, 10.0], [1.0, 1.2, 10.0], [1.5, 0.8, 10.0]])
+    photos, seen = (each.ravel() for each in np.indices((3, 9)))
+    attitudes = np.zeros((3, 3))
+    attitudes[:, 2] = np.radians([0.0, 90.0, 180.0]) if turned else 0.0
+    xy = project(plane[seen], stations[photos], attitudes[photos], np.full(27, -100.0))
+    return Block(
+        photo_ids=["a", "b", "c"],
+        photo_positions=stations,
+        photo_attitudes=attitudes,
+        cameras=[Camera("brown", {"c": -100.0}, sd=dict.fromkeys(names, FREE), name="lens")],
+        point_ids=[f"P{k}" for k in range(9)],
+        point_positions=plane,
+        point_sd=0.0,
+        image_photos=photos,
+        image_points=seen,
+        image_xy=xy,
+        image_sd=0.001,
+    )
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["c"], "c of lens with flying heights (positions along the view): principal distance and flying"),
+        (["xp"], "xp of lens with positions across the view: principal point and position or tilt of all"),
+    ],
+)
+def test_what_vertical_photos_of_a_plane_leave_open_is_said_in_words(names, said):
+    with pytest.raises(RankError) as caught:
+        adjust(vertical(names))
+    assert said in str(caught.value)
+    assert "moving all 3 photos together with the parameters of lens" in str(caught.value)
+    assert (caught.value.photos, caught.value.cameras) == (["a", "b", "c"], ["lens"])
+
+
+def test_photos_turned_about_their_axes_tell_the_principal_point():
+    assert adjust(vertical(["xp", "yp"], turned=True)).converged
+
+
+@pytest.mark.parametrize(
+    ("names", "poses", "said"),
+    [
+        ({"K1", "K2"}, set(), "harmless"),
+        ({"f"}, {"along", "across"}, "scale of the network"),
+        ({"P1", "xp"}, set(), "decentring"),
+        ({"K1", "c"}, {"along"}, "balanced"),
+        ({"b1", "c"}, {"along"}, "affinity and scale"),
+        ({"b2"}, {"swing"}, "shear and kappa"),
+        ({"e7"}, {"tilt"}, ""),
+    ],
+)
+def test_combinations_that_have_a_name(names, poses, said):
+    assert said in in_words(names, poses)
+    assert bool(said) == bool(in_words(names, poses))

@@ -20,7 +20,11 @@ FoundRow = tuple[
 IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
-FailureRow = tuple[str, str, list[list[int]], list[int], list[list[int]], list[list[int]]]
+CombinationRow = tuple[list[int], list[int], list[int], list[tuple[int, int]], list[str]]
+"""Photos; cameras that several of them share; common unknowns; cameras with parameters that take a notable part; parts of
+poses that do: positions `along` and `across` the directions of view, `tilt`, `swing` about these."""
+
+FailureRow = tuple[str, str, list[CombinationRow], list[int]]
 """Why a network cannot be adjusted, as in :class:`BlockError`."""
 
 CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
@@ -99,7 +103,7 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     NaN for arguments that cannot be.
     """
 
-def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str]]]:
+def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str, str]]]:
     """Return the models of cameras, `CAMERAS`, by their names.
 
     Returns
@@ -155,6 +159,39 @@ def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
     ------
     ValueError
         A model that there is not or that is forward, other shapes or numbers of parameters.
+    """
+
+def camera_partials(model: str, parameters: _Floats, u: _Floats) -> tuple[_Floats, _Floats, _Floats]:
+    """Images of directions with their partials; arguments as in :func:`camera_images`.
+
+    Returns
+    -------
+    (n, 2) images, (n, 2, 3) their partials by u, (n, 2, k) by the parameters, 0 for those that are constants of
+    a lens; not finite where there are none. Those of a backward camera are the ones of the measured position
+    that corresponds to u.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, other shapes or numbers of parameters.
+    """
+
+def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None:
+    """Return the radius up to which the radial part of a lens is one-to-one, and what it becomes.
+
+    Of a forward camera the radius is the tangent of the angle from the axis, of a fisheye the angle (rad), and
+    becomes what the focal length multiplies; `brown_forward` has lengths in the image. Of a backward camera it
+    is that of the measured position from the principal point, which becomes that of the corrected one.
+    Infinite where only the image ends.
+
+    Returns
+    -------
+    None where the lens is one-to-one everywhere.
+
+    Raises
+    ------
+    ValueError
+        A model that there is not, or another number of parameters.
     """
 
 def attitudes_from_numbers(
@@ -397,10 +434,10 @@ def refraction_shift(
 class BlockError(Exception):
     """A block that cannot be adjusted.
 
-    `args` is (kind, message, photos, points, cameras, unknowns): kind is `undetermined points`, `undetermined
-    photos`, `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or
-    `input`; photos, cameras and common unknowns are lists of indices for each undetermined combination of
-    unknowns, points a list of point indices.
+    `args` is (kind, message, combinations, points): kind is `undetermined points`, `undetermined photos`,
+    `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or `input`;
+    combinations are what undetermined combinations of unknowns move (of `coarse`, the photos concerned, in
+    one), points a list of point indices.
     """
 
 def find_first_values(
@@ -1450,7 +1487,7 @@ class StellarProblem:
         """Right ascension and declination (m, 2) of every image at the initial values."""
 
 class CollectionError(Exception):
-    """A collection cannot be adjusted: (kind, message, photos of each combination, points).
+    """A collection cannot be adjusted: (kind, message, combinations, points).
 
     The kinds are those of :class:`BlockError`, without `no intersection`.
     """
@@ -1470,22 +1507,13 @@ UNKNOWNS: list[tuple[str, list[tuple[str, str]]]]
 CAMERAS: list[str]
 """What the models of cameras are called."""
 
-def camera_model(camera: str) -> tuple[str, list[tuple[str, bool]]]:
-    """Return the formula of a model of cameras, and its parameters: name, whether a length in the image.
-
-    Raises
-    ------
-    ValueError
-        No model has this name.
-    """
-
 def collection_images(camera: str, photo_parameters: _Floats, points: _Floats) -> _Floats:
     """Image coordinates of points, row by row: point i on the photo of row i.
 
     Parameters
     ----------
     camera
-        The model, one of `CAMERAS`; `docs/collection.md` has their formulas.
+        The model, one of `CAMERAS`; `docs/cameras.md` has their formulas.
     photo_parameters
         (n, 6 + k) angle-axis vector w (rad) and t, so that P = R(w) X + t in the photo's axes (x right, y up,
         looking along -z), then the k parameters of the camera.

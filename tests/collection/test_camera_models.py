@@ -77,15 +77,18 @@ def test_report_and_document_name_the_parameters_of_the_camera():
 
 
 def test_every_model_of_the_crate_can_be_named():
-    for name in _photocore.CAMERAS:
-        formula, parameters = _photocore.camera_model(name)
+    models = dict(_photocore.camera_models())
+    assert list(models) == _photocore.CAMERAS
+    for name, (formula, parameters, constants, *_) in models.items():
         assert "image = " in formula
         # In front of the camera; lengths in the image are one, terms of lenses nothing.
         pose = [1.0, 1.0, 1.0, 1.0, 1.0, -5.0]
-        values = np.array([pose + [float(in_image) for _, in_image in parameters]])
+        values = np.array([pose + [float(power == 1) for _, power in parameters]])
         collection = Collection(values, np.ones((1, 3)), [0], [0], np.ones((1, 2)), camera=name)
         assert len(collection.units) == len(collection.parameters) == values.shape[1]
         assert np.isfinite(collection.computed_xy()).all()
+        held = np.arange(values.shape[1]) >= values.shape[1] - constants
+        np.testing.assert_array_equal(collection.photo_sd[0] == 0.0, held)
 
 
 def test_models_that_cannot_be_are_refused_by_name():
@@ -94,4 +97,52 @@ def test_models_that_cannot_be_are_refused_by_name():
     with pytest.raises(InputError, match=r"photo_parameters has the shape \(8, 9\), not \(8, 11\)"):
         MADE.collection.replace(camera="radial")
     with pytest.raises(ValueError, match="camera cannot be"):
-        _photocore.camera_model("x")
+        _photocore.radial_domain("x", np.zeros(1))
+    with pytest.raises(InputError, match="the camera brown has 11 parameters, not 3"):
+        _photocore.camera_partials("brown", np.ones(3), np.ones((1, 3)))
+
+
+def random_cameras(rng):
+    """Yield every model with parameters that could be, and directions in front of it."""
+    for name, (_, parameters, *_) in _photocore.camera_models():
+        values = []
+        for parameter, power in parameters:
+            if parameter in ("alpha", "beta", "omega"):
+                values.append(rng.uniform(0.6, 0.9))
+            elif parameter in ("c", "f", "fx", "fy", "w", "h", "b"):
+                values.append(rng.uniform(900.0, 1400.0))
+            elif power == 1:
+                values.append(rng.uniform(-5.0, 5.0))
+            else:
+                values.append(rng.uniform(-0.01, 0.01) * 1500.0**power)
+        depth = rng.uniform(2.0, 9.0, (50, 1))
+        u = depth * np.hstack([rng.uniform(-0.4, 0.4, (50, 2)), -np.ones((50, 1))])
+        yield name, np.array(values), u
+
+
+def test_images_rays_and_partials_of_every_model_belong_together():
+    for name, values, u in random_cameras(np.random.default_rng(11)):
+        xy, by_u, by_parameters = _photocore.camera_partials(name, values, u)
+        assert by_u.shape == (50, 2, 3)
+        assert by_parameters.shape == (50, 2, len(values))
+        np.testing.assert_array_equal(xy, _photocore.camera_images(name, values, u))
+        assert np.abs(np.einsum("nij,nj->ni", by_u, u)).max() < 1e-9
+        rays = _photocore.camera_rays(name, values, xy)
+        np.testing.assert_allclose(rays, u / np.linalg.norm(u, axis=1, keepdims=True), atol=1e-12)
+        moved = u + 1e-6 * np.array([1.0, -2.0, 0.5])
+        np.testing.assert_allclose(
+            _photocore.camera_images(name, values, moved),
+            xy + np.einsum("nij,nj->ni", by_u, moved - u),
+            atol=1e-6,
+        )
+
+
+def test_where_a_lens_ends_there_is_no_ray():
+    values = np.array([1000.0, 600.0, 400.0, -0.3])
+    radius, distorted = _photocore.radial_domain("simple_radial", values)
+    np.testing.assert_allclose([radius, distorted], [np.sqrt(1 / 0.9), 2 / 3 * np.sqrt(1 / 0.9)], rtol=1e-14)
+    edges = 600.0 + 1000.0 * distorted * np.array([0.99, 1.01])
+    rays = _photocore.camera_rays("simple_radial", values, np.column_stack([edges, [400.0, 400.0]]))
+    assert np.isfinite(rays[0]).all()
+    assert np.isnan(rays[1]).all()
+    assert _photocore.radial_domain("pinhole", np.ones(4)) is None

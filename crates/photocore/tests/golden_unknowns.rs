@@ -1,4 +1,4 @@
-//! An aerial block with GNSS and IMU against golden figures of an independent program, read where they are at hand.
+//! An aerial block with GNSS and IMU, and a rig, against golden figures of an independent program, read where they are at hand.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
@@ -9,11 +9,13 @@ use std::ops::ControlFlow;
 
 use nalgebra::{DMatrix, Matrix6};
 use photocore::adjustment::{self, Method, Status, Stop};
-use photocore::geometry::{AttitudeNumbers, Matrix3, ObjectSpace, Perspective, PoseNumbers, RotationSense};
+use photocore::geometry::{
+    self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, PoseNumbers, RotationSense,
+};
 use photocore::network::observations::{Attitude, Control, Position, Quantity};
 use photocore::network::{
-    AdjustedObservation, AdjustedPhoto, Camera, Common, CommonKind, Image, Network, Observation, Options,
-    Photo, Point, Precision, Solution,
+    AdjustedObservation, AdjustedPhoto, Camera, Common, CommonKind, Image, Mount, Network, Observation,
+    Options, Photo, Point, Precision, Solution,
 };
 use serde_json::Value;
 
@@ -288,4 +290,62 @@ fn an_aerial_block_with_lever_arm_shifts_drifts_and_boresight() {
         residuals.iter().zip(&lever_arm.redundancy).map(|(v, r)| v / (lever_arm_sd * r.sqrt())).collect();
     let own = (&residuals[..], &lever_arm.redundancy[..], &standardized[..]);
     assert_kind(&file, "lever arm prior", std::iter::once(own));
+}
+
+#[test]
+fn a_rig_with_an_unknown_sensor() {
+    let Some(data) = golden("rig.json") else { return };
+    let camera = |name: &str| {
+        let parameters = list(&data["cameras"][name]);
+        Camera::held(geometry::Camera::named("opencv", &parameters).unwrap())
+    };
+    let mut file = File::new(&data, "frame", vec![camera("sensor1"), camera("sensor2")]);
+    file.add_common("sensor2 in frame", CommonKind::Sensor, FREE);
+    let frames = file.network.photos.len();
+    for frame in 0..frames {
+        let photo = Photo { camera: 1, ..file.network.photos[frame] };
+        file.network.photos.push(photo);
+        file.network.mounts.push(Mount { photo: frames + frame, frame, sensor: 0 });
+    }
+    file.add_images("image sensor 1", |index, names| index[names[0]]);
+    let first = file.network.images.len();
+    file.add_images("image sensor 2", |index, names| frames + index[names[0]]);
+    file.network.observations = file.control();
+    let solution = adjusted(&file.network);
+    assert_solution(&file, &solution);
+    assert_kind(&file, "image sensor 1", of_images(&solution, 0..first));
+    assert_kind(&file, "image sensor 2", of_images(&solution, first..solution.images.len()));
+    assert_kind(&file, "control", of_kind(&file.network, &solution, "control"));
+
+    let derived = &data["derived_pose_sensor2_frame3"];
+    let own = &solution.photos[frames + file.index["frame3"]];
+    let [x, y, z, angles @ ..] = own.pose;
+    for (found, expected) in [x, y, z].into_iter().zip(list(&derived["position"])) {
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+    }
+    assert_attitude(&NUMBERS.attitude(angles), &derived["matrix_photo_to_object"], "derived");
+    assert_cofactors(by_step(own).as_slice(), &derived["cofactors"], "derived");
+
+    // A frame without a photo of its own: that of the first is taken away, and its images with it.
+    let mut network = file.network.clone();
+    network.images.retain(|image| image.photo != 0);
+    let without = adjusted(&network);
+    assert_eq!([0, frames].map(|photo| without.photos[photo].images > 0), [false, true]);
+    assert!(without.photos[0].cofactors.iter().all(|value| value.is_finite()));
+
+    // A sensor that is known where it was found changes nothing in that.
+    let mut network = file.network.clone();
+    let found = &solution.commons[0];
+    network.commons[0] = Common {
+        kind: CommonKind::Sensor,
+        position: found.position,
+        attitude: found.attitude,
+        sd: vec![0.0; 6],
+    };
+    let known = adjusted(&network);
+    assert_eq!(known.degrees_of_freedom, solution.degrees_of_freedom + 6);
+    for (a, b) in known.photos.iter().zip(&solution.photos) {
+        (0..6).for_each(|k| assert!((a.pose[k] - b.pose[k]).abs() < 1e-8));
+        (0..6).for_each(|k| assert!(a.cofactors[7 * k] < b.cofactors[7 * k] * (1.0 + 1e-9)));
+    }
 }

@@ -8,10 +8,10 @@ use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
 use num_complex::Complex64 as C;
 use photocore::adjustment::{self, Method, Status, Stop};
-use photocore::geometry::{self, Bal, ObjectSpace, Perspective, PoseNumbers};
+use photocore::geometry::{self, Bal, ObjectSpace, Perspective, PoseNumbers, RotationSense};
 use photocore::network::observations::Distance;
 use photocore::network::{
-    Camera, Combination, Image, Network, NetworkError, Of, Options, Photo, Point, Solution,
+    Camera, Combination, Image, Network, NetworkError, Of, Options, Photo, Point, PosePart, Solution,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -361,6 +361,7 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
             Of::Photo(photo) | Of::PhotoStep(photo) => 6 * photo..6 * photo + 6,
             Of::Point(point) => dense.point(point),
             Of::Camera(camera) => dense.camera(camera),
+            Of::Common(common) => panic!("common unknown {common}"),
         };
         of.iter().flat_map(own).collect()
     };
@@ -480,4 +481,57 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
     let solution = adjust(&network, TIGHT).unwrap();
     assert!((solution.cameras[1].cofactors[0].sqrt() - 0.1).abs() < 1e-9);
     assert!(solution.cameras[1].redundancy[0].abs() < 1e-8);
+}
+
+#[test]
+fn constants_of_a_camera_are_never_unknown() {
+    for sd in [FREE, 0.1] {
+        let mut network = network();
+        network.cameras[5].sd[10] = sd;
+        let error = NetworkError::CameraConstant { camera: 5, parameter: "r0" };
+        assert_eq!(adjust(&network, TIGHT).unwrap_err(), error);
+    }
+}
+
+/// The same with poses in angles: what takes part is named.
+#[test]
+fn what_is_not_determined_is_named_by_parameters_and_parts_of_poses() {
+    let sense = RotationSense::GroundToPhoto;
+    let places: Vec<[f64; 3]> = (0..9).map(|k| [(k % 3) as f64, (k / 3) as f64, 0.0]).collect();
+    let lens = geometry::Camera::named("radial", &[1000.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
+    let network = |free: &[usize]| {
+        let sd = (0..5).map(|k| if free.contains(&k) { FREE } else { 0.0 }).collect();
+        let mut network = Network {
+            space: ObjectSpace::Rectangular,
+            poses: PoseNumbers::Angles(sense),
+            refraction: None,
+            cameras: vec![Camera { camera: lens, sd }],
+            photos: vec![],
+            points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
+            images: vec![],
+            observations: vec![],
+            commons: vec![],
+            mounts: vec![],
+        };
+        for (photo, [x, y]) in [[0.5, 1.0], [1.0, 1.2], [1.5, 0.8]].into_iter().enumerate() {
+            let pose = [x, y, 10.0, 0.0, 0.0, 0.0];
+            network.photos.push(Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 });
+            for (point, place) in places.iter().enumerate() {
+                let xy = lens.image(&[place[0] - x, place[1] - y, -10.0].into());
+                network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
+            }
+        }
+        network
+    };
+    let combinations = |free: &[usize]| match adjust(&network(free), TIGHT) {
+        Err(NetworkError::Undetermined(found)) => found,
+        other => panic!("{:?}", other.map(|solution| solution.degrees_of_freedom)),
+    };
+    let [found] = &combinations(&[0])[..] else { panic!("one combination") };
+    assert_eq!((&found.parameters[..], &found.poses[..]), (&[(0, 0)][..], &[PosePart::Along][..]));
+    // The principal point and the positions across, x and y.
+    let found = combinations(&[1, 2]);
+    let parameters: Vec<_> = found.iter().flat_map(|one| one.parameters.clone()).collect();
+    assert_eq!(parameters, [(0, 1), (0, 2)]);
+    assert!(found.iter().all(|one| one.poses == [PosePart::Across]), "{found:?}");
 }

@@ -1,7 +1,7 @@
 //! Cameras by the names of their models; their documentation is in `_photocore.pyi`.
 
-use numpy::{PyArray2, PyReadonlyArrayDyn};
-use photocore::geometry::camera::{LensDirection, ModelFacts};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
+use photocore::geometry::camera::{LensDirection, ModelFacts, RadialLimit};
 use photocore::geometry::{Camera, Unit};
 use pyo3::prelude::*;
 
@@ -13,12 +13,14 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(camera_models, module)?)?;
     module.add_function(wrap_pyfunction!(camera_images, module)?)?;
     module.add_function(wrap_pyfunction!(camera_rays, module)?)?;
-    module.add_function(wrap_pyfunction!(camera_correct, module)?)
+    module.add_function(wrap_pyfunction!(camera_correct, module)?)?;
+    module.add_function(wrap_pyfunction!(camera_partials, module)?)?;
+    module.add_function(wrap_pyfunction!(radial_domain, module)?)
 }
 
 /// Formula, parameters with the power of the unit of the image that they are measured in, how many of them, the last ones, are
-/// constants, and the direction of the lens.
-type Facts = (&'static str, Vec<(&'static str, i32)>, usize, &'static str);
+/// constants, the direction of the lens, and that of the second image coordinate.
+type Facts = (&'static str, Vec<(&'static str, i32)>, usize, &'static str, &'static str);
 
 #[pyfunction]
 fn camera_models() -> Vec<(&'static str, Facts)> {
@@ -28,13 +30,13 @@ fn camera_models() -> Vec<(&'static str, Facts)> {
         Unit::One => 0,
     };
     let facts = |&name: &&'static str| {
-        let ModelFacts { formula, parameters, constants, lens } = Camera::model(name)?;
+        let ModelFacts { formula, parameters, constants, lens, down } = Camera::model(name)?;
         let direction = match lens {
             LensDirection::Forward => "forward",
             LensDirection::Backward => "backward",
         };
         let parameters = parameters.iter().map(|&(name, unit)| (name, power(unit))).collect();
-        Some((name, (formula, parameters, constants, direction)))
+        Some((name, (formula, parameters, constants, direction, if down { "down" } else { "up" })))
     };
     Camera::NAMES.iter().filter_map(facts).collect()
 }
@@ -86,4 +88,33 @@ fn camera_correct<'py>(
         camera.correction(xy).ok_or_else(refused)
     };
     table(py, rows("xy", &xy)?.into_iter().map(corrected).collect::<PyResult<_>>()?)
+}
+
+/// Images, their partials with respect to u and to the parameters.
+type Partials<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>);
+
+#[pyfunction]
+fn camera_partials<'py>(
+    py: Python<'py>,
+    model: &str,
+    parameters: PyReadonlyArrayDyn<'py, f64>,
+    u: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Partials<'py>> {
+    let values = numbers("parameters", &parameters)?;
+    let camera = named(model, &values)?;
+    let images: Vec<_> = rows("u", &u)?.into_iter().map(|u: [f64; 3]| camera.linearize(&u.into())).collect();
+    let by_u = images.iter().flat_map(|image| image.by_u).flat_map(|row| <[f64; 3]>::from(row)).collect();
+    let by_parameters = images.iter().flat_map(|image| image.by_parameters.concat()).collect();
+    let count = images.len();
+    Ok((
+        table(py, images.iter().map(|image| image.xy).collect())?,
+        PyArray1::from_vec(py, by_u).reshape([count, 2, 3])?,
+        PyArray1::from_vec(py, by_parameters).reshape([count, 2, values.len()])?,
+    ))
+}
+
+#[pyfunction]
+fn radial_domain(model: &str, parameters: PyReadonlyArrayDyn<'_, f64>) -> PyResult<Option<(f64, f64)>> {
+    let camera = named(model, &numbers("parameters", &parameters)?)?;
+    Ok(camera.radial_limit().map(|RadialLimit { radius, distorted }| (radius, distorted)))
 }

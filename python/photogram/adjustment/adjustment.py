@@ -14,6 +14,7 @@ from photogram import _photocore
 from photogram.adjustment.ends import behind, datum, rounded, too_coarse, undetermined
 from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
+from photogram.adjustment.undetermined import undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory, threads_that_fit, turned
@@ -316,10 +317,8 @@ def _named(
     block: Block,
     kind: str,
     message: str,
-    photos: list[list[int]],
+    combinations: list[_photocore.CombinationRow],
     points: list[int],
-    cameras: list[list[int]],
-    unknowns: list[list[int]],
 ) -> AdjustmentError:
     """Put names to the indices of a failure of the core."""
     point_names = [block.point_ids[i] for i in points]
@@ -329,61 +328,11 @@ def _named(
         text = f"the rays on photos {listed(photo_names)} do not determine the points {listed(point_names)}"
         return RankError(text, photo_names, point_names)
     if kind == "undetermined photos":
-        return _undetermined_photos(block, photos, cameras, unknowns)
+        return undetermined_combinations(block, combinations)
     if kind == "no intersection":
         return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
     if kind == "coarse":
-        return too_coarse([block.photo_ids[i] for i in photos[0]], point_names)
+        return too_coarse([block.photo_ids[i] for i in combinations[0][0]], point_names)
     if kind == "memory":
         return OutOfMemoryError(message)
     return AdjustmentError(message)
-
-
-def _undetermined_photos(
-    block: Block, photos: list[list[int]], cameras: list[list[int]], unknowns: list[list[int]]
-) -> RankError:
-    combinations = [
-        (tuple(of), tuple(by), tuple(others))
-        for of, by, others in zip(photos, cameras, unknowns, strict=True)
-    ]
-    concerned = sorted({photo for of, *_ in combinations for photo in of})
-    names = [block.photo_ids[photo] for photo in concerned]
-    camera_names = [
-        block.camera_names[row] for row in sorted({row for _, by, _ in combinations for row in by})
-    ]
-    points = np.unique(block.image_points[np.isin(block.image_photos, concerned)])
-    point_names = [block.point_ids[point] for point in points]
-    lines = [f"the observations leave {len(combinations)} combinations of unknowns undetermined:"]
-    lines += [
-        f"  {combinations.count(each)} moving {_moved(block, *each)}" for each in sorted(set(combinations))
-    ]
-    if not np.isfinite(block.point_sd).any():
-        weighted = np.isfinite(block.photo_position_sd).any()
-        remedy = (
-            "the standard deviations of the photos are too large to give a datum in double precision"
-            if weighted
-            else "standard deviations for the positions and attitudes of photos would give a datum"
-        )
-        lines.append(f"  there is no control; {remedy}")
-    return RankError("\n".join(lines), names, point_names, camera_names)
-
-
-def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: tuple[int, ...]) -> str:
-    """Say what a combination of unknowns moves."""
-    of_cameras = listed([block.camera_names[camera] for camera in cameras])
-    others = listed([block.unknowns[row].title for row in unknowns])
-    if not photos:
-        parts = [f"the parameters of {of_cameras}"] if cameras else []
-        return " and ".join([*parts, *([others] if unknowns else [])])
-    on = np.unique(block.image_points[np.isin(block.image_photos, photos)])
-    moved = (
-        f"all {len(photos)} photos together"
-        if len(photos) == len(block.photo_ids) > 1
-        else f"photos {listed([block.photo_ids[photo] for photo in photos])}"
-    )
-    if cameras:
-        moved += f" with the parameters of {of_cameras}"
-    if unknowns:
-        moved += f" with {others}"
-    held = f"hold the points {listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
-    return f"{moved}, which {held}"

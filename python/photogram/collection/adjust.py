@@ -158,18 +158,20 @@ def _numbers(which: NDArray[np.bool_]) -> str:
 
 
 def _named(
-    kind: str, message: str, photos: list[list[int]], points: list[int], *_others: list[list[int]]
+    kind: str, message: str, combinations: list[_photocore.CombinationRow], points: list[int]
 ) -> AdjustmentError:
     """Put a failure of the core into words; photos and points have no names but their numbers, from 0."""
     if kind == "undetermined points":
         names = [str(point) for point in points]
         return RankError(f"their rays do not determine {len(names)} points: {listed(names)}", [], names)
     if kind == "undetermined photos":
-        names = [str(photo) for photo in sorted({photo for each in photos for photo in each})]
-        text = f"the observations leave {len(photos)} combinations of unknowns undetermined, moving photos"
+        names = [str(photo) for photo in sorted({photo for each in combinations for photo in each[0]})]
+        text = (
+            f"the observations leave {len(combinations)} combinations of unknowns undetermined, moving photos"
+        )
         return RankError(f"{text} {listed(names)}", names, [])
     if kind == "coarse":
-        return too_coarse([str(photo) for photo in photos[0]], [str(point) for point in points])
+        return too_coarse([str(photo) for photo in combinations[0][0]], [str(point) for point in points])
     if kind == "memory":
         return OutOfMemoryError(message)
     return AdjustmentError(message)

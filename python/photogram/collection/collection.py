@@ -44,11 +44,11 @@ class Collection:
         (m, 2) standard deviations, pixels; one number stands for all.
     photo_sd, point_sd
         (P, k) and (n, 3) standard deviations of the given values as observations; infinite free, zero
-        fixed; one number stands for all.
+        fixed; one number stands for all but the constants of a camera, which are fixed.
     camera
         The model of the cameras. `bal` ("Bundle Adjustment in the Large"; Agarwal and others 2010) has f, k1,
         k2 and maps P to f (1 + k1 p^2 + k2 p^4) p with p = -(P1, P2) / P3: pixels from the principal point, x
-        to the right, y up. `docs/collection.md` lists the others.
+        to the right, y up. `docs/cameras.md` has the others.
     """
 
     photo_parameters: Floats
@@ -75,6 +75,8 @@ class Collection:
             "photo_sd": (photos, len(self.parameters)),
             "point_sd": (points, 3),
         }
+        if np.ndim(self.photo_sd) == 0:
+            object.__setattr__(self, "photo_sd", np.where(self._constant, 0.0, self.photo_sd))
         for name, shape in shapes.items():
             object.__setattr__(self, name, shaped(name, getattr(self, name), shape))
         for name in ("photo_parameters", "point_positions", "image_xy"):
@@ -86,20 +88,29 @@ class Collection:
             object.__setattr__(self, name, indices(name, getattr(self, name), images, count))
 
     @property
+    def _model(self) -> tuple[str, list[tuple[str, int]], int, str, str]:
+        return dict(_photocore.camera_models())[self.camera]
+
+    @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the k parameters of a photo."""
-        return (*POSE, *(name for name, _ in _photocore.camera_model(self.camera)[1]))
+        return (*POSE, *(name for name, _ in self._model[1]))
+
+    @property
+    def _constant(self) -> NDArray[np.bool_]:
+        """(k,) which parameters of a photo are never unknown."""
+        return np.arange(len(self.parameters)) >= len(self.parameters) - self._model[2]
 
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the k parameters: `rad`, `px`; none for numbers and for lengths in the object space."""
-        _, parameters = _photocore.camera_model(self.camera)
-        return ("rad",) * 3 + ("",) * 3 + tuple("px" if in_image else "" for _, in_image in parameters)
+        powers = (power for _, power in self._model[1])
+        return ("rad",) * 3 + ("",) * 3 + tuple("px" if power == 1 else "" for power in powers)
 
     @property
     def formula(self) -> str:
         """The image of P, a point in the axes of the photo."""
-        return _photocore.camera_model(self.camera)[0]
+        return self._model[0]
 
     def replace(self, **changes: Any) -> Self:
         """Return the collection with other arrays in place of the named ones."""

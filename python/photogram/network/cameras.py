@@ -30,7 +30,7 @@ are given, cx and cy are counted from the middle of the picture, and may be miss
 
 
 @cache
-def _models() -> dict[str, tuple[str, list[tuple[str, int]], int, str]]:
+def _models() -> dict[str, tuple[str, list[tuple[str, int]], int, str, str]]:
     return dict(_photocore.camera_models())
 
 
@@ -98,7 +98,7 @@ class Camera:
         return self._facts[3]
 
     @property
-    def _facts(self) -> tuple[str, list[tuple[str, int]], int, str]:
+    def _facts(self) -> tuple[str, list[tuple[str, int]], int, str, str]:
         return _models()[self.model]
 
     @property

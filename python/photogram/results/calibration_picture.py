@@ -88,8 +88,8 @@ def figure_of_distortion(camera: AdjustedCamera, curve: DistortionCurve) -> Figu
     """Return the curve and its balanced form, one standard deviation on either side, dashed beyond images."""
     unit = str(camera.camera.unit)
     factor, written = (1000.0, "um") if unit == "mm" else (1.0, "px")
-    figure = new_figure(7.0, 6.0)
-    upper, lower = figure.subplots(2, 1, sharex=True)
+    figure = new_figure(7.0, 8.0)
+    upper, lower, bands = figure.subplots(3, 1, sharex=True)
     _draw(upper, curve, factor, curve.values, {"mapping": curve.sd_mapping, "curve": curve.sd})
     _draw(lower, curve, factor, curve.balanced, {"balanced curve": curve.sd_balanced})
     upper.set_title(
@@ -101,8 +101,18 @@ def figure_of_distortion(camera: AdjustedCamera, curve: DistortionCurve) -> Figu
         loc="left",
         fontsize="medium",
     )
-    lower.set_xlabel(f"radius, {unit}")
-    for axes in (upper, lower):
+    # Bands are thin on curves of hundreds of micrometres: once more by themselves.
+    for name, sd in (
+        ("mapping", curve.sd_mapping),
+        ("curve", curve.sd),
+        ("balanced curve", curve.sd_balanced),
+    ):
+        seen = curve.radii <= curve.observed
+        [line] = bands.plot(curve.radii[seen], factor * sd[seen], label=f"sd of the {name}")
+        bands.plot(curve.radii[~seen], factor * sd[~seen], color=line.get_color(), linestyle="--")
+    bands.set_ylim(bottom=0.0)
+    bands.set_xlabel(f"radius, {unit}")
+    for axes in (upper, lower, bands):
         axes.set_ylabel(written)
         axes.legend(frameon=False)
         open_frame(axes)

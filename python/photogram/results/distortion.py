@@ -170,7 +170,8 @@ def _along(camera: Camera, radii: Floats) -> Floats:
     across = np.sin(argument) if _is_fisheye(camera) else argument
     back = -np.cos(argument) if _is_fisheye(camera) else zero - 1.0
     middle = camera.project([[0.0, 0.0, -1.0]])[0, 0]
-    return np.asarray(camera.project(np.column_stack([across, zero, back]))[:, 0] - middle - radii)
+    images = camera.project(np.column_stack([across, zero, back]))[:, 0]
+    return np.asarray(np.abs(images - middle) - radii)
 
 
 def _ideal(camera: Camera, rays: Floats) -> Floats:

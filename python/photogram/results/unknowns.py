@@ -79,7 +79,7 @@ class AdjustedUnknown:
     @property
     def sd(self) -> Floats:
         """(k,) standard deviations; 0 where held."""
-        return standard_deviations(self.covariance)
+        return np.asarray(standard_deviations(self.covariance[np.newaxis])[0])
 
     @property
     def values(self) -> Floats:

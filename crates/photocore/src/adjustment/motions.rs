@@ -47,7 +47,7 @@ const AT_ONCE: usize = 256;
 const LANES: usize = 8;
 
 /// Sums over rows a, for candidates k and m. The second and third take the unknowns apart that the first lets act together.
-struct Sums {
+pub(super) struct Sums {
     /// (a . g_k) (a . g_m), and the same of every unknown that is weighted or fixed.
     together: Vec<f64>,
     /// The sum of (a_i g_ik)^2 over the unknowns i.
@@ -63,6 +63,16 @@ impl Sums {
         Self { together: vec![0.0; (parts * LANES).pow(2)], apart: none.clone(), along: none }
     }
 
+    /// The greatest share of what one of so many candidates changes that remains when the unknowns act together.
+    pub fn share(&self, count: usize) -> f64 {
+        let stride = self.apart.len() * LANES;
+        let share = |k: usize| {
+            let apart = self.apart.as_flattened()[k];
+            if apart > 0.0 { (self.together[k * stride + k] / apart).sqrt() } else { 0.0 }
+        };
+        (0..count).map(share).fold(0.0, f64::max)
+    }
+
     fn add(&mut self, other: &Self) {
         self.together.iter_mut().zip(&other.together).for_each(|(sum, value)| *sum += value);
         let (own, other) = (self.apart.as_flattened_mut(), other.apart.as_flattened());
@@ -71,20 +81,39 @@ impl Sums {
 }
 
 /// The candidates, unknown by unknown, and which of the unknowns are fixed.
-struct Candidates<'a> {
+pub(super) struct Candidates<'a> {
     parts: usize,
     by_unknown: &'a [[f64; LANES]],
     fixed: &'a [bool],
 }
 
-impl Candidates<'_> {
+impl<'a> Candidates<'a> {
+    pub fn new(motions: &Motions, by_unknown: &'a [[f64; LANES]], fixed: &'a [bool]) -> Self {
+        Self { parts: motions.vectors.len().div_ceil(LANES), by_unknown, fixed }
+    }
+
+    /// How motions move each of so many unknowns.
+    pub fn by_unknown(motions: &Motions, unknowns: usize) -> Vec<[f64; LANES]> {
+        let parts = motions.vectors.len().div_ceil(LANES);
+        let moved = |at: usize| {
+            let (unknown, first) = (at / parts, at % parts * LANES);
+            std::array::from_fn(|k| motions.vectors.get(first + k).map_or(0.0, |vector| vector[unknown]))
+        };
+        (0..unknowns * parts).map(moved).collect()
+    }
+
+    /// No sums yet.
+    pub fn sums(&self) -> Sums {
+        Sums::zero(self.parts)
+    }
+
     /// How they move an unknown.
     fn of(&self, unknown: usize) -> &[[f64; LANES]] {
         &self.by_unknown[unknown * self.parts..][..self.parts]
     }
 
     /// Adds one row of partials. A fixed unknown is an observation of the weight that this row gives it.
-    fn add_row(&self, sums: &mut Sums, row: impl Iterator<Item = (usize, f64)>) {
+    pub fn add_row(&self, sums: &mut Sums, row: impl Iterator<Item = (usize, f64)>) {
         sums.along.fill([0.0; LANES]);
         for (unknown, coefficient) in row {
             let moved = self.of(unknown);
@@ -103,7 +132,7 @@ impl Candidates<'_> {
     }
 
     /// Adds the rows of a local block.
-    fn add_local<E: Equations>(
+    pub fn add_local<E: Equations>(
         &self,
         sums: &mut Sums,
         buffers: &mut Buffers,
@@ -169,7 +198,7 @@ impl<M: Model> Problem<M> {
     }
 
     /// The unknowns to hold at given values; none where there is a datum.
-    pub(super) fn to_hold(&self, values: &[f64], pool: &ThreadPool) -> Vec<usize> {
+    pub(crate) fn to_hold(&self, values: &[f64], pool: &ThreadPool) -> Vec<usize> {
         let motions = pool.install(|| self.model.motions(values));
         let open = motions.and_then(|motions| self.open(values, &motions, pool));
         open.map_or(vec![], |open| open.hold)
@@ -177,17 +206,12 @@ impl<M: Model> Problem<M> {
 
     fn sums(&self, values: &[f64], motions: &Motions, pool: &ThreadPool) -> Sums {
         let layout = self.layout();
-        let parts = motions.vectors.len().div_ceil(LANES);
-        let moved = |at: usize| {
-            let (unknown, first) = (at / parts, at % parts * LANES);
-            std::array::from_fn(|k| motions.vectors.get(first + k).map_or(0.0, |vector| vector[unknown]))
-        };
-        let by_unknown: Vec<[f64; LANES]> = (0..values.len() * parts).map(moved).collect();
+        let by_unknown = Candidates::by_unknown(motions, values.len());
         let fixed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
-        let candidates = Candidates { parts, by_unknown: &by_unknown, fixed: &fixed };
+        let candidates = Candidates::new(motions, &by_unknown, &fixed);
         let equations = pool.install(|| Linearized::of_all(self, values));
         let chunk = |chunk: usize| {
-            let (mut sums, mut buffers) = (Sums::zero(parts), Buffers::default());
+            let (mut sums, mut buffers) = (candidates.sums(), Buffers::default());
             let end = ((chunk + 1) * AT_ONCE).min(layout.locals());
             for local in chunk * AT_ONCE..end {
                 candidates.add_local(&mut sums, &mut buffers, layout, &equations, local);
@@ -195,7 +219,7 @@ impl<M: Model> Problem<M> {
             sums
         };
         let chunks = (0..layout.locals().div_ceil(AT_ONCE)).into_par_iter();
-        let mut sums = Sums::zero(parts);
+        let mut sums = candidates.sums();
         pool.install(|| chunks.map(chunk).collect::<Vec<Sums>>()).iter().for_each(|part| sums.add(part));
         self.for_ties(|tie, rows| {
             equations.write_tie(tie, rows);

@@ -50,6 +50,11 @@ impl<'a, M: Model> NormalEquations<'a, M> {
         self.factor.deficiency().map_or(vec![], |found| found.unknowns(self.problem.layout()))
     }
 
+    /// The same with all unknowns, how each combination moves them, and their diagonal elements of the normal equations.
+    pub fn combinations(&self) -> Vec<Vec<(usize, f64, f64)>> {
+        self.factor.deficiency().map_or(vec![], |found| found.combinations(self.problem.layout()))
+    }
+
     /// The unknowns, none of them local, that no observation and no weight touches, ascending.
     pub fn without_effect(&self) -> Vec<usize> {
         self.factor.without_effect(self.problem.layout())

@@ -1,11 +1,12 @@
 //! Cameras whose parameters are unknown: those of one photo are unknowns of that, those of several are blocks of their own.
 
-use super::model::Bundle;
+use super::model::{Bundle, Station};
 use super::precision::median;
 use super::problem::Assembled;
-use super::{AdjustedPhoto, Network};
+use super::{AdjustedPhoto, Image, Network};
 use crate::adjustment::{Adjustment, Model};
-use crate::normals::GroupRows;
+use crate::geometry::camera::each_camera;
+use crate::geometry::{CameraModel, Vector3};
 
 /// An adjusted camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,38 +90,37 @@ impl Network {
             camera.information = given.sd.iter().map(weight).collect();
         }
         let stations = model.prepare(unknowns);
-        let (mut constant, mut local) = ([0.0; 2], [0.0; 6]);
-        let (mut kept, mut common) = (Vec::new(), Vec::new());
         for point in 0..model.points.len() {
             for index in model.start[point]..model.start[point + 1] {
                 let image = &model.images[index];
-                let camera = self.photos[image.photo].camera;
-                let given = &self.cameras[camera];
-                if given.is_held() {
+                let number = self.photos[image.photo].camera;
+                if self.cameras[number].is_held() {
                     continue;
                 }
-                let own = model.of_block(image.photo).len();
-                kept.resize(2 * own, 0.0);
-                common.resize(if own > 6 { 0 } else { 2 * given.sd.len() }, 0.0);
-                let (kept, common) = (kept.as_mut_slice(), common.as_mut_slice());
-                let mut rows = GroupRows {
-                    constant: &mut constant,
-                    local: &mut local,
-                    kept: &mut *kept,
-                    common: &mut *common,
-                };
-                model.observe(&stations, point, index, &mut rows);
+                let Station { orientation, camera } = &stations.photos[image.photo];
+                let u = orientation.sight(&stations.points[point]);
                 let weight = adjustment.weights.as_ref().map_or(1.0, |weights| weights[index]);
-                for row in 0..2 {
-                    let partials = if own > 6 {
-                        &kept[row * own + 6..(row + 1) * own]
-                    } else {
-                        &common[row * given.sd.len()..(row + 1) * given.sd.len()]
-                    };
-                    for (k, partial) in partials.iter().enumerate().filter(|&(k, _)| given.sd[k] > 0.0) {
-                        cameras[camera].information[k] += weight * (partial / image.sd[row]).powi(2);
-                    }
-                }
+                let (sd, sums) = (&self.cameras[number].sd, &mut cameras[number].information);
+                each_camera!(camera, camera => add_squares(camera, &u, image, weight, sd, sums));
+            }
+        }
+    }
+}
+
+/// Adds the squares of the partials of an image, straight as its ray is, by the parameters of its camera that are not held.
+fn add_squares<C: CameraModel>(
+    camera: &C,
+    u: &Vector3,
+    image: &Image,
+    weight: f64,
+    sd: &[f64],
+    sums: &mut [f64],
+) {
+    let (_, computed) = camera.compare(u, image.xy);
+    for (partials, image_sd) in computed.by_parameters.iter().zip(image.sd) {
+        for ((sum, partial), sd) in sums.iter_mut().zip(partials.as_ref()).zip(sd) {
+            if *sd > 0.0 {
+                *sum += weight * (partial / image_sd).powi(2);
             }
         }
     }

@@ -2,12 +2,14 @@
 
 use std::ops::ControlFlow;
 
+use nalgebra::Matrix6;
 use rayon::ThreadPool;
 
+use super::model::Owner;
 use super::problem::Assembled;
 use super::{InnerConstraints, Network, NetworkError, Options, Solution};
-use crate::adjustment::{Adjusted, CofactorError, Datum, Event, Factored, Phase};
-use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
+use crate::adjustment::{Adjusted, Classes, CofactorError, Datum, Event, Factored, Phase};
+use crate::geometry::{AttitudeNumbers, Matrix3, Orientation, PoseNumbers};
 use crate::normals::{Function, Ordering};
 
 /// Where an adjustment of a network has ended: all that is needed to come back to it.
@@ -37,6 +39,9 @@ pub enum NetworkDatum {
     RelativeToPoints(Vec<usize>),
 }
 
+/// Shares that are more than rounding.
+const NOTABLE: f64 = 1e-6;
+
 /// What has cofactors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Of {
@@ -48,6 +53,8 @@ pub enum Of {
     Point(usize),
     /// The parameters of a camera.
     Camera(usize),
+    /// Unknowns that observations, or photos on frames, have in common.
+    Common(usize),
 }
 
 /// An adjusted network whose normal equations are factored: cofactors of anything with anything.
@@ -140,6 +147,45 @@ impl Network {
         solution.state.datum = Some(datum.clone());
         solution.lost_digits = lost;
         Ok(solution)
+    }
+
+    /// What keeps an adjusted network from moving: for each kind of observation that does, the share of what a motion changes in its
+    /// observations that remains when all unknowns move together, the greatest of all shifts, rotations and the scale. What a datum may
+    /// be chosen for has none.
+    ///
+    /// # Errors
+    /// A state that is not of this network.
+    pub fn resistance(
+        &self,
+        options: &Options,
+        state: &State,
+        pool: &ThreadPool,
+    ) -> Result<Vec<(&'static str, f64)>, NetworkError> {
+        let assembled = self.assembled_again(options, state, pool)?;
+        let model = &assembled.problem.model;
+        let mut names =
+            vec!["image", "control", "position or attitude of a photo", "camera", "common unknown"];
+        let mut class_of = |kind: &'static str| {
+            names.iter().position(|&name| name == kind).unwrap_or_else(|| {
+                names.push(kind);
+                names.len() - 1
+            })
+        };
+        let mut of_ties = vec![0; model.tied_images()];
+        of_ties.extend(model.observations.iter().map(|tied| class_of(tied.observation.kind())));
+        let mut of_unknowns = vec![1; assembled.problem.layout().unknowns()];
+        for block in 0..model.stations() {
+            let class = match model.owner(block) {
+                Owner::Photo(_) => 2,
+                Owner::Camera(_) => 3,
+                Owner::Common(_) => 4,
+            };
+            of_unknowns[model.of_block(block)].fill(class);
+        }
+        let classes = Classes { count: names.len(), of_ties: &of_ties, of_unknowns: &of_unknowns };
+        let shares = assembled.problem.resistance(&state.unknowns, &classes, pool);
+        let notable = names.into_iter().zip(shares).filter(|(_, share)| *share > NOTABLE);
+        Ok(notable.collect())
     }
 
     /// The problem whose solution a state is.
@@ -295,10 +341,19 @@ impl Covariances {
                 if photo >= model.cameras.len() {
                     return Err(NetworkError::NoPhoto(photo));
                 }
+                let step = matches!(of, Of::PhotoStep(_));
+                if model.mount(photo).is_some() {
+                    return Ok(self.mounted(photo, step));
+                }
                 let first = model.of_block(photo).start;
-                let numbers = self.attitude(photo, matches!(of, Of::PhotoStep(_)));
+                let numbers = self.attitude(photo, step);
                 let turned = |k: usize| (0..3).map(|m| (first + 3 + m, numbers[(k, m)])).collect();
                 Ok(themselves(first..first + 3).chain((0..3).map(turned)).collect())
+            }
+            Of::Common(common) => {
+                let block = model.common_block.get(common).ok_or(NetworkError::NoCommon(common))?;
+                let known = || vec![vec![]; model.commons[common].kind.unknowns().len()];
+                Ok(block.map_or_else(known, |block| themselves(model.of_block(block)).collect()))
             }
             Of::Point(point) => {
                 let index = self.point.get(point).ok_or(NetworkError::NoPoint(point))?;
@@ -318,6 +373,27 @@ impl Covariances {
                 })
             }
         }
+    }
+
+    /// The pose of a photo that is mounted, by the unknowns of its frame and its sensor.
+    fn mounted(&self, photo: usize, step: bool) -> Vec<Function> {
+        let model = &self.assembled.problem.model;
+        let placed = model.placed(&self.factored.values()[model.of_stations()]);
+        let orientation = &placed.photos[photo].orientation;
+        let numbers = orientation.numbers(model.poses, model.space);
+        let by_step = Orientation::new(model.poses, model.space, &numbers).unknowns_by_step();
+        let reported = by_step.map_or_else(|| Matrix6::repeat(f64::NAN), |by| by * orientation.step_matrix());
+        let to = if step { Matrix6::identity() } else { reported };
+        let own = placed.mounted[photo].as_ref();
+        let parts: Vec<(usize, Matrix6<f64>)> = model
+            .blocks_of_pose(photo)
+            .zip(own.into_iter().flat_map(|own| [own.by_frame, own.by_sensor]))
+            .map(|(block, by)| (model.of_block(block).start, to * by))
+            .collect();
+        let row = |k: usize| -> Function {
+            parts.iter().flat_map(|(first, by)| (0..6).map(move |m| (first + m, by[(k, m)]))).collect()
+        };
+        (0..6).map(row).collect()
     }
 
     /// What leads from the last three unknowns of a photo to its angles as they are reported, or to its rotation step; NaN for angles

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use nalgebra::Vector6;
 
 use super::commons::Motion;
-use super::model::Bundle;
+use super::model::{Bundle, Placed};
 use super::problem::Assembled;
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
@@ -38,61 +38,125 @@ fn displacement(k: usize, from: &Vector3) -> Vector3 {
     }
 }
 
-impl Bundle {
-    /// The photo that the user has placed or, where there is none, that with most images among those of the largest part, photos hanging
-    /// together by their points; and its part. None without images.
-    /// A frame has the images of all photos on it.
-    fn central_photo(&self) -> Option<(usize, Vec<usize>)> {
-        let mut part: Vec<usize> = (0..self.images_on.len()).collect();
-        fn root(part: &mut [usize], mut photo: usize) -> usize {
-            while part[photo] != photo {
-                part[photo] = part[part[photo]];
-                photo = part[photo];
-            }
-            photo
+/// Photos that hang together by points and observations; a shared camera does not join them.
+#[derive(Debug)]
+struct Part {
+    photos: Vec<usize>,
+    /// The one to hold: what the user says or has placed, else that with most images.
+    central: usize,
+}
+
+/// The parts of a network that have photos with images, the largest first, and the part of each photo, point and common unknown.
+#[derive(Debug)]
+pub(super) struct Parts {
+    all: Vec<Part>,
+    of_photo: Vec<Option<usize>>,
+    of_point: Vec<Option<usize>>,
+    of_common: Vec<Option<usize>>,
+}
+
+/// The photo, and the coordinate of another one, that are to be held where nothing else gives a datum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Minimum {
+    /// The photo whose pose is held.
+    pub photo: usize,
+    /// Photo and number of its unknown, held for the scale; where there is none, the one in which a photo is farthest from the first.
+    pub coordinate: Option<(usize, usize)>,
+}
+
+/// Parts that are given a datum at the most: a network in more of them is a mistake.
+const MOST_PARTS: usize = 8;
+
+/// Joins what hangs together.
+struct Joined(Vec<usize>);
+
+impl Joined {
+    fn root(&mut self, mut node: usize) -> usize {
+        while self.0[node] != node {
+            self.0[node] = self.0[self.0[node]];
+            node = self.0[node];
         }
-        for point in 0..self.points.len() {
-            for pair in self.images_of(point).windows(2) {
-                let [a, b] = [0, 1].map(|k| root(&mut part, self.carrier(pair[k].photo)));
-                part[a.max(b)] = a.min(b);
-            }
-        }
-        let mut images_on = vec![0; part.len()];
-        self.images_on.iter().enumerate().for_each(|(photo, n)| images_on[self.carrier(photo)] += n);
-        let mut photos = vec![vec![]; part.len()];
-        for photo in (0..part.len()).filter(|&photo| images_on[photo] > 0) {
-            photos[root(&mut part, photo)].push(photo);
-        }
-        let first_longest =
-            |best: Vec<usize>, next: Vec<usize>| if next.len() > best.len() { next } else { best };
-        if let Some(anchor) = self.anchor {
-            let part = photos.into_iter().find(|part| part.contains(&anchor))?;
-            return Some((anchor, part));
-        }
-        let largest = photos.into_iter().reduce(first_longest)?;
-        let central = largest
-            .iter()
-            .copied()
-            .reduce(|best, next| if images_on[next] > images_on[best] { next } else { best })?;
-        Some((central, largest))
+        node
     }
 
-    /// The motions of a free network about the central photo, whose pose is held first, and for the scale the coordinate of another
-    /// in which the two are farthest apart.
+    fn join(&mut self, nodes: impl IntoIterator<Item = usize>) {
+        let mut nodes = nodes.into_iter();
+        let Some(first) = nodes.next() else { return };
+        for node in nodes {
+            let [a, b] = [first, node].map(|node| self.root(node));
+            self.0[a.max(b)] = a.min(b);
+        }
+    }
+}
+
+impl Bundle {
+    /// The parts of the network. A frame has the images of all photos on it.
+    pub(super) fn parts(&self) -> Parts {
+        let (photos, points) = (self.images_on.len(), self.points.len());
+        let of_point = |point: usize| photos + point;
+        let of_common = |common: usize| photos + points + common;
+        let mut joined = Joined((0..photos + points + self.commons.len()).collect());
+        for point in 0..points {
+            for image in self.images_of(point) {
+                joined.join([of_point(point), self.carrier(image.photo)]);
+            }
+        }
+        let moves = |common: &usize| self.commons[*common].moves() && self.common_block[*common].is_some();
+        for touches in self.observations.iter().map(|tied| &tied.touches) {
+            let commons = touches.commons.iter().map(|&(common, _)| common).filter(moves).map(of_common);
+            let own = touches.photos.iter().map(|&photo| self.carrier(photo));
+            joined.join(own.chain(touches.points.iter().map(|&point| of_point(point))).chain(commons));
+        }
+        for mount in self.mounts.iter().flatten().filter(|mount| moves(&mount.sensor)) {
+            joined.join([mount.frame, of_common(mount.sensor)]);
+        }
+        let mut images_on = vec![0; photos];
+        self.images_on.iter().enumerate().for_each(|(photo, n)| images_on[self.carrier(photo)] += n);
+        let mut by_root = vec![vec![]; joined.0.len()];
+        for photo in (0..photos).filter(|&photo| images_on[photo] > 0) {
+            by_root[joined.root(photo)].push(photo);
+        }
+        let asked = self.minimum.map(|minimum| self.carrier(minimum.photo)).or(self.anchor);
+        let mut found: Vec<(usize, Vec<usize>)> =
+            by_root.into_iter().enumerate().filter(|(_, photos)| !photos.is_empty()).collect();
+        let has_asked = |photos: &[usize]| asked.is_some_and(|asked| photos.contains(&asked));
+        found.sort_by_key(|(_, photos)| (!has_asked(photos), usize::MAX - photos.len()));
+        found.truncate(MOST_PARTS);
+        let mut number = vec![None; joined.0.len()];
+        found.iter().enumerate().for_each(|(part, (root, _))| number[*root] = Some(part));
+        let mut of = |node: usize| number[joined.root(node)];
+        let of_photo = (0..photos).map(|photo| of(self.carrier(photo))).collect();
+        let of_point = (0..points).map(|point| of(of_point(point))).collect();
+        let of_common = (0..self.commons.len()).map(|common| of(of_common(common))).collect();
+        let most = |best: usize, &next: &usize| if images_on[next] > images_on[best] { next } else { best };
+        let part = |(_, photos): (usize, Vec<usize>)| {
+            let central = asked.filter(|_| has_asked(&photos));
+            Part { central: central.unwrap_or_else(|| photos.iter().fold(photos[0], most)), photos }
+        };
+        Parts { all: found.into_iter().map(part).collect(), of_photo, of_point, of_common }
+    }
+
+    /// The motions of each part about its central photo, whose pose is held first, and for the scale the coordinate of another in which the
+    /// two are farthest apart.
     pub(super) fn rigid_motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        let parts = self.parts();
+        if parts.all.is_empty() {
+            return None;
+        }
         let placed = self.placed(&unknowns[self.of_stations()]);
         let photos = &placed.photos;
-        let (central, part) = self.central_photo()?;
-        let origin = photos[central].orientation.centre();
-        let mut vectors = vec![vec![0.0; unknowns.len()]; MOTIONS];
+        let origins: Vec<Vector3> =
+            parts.all.iter().map(|part| photos[part.central].orientation.centre()).collect();
+        let mut vectors = vec![vec![0.0; unknowns.len()]; MOTIONS * origins.len()];
         for (point, &at) in self.coordinates(unknowns).enumerate() {
             let point_at = Point::new(self.space, at);
             let inverse = match self.space {
                 ObjectSpace::Rectangular => Matrix3::identity(),
                 ObjectSpace::Geographic(_) => point_at.partials().try_inverse()?,
             };
-            let from = point_at.position() - origin;
-            for (k, vector) in vectors.iter_mut().enumerate() {
+            let Some(part) = parts.of_point[point] else { continue };
+            let from = point_at.position() - origins[part];
+            for (k, vector) in vectors[MOTIONS * part..][..MOTIONS].iter_mut().enumerate() {
                 let moved = inverse * displacement(k, &from);
                 vector[self.of_point(point)].copy_from_slice(moved.as_slice());
             }
@@ -100,52 +164,88 @@ impl Bundle {
         for (photo, station) in photos.iter().enumerate().filter(|&(photo, _)| self.mount(photo).is_none()) {
             let by_step = station.orientation.unknowns_by_step()?;
             let pose = station.orientation.pose();
-            for (k, vector) in vectors.iter_mut().enumerate() {
-                let shift = displacement(k, &(pose.position - origin));
+            let Some(part) = parts.of_photo[photo] else { continue };
+            for (k, vector) in vectors[MOTIONS * part..][..MOTIONS].iter_mut().enumerate() {
+                let shift = displacement(k, &(pose.position - origins[part]));
                 let turn = if (3..6).contains(&k) { Vector3::ith(k - 3, 1.0) } else { Vector3::zeros() };
                 let rho = pose.attitude.tr_mul(&turn);
                 let moved = by_step * Vector6::new(shift.x, shift.y, shift.z, rho.x, rho.y, rho.z);
                 vector[self.of_block(photo)][..6].copy_from_slice(moved.as_slice());
             }
         }
-        for (k, vector) in vectors.iter_mut().enumerate() {
+        for (number, vector) in vectors.iter_mut().enumerate() {
+            let (part, k) = (number / MOTIONS, number % MOTIONS);
             let turn = if (3..6).contains(&k) { Vector3::ith(k - 3, 1.0) } else { Vector3::zeros() };
             let scale = if k == SCALE { 2.0 } else { 1.0 };
-            let displacement = |place: &Vector3| displacement(k, &(place - origin));
+            let displacement = |place: &Vector3| displacement(k, &(place - origins[part]));
             let motion = Motion { displacement: &displacement, turn, scale };
-            self.move_commons(&placed, &motion, |common, state| common.change(state, &motion), vector);
+            self.move_commons_of(&parts, part, vector, |vector| {
+                self.move_commons(&placed, &motion, |common, state| common.change(state, &motion), vector);
+            });
         }
-        let shifts = part.iter().filter(|&&photo| photo != central).flat_map(|&photo| {
-            let shift = photos[photo].orientation.shifts_along(&origin);
-            shift.map(|(number, change)| (change.abs(), self.of_block(photo).start + number))
-        });
-        let mut shifts: Vec<(f64, usize)> = shifts.collect();
-        shifts.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let pose = self.of_block(central).take(6);
-        let preferred = pose.chain(shifts.into_iter().map(|(_, unknown)| unknown)).collect();
+        let mut preferred = vec![];
+        for (Part { photos: own, central }, origin) in parts.all.iter().zip(&origins) {
+            preferred.extend(self.of_block(*central).take(6));
+            let asked = self.minimum.filter(|minimum| self.carrier(minimum.photo) == *central);
+            let coordinate = asked.and_then(|minimum| minimum.coordinate);
+            preferred
+                .extend(coordinate.map(|(photo, number)| self.of_block(self.carrier(photo)).start + number));
+            let shifts = own.iter().filter(|&photo| photo != central).flat_map(|&photo| {
+                let shift = photos[photo].orientation.shifts_along(origin);
+                shift.map(|(number, change)| (change.abs(), self.of_block(photo).start + number))
+            });
+            let mut shifts: Vec<(f64, usize)> = shifts.collect();
+            shifts.sort_by(|a, b| b.0.total_cmp(&a.0));
+            preferred.extend(shifts.into_iter().map(|(_, unknown)| unknown));
+        }
         Some(Motions { vectors, preferred })
     }
 
-    /// Moves the network as a whole, exactly: P -> o + e^s Exp(w) (P - o) + e, o being the centre of the central photo.
+    /// Has common unknowns moved, those of one part only.
+    fn move_commons_of(
+        &self,
+        parts: &Parts,
+        part: usize,
+        unknowns: &mut [f64],
+        moved: impl FnOnce(&mut [f64]),
+    ) {
+        let others = (0..self.commons.len()).filter(|&common| parts.of_common[common] != Some(part));
+        let ranges = others.filter_map(|common| Some(self.of_block(self.common_block[common]?)));
+        let kept: Vec<_> = ranges.map(|range| (range.clone(), unknowns[range].to_vec())).collect();
+        moved(unknowns);
+        kept.into_iter().for_each(|(range, values)| unknowns[range].copy_from_slice(&values));
+    }
+
+    /// Moves each part as a whole, exactly: P -> o + e^s Exp(w) (P - o) + e, o being the centre of its central photo.
     pub(super) fn move_rigidly(&self, unknowns: &mut [f64], amounts: &[f64]) {
-        let placed = self.placed(&unknowns[self.of_stations()]);
+        let (parts, placed) = (self.parts(), self.placed(&unknowns[self.of_stations()]));
+        for (part, amounts) in amounts.chunks_exact(MOTIONS).take(parts.all.len()).enumerate() {
+            self.move_part(&parts, &placed, part, unknowns, amounts);
+        }
+    }
+
+    fn move_part(&self, parts: &Parts, placed: &Placed, part: usize, unknowns: &mut [f64], amounts: &[f64]) {
         let photos = &placed.photos;
-        let Some((central, _)) = self.central_photo() else { return };
-        let origin = photos[central].orientation.centre();
+        let origin = photos[parts.all[part].central].orientation.centre();
         let shift = Vector3::new(amounts[0], amounts[1], amounts[2]);
-        let turn = angle_axis_rotation(&Vector3::new(amounts[3], amounts[4], amounts[5]));
-        let scale = amounts[SCALE].exp();
+        let rotation = Vector3::new(amounts[3], amounts[4], amounts[5]);
+        let (turn, scale) = (angle_axis_rotation(&rotation), amounts[SCALE].exp());
         let moved = |place: Vector3| origin + scale * (turn * (place - origin)) + shift;
         let displacement = |place: &Vector3| moved(*place) - place;
-        let rotation = Vector3::new(amounts[3], amounts[4], amounts[5]);
         let motion = Motion { displacement: &displacement, turn: rotation, scale };
-        self.move_commons(&placed, &motion, |common, state| common.moved(state, &motion), unknowns);
+        self.move_commons_of(parts, part, unknowns, |unknowns| {
+            self.move_commons(placed, &motion, |common, state| common.moved(state, &motion), unknowns);
+        });
         let places =
             self.coordinates(unknowns).map(|&at| self.space.coordinates(moved(self.space.cartesian(at))));
-        for (point, at) in places.collect::<Vec<[f64; 3]>>().into_iter().enumerate() {
+        let places: Vec<[f64; 3]> = places.collect();
+        for (point, at) in
+            places.into_iter().enumerate().filter(|&(point, _)| parts.of_point[point] == Some(part))
+        {
             unknowns[self.of_point(point)].copy_from_slice(&at);
         }
-        for (photo, station) in photos.iter().enumerate().filter(|&(photo, _)| self.mount(photo).is_none()) {
+        let own = |photo: usize| self.mount(photo).is_none() && parts.of_photo[photo] == Some(part);
+        for (photo, station) in photos.iter().enumerate().filter(|&(photo, _)| own(photo)) {
             let pose = &mut unknowns[self.of_block(photo)][..6];
             let (centre, attitude) =
                 (moved(station.orientation.centre()), turn * station.orientation.pose().attitude);
@@ -192,13 +292,32 @@ impl Assembled {
             let partials = Point::new(model.space, at).partials();
             [0, 1, 2].map(|k| (first + k, partials.column(k).norm()))
         };
-        let carriers = points.chain(photos).flat_map(lengths).collect();
-        let left = if inner.scale { vec![] } else { vec![SCALE] };
+        let carriers: Vec<(usize, f64)> = points.chain(photos).flat_map(lengths).collect();
+        let left = self.left(&carriers, !inner.scale);
         (Datum { carriers, left, relative: false }, reference)
     }
 
     /// The datum in which cofactors are relative to some unknowns, scale staying as it is.
     pub(super) fn relative(&self, carriers: Vec<(usize, f64)>) -> Datum {
-        Datum { carriers, left: vec![SCALE], relative: true }
+        let left = self.left(&carriers, true);
+        Datum { carriers, left, relative: true }
+    }
+
+    /// The motions that are left as they are: all of parts without carriers and, if so asked, the scale of the others.
+    fn left(&self, carriers: &[(usize, f64)], scale: bool) -> Vec<usize> {
+        let (model, parts) = (&self.problem.model, self.problem.model.parts());
+        let mut carried = vec![false; parts.all.len()];
+        let mut unknown_of = vec![None; self.problem.layout().unknowns()];
+        for (point, part) in parts.of_point.iter().enumerate() {
+            unknown_of[model.of_point(point)].fill(*part);
+        }
+        for (photo, part) in parts.of_photo.iter().enumerate() {
+            unknown_of[model.of_block(photo)].fill(*part);
+        }
+        for &(carrier, _) in carriers {
+            unknown_of[carrier].into_iter().for_each(|part| carried[part] = true);
+        }
+        let stays = |&number: &usize| !carried[number / MOTIONS] || scale && number % MOTIONS == SCALE;
+        (0..MOTIONS * carried.len()).filter(stays).collect()
     }
 }

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::model::Owner;
+use super::naming::PosePart;
 use super::observations::Fault;
 use super::precision::Coarse;
 use super::problem::Assembled;
@@ -27,6 +28,9 @@ pub enum NetworkError {
     /// There is no camera of this index.
     #[error("there is no camera {0}")]
     CameraIndex(usize),
+    /// There is no common unknown of this index.
+    #[error("there is no common unknown {0}")]
+    NoCommon(usize),
     /// The point took no part in the adjustment.
     #[error("point {0} was left out of the adjustment")]
     LeftOut(usize),
@@ -122,6 +126,10 @@ pub struct Combination {
     pub photos: Vec<usize>,
     /// Cameras that several photos share.
     pub cameras: Vec<usize>,
+    /// Cameras and their parameters that take a notable part; none where this was not looked into.
+    pub parameters: Vec<(usize, usize)>,
+    /// Parts of the poses of photos that do.
+    pub poses: Vec<PosePart>,
     /// Common unknowns.
     pub commons: Vec<usize>,
 }

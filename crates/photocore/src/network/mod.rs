@@ -60,6 +60,7 @@ mod datum;
 mod error;
 mod model;
 mod mounts;
+mod naming;
 mod neighbourhood;
 pub mod observations;
 mod precision;
@@ -80,9 +81,10 @@ use crate::normals::Ordering;
 pub use cameras::AdjustedCamera;
 pub use commons::{AdjustedCommon, Common, CommonKind};
 pub use covariance::{Covariances, NetworkDatum, Of, State};
-pub use datum::InnerConstraints;
+pub use datum::{InnerConstraints, Minimum};
 pub use error::{Combination, NetworkError};
 pub use mounts::Mount;
+pub use naming::PosePart;
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub(crate) use precision::median;
@@ -216,6 +218,8 @@ pub struct Options {
     pub hold_unused: bool,
     /// Bytes that the adjustment may take (see [`crate::normals::System::memory`]); None for any number.
     pub memory: Option<usize>,
+    /// What to hold where nothing else gives a datum; None for what is best held.
+    pub minimum: Option<Minimum>,
 }
 
 impl Default for Options {
@@ -228,6 +232,7 @@ impl Default for Options {
             start: Start::default(),
             hold_unused: false,
             memory: None,
+            minimum: None,
         }
     }
 }
@@ -287,7 +292,8 @@ impl Network {
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
             let adjusted = adjustment::adjust(problem, &own, pool, watch);
-            let mut adjusted = adjusted.map_err(|error| NetworkError::new(error, &assembled))?;
+            let named = |error| self.name(NetworkError::new(error, &assembled), &assembled, pool);
+            let mut adjusted = adjusted.map_err(named)?;
             let earlier = before.take();
             adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
             if adjusted.collapsed.is_empty() {

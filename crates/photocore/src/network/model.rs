@@ -6,6 +6,7 @@ use nalgebra::Matrix2x6;
 use rayon::prelude::*;
 
 use super::commons::{CommonState, PlacedCommon};
+use super::datum::Minimum;
 use super::mounts::{Mount, Mounted, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::{Image, Point};
@@ -67,6 +68,8 @@ pub struct Bundle {
     pub placed: bool,
     /// The only photo whose position is fixed, where nothing else is placed: the user has chosen what to hold.
     pub anchor: Option<usize>,
+    /// What the user wants to be held where nothing else gives a datum.
+    pub minimum: Option<Minimum>,
 }
 
 /// Photos and points at given values of the unknowns.

@@ -151,6 +151,7 @@ impl Network {
         }
         let origin = self.origin();
         let mut model = self.bundle(&screened, images_on.clone(), origin)?;
+        model.minimum = options.minimum;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
             model.turning = (0..self.photos.len()).map(|i| self.turns(i) && !unused(i)).collect();
@@ -297,6 +298,7 @@ impl Network {
             observations: vec![],
             placed,
             anchor,
+            minimum: None,
         };
         bundle.observations = self.tied_observations(screened, &bundle)?;
         Ok(bundle)

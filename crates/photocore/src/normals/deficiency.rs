@@ -40,6 +40,17 @@ impl Deficiency<'_> {
         let Factor { lost, .. } = self.factor;
         lost.iter().map(|&pivot| self.factor.taking_part(layout, self.factor.combination(pivot))).collect()
     }
+
+    /// For each of them all unknowns with how it moves them and their diagonal element of the equations: what these alone would make of
+    /// such a move is its square times the element.
+    pub fn combinations(&self, layout: &Layout) -> Vec<Vec<(usize, f64, f64)>> {
+        let Factor { lost, diagonal, .. } = self.factor;
+        let combination = |&pivot: &usize| {
+            let moved = self.factor.combination(pivot).into_iter().zip(diagonal);
+            self.factor.unknowns(layout).zip(moved).map(|(unknown, (x, &n))| (unknown, x, n)).collect()
+        };
+        lost.iter().map(combination).collect()
+    }
 }
 
 fn blocks_moved(symbolic: &Symbolic, vector: &[f64]) -> Vec<usize> {

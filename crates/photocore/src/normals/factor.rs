@@ -27,7 +27,7 @@ pub struct Factor {
     /// L^-1 n, in the order of elimination.
     pub(super) right: Vec<f64>,
     /// Diagonal of the normal equations before any elimination, in the order of elimination.
-    diagonal: Vec<f64>,
+    pub(super) diagonal: Vec<f64>,
     /// Lost pivots, in the order of elimination.
     pub(super) lost: Vec<usize>,
     /// Pivots that may be nothing but rounding.

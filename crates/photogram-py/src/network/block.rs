@@ -3,11 +3,11 @@
 use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
 use photocore::geometry::PoseNumbers;
-use photocore::network::{Camera, Network, Options, Photo, Start, UnitVariance};
+use photocore::network::{Camera, Minimum, Network, Options, Photo, Start, UnitVariance};
 use pyo3::prelude::*;
 
-use super::solution::BlockSolution;
-use super::{BlockError, adjusted, failure, images, points};
+use super::block_network::BlockNetwork;
+use super::{images, points};
 use crate::arrays::{check_lengths, indices, rows};
 use crate::camera::named;
 use crate::commons::{CommonRow, MountRow, common, mount};
@@ -17,7 +17,7 @@ use crate::options::{named_loss, named_ordering, unknown};
 
 /// Adds the function to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(adjust_block, module)?)
+    module.add_function(wrap_pyfunction!(block_network, module)?)
 }
 
 /// Model, parameters and their standard deviations of a camera.
@@ -31,10 +31,9 @@ fn camera((model, parameters, sd): CameraRow) -> PyResult<Camera> {
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
     photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, unknowns, mounts, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
-    covariance, loss, ordering, unit_variance, threads, memory, progress
+    covariance, loss, ordering, unit_variance, minimum, memory
 ))]
-fn adjust_block(
-    py: Python<'_>,
+fn block_network(
     photo_positions: PyReadonlyArrayDyn<'_, f64>,
     photo_attitudes: PyReadonlyArrayDyn<'_, f64>,
     photo_positions_observed: PyReadonlyArrayDyn<'_, f64>,
@@ -62,10 +61,9 @@ fn adjust_block(
     loss: Option<(&str, f64)>,
     ordering: &str,
     unit_variance: &str,
-    threads: usize,
+    minimum: Option<(usize, Option<(usize, usize)>)>,
     memory: Option<usize>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<BlockSolution> {
+) -> PyResult<BlockNetwork> {
     let positions = rows("photo_positions", &photo_positions)?;
     let attitudes = rows("photo_attitudes", &photo_attitudes)?;
     let positions_observed = rows("photo_positions_observed", &photo_positions_observed)?;
@@ -120,11 +118,9 @@ fn adjust_block(
         start: Start::Intersected,
         hold_unused: false,
         memory,
+        minimum: minimum.map(|(photo, coordinate)| Minimum { photo, coordinate }),
     };
-    let solution = adjusted(py, &network, &options, threads, progress)?;
-    solution
-        .map(|solution| BlockSolution { solution, unknowns: 6 })
-        .map_err(|error| BlockError::new_err(failure(&error, "block")))
+    Ok(BlockNetwork { network, options })
 }
 
 fn six([a, b, c]: [f64; 3], [d, e, f]: [f64; 3]) -> [f64; 6] {

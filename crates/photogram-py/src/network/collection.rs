@@ -3,7 +3,7 @@
 use numpy::{PyArray2, PyReadonlyArrayDyn};
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
 use photocore::geometry::camera::ModelFacts;
-use photocore::geometry::{self, ObjectSpace, Orientation, Point as GroundPoint, PoseNumbers, Unit};
+use photocore::geometry::{self, ObjectSpace, Orientation, Point as GroundPoint, PoseNumbers};
 use photocore::network::{Camera, Network, NetworkError as Failure, Options, Photo, Start, UnitVariance};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -16,7 +16,6 @@ use crate::options::{named_loss, named_ordering, unknown};
 /// Adds the functions to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("CAMERAS", geometry::Camera::NAMES.to_vec())?;
-    module.add_function(wrap_pyfunction!(camera_model, module)?)?;
     module.add_function(wrap_pyfunction!(collection_images, module)?)?;
     module.add_function(wrap_pyfunction!(adjust_collection, module)?)
 }
@@ -29,23 +28,17 @@ fn model(camera: &str) -> PyResult<ModelFacts> {
     geometry::Camera::model(camera).ok_or_else(|| unknown("camera", camera))
 }
 
-#[pyfunction]
-fn camera_model(camera: &str) -> PyResult<(&'static str, Vec<(&'static str, bool)>)> {
-    let ModelFacts { formula, parameters, .. } = model(camera)?;
-    Ok((formula, parameters.iter().map(|&(name, unit)| (name, unit == Unit::Image)).collect()))
-}
-
-/// Pose and camera of every row of an (n, 6 + k) array.
+/// Pose and camera of every row of an (n, 6 + k) array, one after the other: there may be a row for every image.
 fn photos(
     camera: &str,
     name: &str,
     array: &PyReadonlyArrayDyn<'_, f64>,
-) -> PyResult<Vec<([f64; POSE], geometry::Camera)>> {
-    let split = |row: Vec<f64>| {
+) -> PyResult<impl ExactSizeIterator<Item = PyResult<([f64; POSE], geometry::Camera)>>> {
+    let split = move |row: Vec<f64>| {
         let (pose, own) = row.split_first_chunk().ok_or_else(|| unknown("camera", camera))?;
         Ok((*pose, geometry::Camera::named(camera, own).ok_or_else(|| unknown("camera", camera))?))
     };
-    slices(name, array, POSE + model(camera)?.parameters.len())?.into_iter().map(split).collect()
+    Ok(slices(name, array, POSE + model(camera)?.parameters.len())?.into_iter().map(split))
 }
 
 #[pyfunction]
@@ -58,12 +51,13 @@ fn collection_images<'py>(
     let photos = photos(camera, "photo_parameters", &photo_parameters)?;
     let points = rows("points", &points)?;
     check_lengths(("points", points.len()), &[("photo_parameters", photos.len())])?;
-    let image = |(([a, b, c, x, y, z], camera), point): (([f64; POSE], geometry::Camera), [f64; 3])| {
+    let image = |(photo, point): (PyResult<([f64; POSE], geometry::Camera)>, [f64; 3])| {
+        let ([a, b, c, x, y, z], camera) = photo?;
         let orientation = Orientation::from_vectors([a, b, c].into(), [x, y, z].into());
-        camera.image(&orientation.sight(&GroundPoint::new(ObjectSpace::Rectangular, point)))
+        Ok(camera.image(&orientation.sight(&GroundPoint::new(ObjectSpace::Rectangular, point))))
     };
-    let images = py.detach(|| photos.into_iter().zip(points).map(image).collect());
-    table(py, images)
+    let images: PyResult<Vec<[f64; 2]>> = py.detach(|| photos.zip(points).map(image).collect());
+    table(py, images?)
 }
 
 #[pyfunction]
@@ -91,7 +85,7 @@ fn adjust_collection(
     memory: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<CollectionSolution> {
-    let given = photos(camera, "photo_parameters", &photo_parameters)?;
+    let given = photos(camera, "photo_parameters", &photo_parameters)?.collect::<PyResult<Vec<_>>>()?;
     let unknowns = POSE + model(camera)?.parameters.len();
     let sd = slices("photo_sd", &photo_sd, unknowns)?;
     check_lengths(("photo_parameters", given.len()), &[("photo_sd", sd.len())])?;
@@ -129,6 +123,7 @@ fn adjust_collection(
         start: Start::Given,
         hold_unused: true,
         memory,
+        minimum: None,
     };
     let solution = adjusted(py, &network, &options, threads, progress)?;
     solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| match error {

@@ -1,12 +1,15 @@
 //! Networks of photos: blocks and collections; their documentation is in `_photocore.pyi`.
 
 mod block;
+mod block_network;
 mod collection;
 mod first_values;
 mod solution;
 
 use numpy::PyReadonlyArrayDyn;
-use photocore::network::{Coarse, Image, Network, NetworkError as Failure, Options, Point, Solution};
+use photocore::network::{
+    Coarse, Combination, Image, Network, NetworkError as Failure, Options, Point, PosePart, Solution,
+};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -18,13 +21,13 @@ create_exception!(
     _photocore,
     BlockError,
     PyException,
-    "The block cannot be adjusted: (kind, message, photos, points, cameras, unknowns)."
+    "The block cannot be adjusted: (kind, message, combinations, points)."
 );
 create_exception!(
     _photocore,
     CollectionError,
     PyException,
-    "The collection cannot be adjusted: (kind, message, photos, points, cameras, unknowns)."
+    "The collection cannot be adjusted: (kind, message, combinations, points)."
 );
 
 /// Adds the functions and classes to the extension module.
@@ -32,6 +35,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("BlockError", module.py().get_type::<BlockError>())?;
     module.add("CollectionError", module.py().get_type::<CollectionError>())?;
     block::register(module)?;
+    block_network::register(module)?;
     collection::register(module)?;
     first_values::register(module)?;
     solution::register(module)
@@ -75,44 +79,53 @@ fn adjusted(
     watched(py, workers, progress, |pool, watch| network.adjust(options, pool, watch))
 }
 
-/// Kind, message, and the photos, points, cameras and common unknowns concerned; all but points combination by combination.
-type FailureRow = (&'static str, String, Vec<Vec<usize>>, Vec<usize>, Vec<Vec<usize>>, Vec<Vec<usize>>);
+/// What an undetermined combination moves: photos, cameras, common unknowns, parameters of cameras, parts of poses.
+type CombinationRow = (Vec<usize>, Vec<usize>, Vec<usize>, Vec<(usize, usize)>, Vec<&'static str>);
+
+/// Kind, message, and what is concerned: combinations or, where there are none, photos in one; points.
+type FailureRow = (&'static str, String, Vec<CombinationRow>, Vec<usize>);
 
 /// A failure as Python sees it.
 fn failure(error: &Failure, what: &str) -> FailureRow {
-    let (mut cameras, mut commons) = (vec![], vec![]);
-    let (kind, photos, points) = match error {
+    let (kind, combinations, points) = match error {
         Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
         Failure::Undetermined(combinations) => {
-            let photos = combinations.iter().map(|combination| combination.photos.clone()).collect();
-            cameras = combinations.iter().map(|combination| combination.cameras.clone()).collect();
-            commons = combinations.iter().map(|combination| combination.commons.clone()).collect();
-            ("undetermined photos", photos, vec![])
+            ("undetermined photos", combinations.iter().map(combination_row).collect(), vec![])
         }
-        Failure::Coarse(Coarse { photos, points }) => ("coarse", vec![photos.clone()], points.clone()),
+        Failure::Coarse(Coarse { photos, points }) => {
+            let photos = Combination { photos: photos.clone(), ..Combination::default() };
+            ("coarse", vec![combination_row(&photos)], points.clone())
+        }
         Failure::Empty => ("empty", vec![], vec![]),
+        error if block_network::has_datum(error) => ("not free", vec![], vec![]),
+        Failure::Datum(_) => ("datum", vec![], vec![]),
+        Failure::LeftOut(point) => ("left out", vec![], vec![*point]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
         Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
-        | Failure::CommonDeviations(_)
-        | Failure::Mount(_)
         | Failure::NoPhoto(_)
         | Failure::NoPoint(_)
         | Failure::CameraIndex(_)
-        | Failure::LeftOut(_)
+        | Failure::NoCommon(_)
         | Failure::Partials { .. }
         | Failure::State
+        | Failure::CommonDeviations(_)
+        | Failure::Mount(_)
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
-        | Failure::Datum(_)
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
     };
-    (kind, said(error, what), photos, points, cameras, commons)
+    (kind, said(error, what), combinations, points)
+}
+
+fn combination_row(combination: &Combination) -> CombinationRow {
+    let Combination { photos, cameras, commons, parameters, poses } = combination.clone();
+    (photos, cameras, commons, parameters, poses.into_iter().map(PosePart::name).collect())
 }
 
 /// What went wrong, in terms of what was given: a block or a collection.

@@ -5,6 +5,7 @@ use photocore::network::{AdjustedCamera, AdjustedPhoto, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::block_network::BlockState;
 use super::{FailureRow, failure};
 use crate::arrays::{squares, table};
 use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
@@ -211,6 +212,16 @@ macro_rules! solution_class {
 solution_class! {
     /// An adjusted block.
     BlockSolution, "block", {
+        #[getter]
+        fn state(&self) -> BlockState {
+            BlockState { state: self.solution.state.clone() }
+        }
+
+        #[getter]
+        fn lost_digits(&self) -> f64 {
+            self.solution.lost_digits
+        }
+
         #[getter]
         fn photo_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
             let (iterations, photos) = (&self.solution.photo_corrections, &self.solution.photos);

@@ -25,6 +25,7 @@ impl CameraModel for Equirectangular {
     const NAME: &'static str = "equirectangular";
     const PARAMETERS: &'static [(&'static str, Unit)] = &[("w", Unit::Image), ("h", Unit::Image)];
     const CONSTANTS: usize = 2;
+    const DOWN: bool = true;
     const FORMULA: &'static str =
         "image = (w (1/2 + atan2(P1, -P3) / 2 pi), h (1/2 + atan2(-P2, hypot(P1, P3)) / pi))";
 

@@ -32,6 +32,8 @@ pub trait CameraModel: Copy {
     const FORMULA: &'static str;
     /// What the terms of its lens are functions of.
     const LENS: LensDirection = LensDirection::Forward;
+    /// Whether the second image coordinate counts downwards, as rows of pixels do.
+    const DOWN: bool = false;
     /// Whether the adjustment compiles its equations in line: for cameras of a few operations, where a call would show.
     const IN_LINE: bool = false;
 
@@ -92,6 +94,8 @@ pub struct ModelFacts {
     pub constants: usize,
     /// [`CameraModel::LENS`].
     pub lens: LensDirection,
+    /// [`CameraModel::DOWN`].
+    pub down: bool,
 }
 
 /// What a parameter of a camera is measured in.
@@ -133,6 +137,8 @@ macro_rules! cameras {
     };
     (@kinds $d:tt $($name:ident)*) => {
         /// A camera of any kind.
+        // Behind a pointer the 48 numbers of the largest could not be copied as all others are.
+        #[allow(clippy::large_enum_variant)]
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum Camera {
             $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
@@ -151,7 +157,7 @@ macro_rules! cameras {
             /// What is known of a model; None where none has the name.
             pub fn model(name: &str) -> Option<ModelFacts> {
                 fn facts<C: CameraModel>() -> ModelFacts {
-                    ModelFacts { formula: C::FORMULA, parameters: C::PARAMETERS, constants: C::CONSTANTS, lens: C::LENS }
+                    ModelFacts { formula: C::FORMULA, parameters: C::PARAMETERS, constants: C::CONSTANTS, lens: C::LENS, down: C::DOWN }
                 }
                 $(if name == <$name as CameraModel>::NAME {
                     return Some(facts::<$name>());

@@ -241,6 +241,7 @@ macro_rules! cameras_of_vision {
             const NAME: &'static str = $said;
             const PARAMETERS: &'static [(&'static str, Unit)] = &[$(($parameter, $role.unit())),*];
             const CONSTANTS: usize = $constants;
+            const DOWN: bool = true;
             const FORMULA: &'static str = $formula;
 
             fn with_parameters(parameters: [f64; $count]) -> Self {

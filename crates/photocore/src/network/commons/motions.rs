@@ -15,6 +15,11 @@ pub struct Motion<'a> {
 }
 
 impl PlacedCommon {
+    /// Whether anything of it changes when the network moves as a whole.
+    pub fn moves(&self) -> bool {
+        self.kind.moves() != Moves::Stays
+    }
+
     /// Whether it takes up what the network moves by.
     pub fn moves_against(&self) -> bool {
         self.kind.moves() == Moves::Against

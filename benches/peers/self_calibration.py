@@ -1,0 +1,124 @@
+"""Blocks that calibrate two cameras of eight parameters, beside the same with known cameras, and gtsam.
+
+python benches/peers/self_calibration.py [20x50 ...] [--repetitions N] [--without-gtsam]
+
+photogram computes the adjustment with all covariances and redundancy numbers; gtsam (`Cal3DS2` as an unknown
+that photos share, skew held) the bare solution, from the same initial values. All runs are interleaved.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+import numpy as np
+from gtsam_block import SETTINGS, poses
+from machine import processor
+from runs import Size
+from start import intersections
+
+import photogram
+from photogram import Block, Camera
+from photogram.network.directions import without_lenses
+
+FREE = dict.fromkeys(("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"), np.inf)
+TRUE = (
+    {"fx": 152.74, "fy": 152.76, "cx": 0.02, "cy": -0.015, "k1": -6e-4, "k2": 2e-4, "p1": 2e-5, "p2": -3e-5},
+    {"fx": 152.60, "fy": 152.59, "cx": -0.01, "cy": 0.03, "k1": 4e-4, "k2": -1e-4, "p1": -2e-5, "p2": 1e-5},
+)
+START = {"fx": 152.7, "fy": 152.7, "cx": 0.0, "cy": 0.0}
+"""A principal distance, as a certificate of long ago has it, and no distortion."""
+
+
+def blocks(size: Size) -> tuple[Block, Block]:
+    """Return a block with known cameras, and the one that calibrates its two."""
+    shape = {"strips": size.strips, "photos_per_strip": size.photos_per_strip, "seed": 1}
+    true = [Camera("opencv", own, unit="mm", name=f"camera {n}") for n, own in enumerate(TRUE, 1)]
+    start = [Camera("opencv", START, FREE, unit="mm", name=each.name) for each in true]
+    made = photogram.simulate(**shape, cameras=true, start_cameras=start).block
+    return photogram.simulate(**shape).block, made
+
+
+def gtsam_solution(block: Block) -> Callable[[], float]:
+    """Return what solves a block by gtsam and gives the weighted sum of squares."""
+    import gtsam
+    from gtsam.symbol_shorthand import K, L, X
+
+    points = intersections(without_lenses(block))
+    graph, initial = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    for photo, pose in enumerate(poses(block)):
+        initial.insert(X(photo), pose)
+    for point, position in enumerate(points):
+        initial.insertPoint3(L(point), position)
+    for number, camera in enumerate(block.cameras):
+        fx, fy, cx, cy, k1, k2, p1, p2 = camera.values
+        initial.insert(K(number), gtsam.Cal3DS2(fx, fy, 0.0, cx, cy, k1, k2, p1, p2))
+        skew = gtsam.noiseModel.Diagonal.Precisions(np.where(np.arange(9) == 2, 1e12, 0.0))
+        graph.add(gtsam.PriorFactorCal3DS2(K(number), initial.atCal3DS2(K(number)), skew))
+    noise = {tuple(sd): gtsam.noiseModel.Diagonal.Sigmas(sd) for sd in np.unique(block.image_sd, axis=0)}
+    images = zip(block.image_photos, block.image_points, block.image_xy, block.image_sd, strict=True)
+    for photo, point, xy, sd in images:
+        camera = int(block.photo_cameras[photo])
+        factor = gtsam.GeneralSFMFactor2Cal3DS2(xy, noise[tuple(sd)], X(photo), L(point), K(camera))
+        graph.add(factor)
+    held = np.isfinite(block.point_sd)
+    known = np.where(held, block.point_positions, points)
+    for control in np.flatnonzero(held.any(axis=1)):
+        of_control = gtsam.noiseModel.Diagonal.Precisions(block.point_sd[control] ** -2.0)
+        graph.add(gtsam.PriorFactorPoint3(L(control), known[control], of_control))
+
+    def solve() -> float:
+        run = SETTINGS["gn-colamd"](graph, initial)
+        run.optimize()
+        return 2.0 * float(run.error())
+
+    return solve
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sizes", nargs="*", type=Size.parse, default=[Size(20, 50)], metavar="STRIPSxPHOTOS")
+    parser.add_argument("--repetitions", type=int, default=3)
+    parser.add_argument("--without-gtsam", action="store_true")
+    arguments = parser.parse_args()
+    print(f"{processor()}; seconds, the fastest of {arguments.repetitions}\n")
+    head = "photos", "known cameras", "steps", "two of 8 unknown", "steps", "ratio", "gtsam, bare", "ratio"
+    print("| " + " | ".join(head) + " |\n|" + "---:|" * len(head))
+    for size in arguments.sizes:
+        known, unknown = blocks(size)
+        work: dict[str, Callable[[], object]] = {
+            "known": lambda block=known: photogram.adjust(block),
+            "unknown": lambda block=unknown: photogram.adjust(block),
+        }
+        if not arguments.without_gtsam:
+            work["gtsam"] = gtsam_solution(unknown)
+        seconds: dict[str, float] = dict.fromkeys(work, np.inf)
+        found: dict[str, object] = {}
+        for _ in range(arguments.repetitions):
+            for side, run in work.items():
+                start = time.perf_counter()
+                found[side] = run()
+                seconds[side] = min(seconds[side], time.perf_counter() - start)
+        print(row(size, seconds, found))
+
+
+def row(size: Size, seconds: dict[str, float], found: dict[str, object]) -> str:
+    """Return a row of the table; the sums of squares must agree."""
+    known, unknown = found["known"], found["unknown"]
+    assert isinstance(known, photogram.Result)
+    assert isinstance(unknown, photogram.Result)
+    cells = [f"{size.photos:,}", f"{seconds['known']:.2f}", str(len(known.iterations))]
+    cells += [f"{seconds['unknown']:.2f}", str(len(unknown.iterations))]
+    cells += [f"{seconds['unknown'] / seconds['known']:.2f}"]
+    if "gtsam" in seconds:
+        ours, theirs = unknown.sums_of_squares.total, float(str(found["gtsam"]))
+        if abs(theirs / ours - 1.0) > 1e-4:
+            raise SystemExit(f"The solutions do NOT agree: {ours} and {theirs}")
+        cells += [f"{seconds['gtsam']:.1f}", f"1/{seconds['gtsam'] / seconds['unknown']:.0f}"]
+    return "| " + " | ".join(cells) + " |"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+//! What keeps a network from moving as a whole, kind by kind.
+
+use rayon::ThreadPool;
+
+use super::motions::{Candidates, Sums};
+use super::problem::{Linearized, Model, Problem};
+use super::walk::Buffers;
+use crate::normals::Equations;
+
+/// Kinds of observations, by their numbers: groups are of the first.
+#[derive(Debug, Clone, Copy)]
+pub struct Classes<'a> {
+    /// How many kinds there are.
+    pub count: usize,
+    /// Of each tie.
+    pub of_ties: &'a [usize],
+    /// Of each unknown, as an observation of itself.
+    pub of_unknowns: &'a [usize],
+}
+
+impl<M: Model> Problem<M> {
+    /// For each kind of observation the share of what a motion changes in it that remains when all unknowns move together, the greatest
+    /// of all motions: one for what is fixed, and rounding where the kind leaves all of them open.
+    pub fn resistance(&self, values: &[f64], classes: &Classes<'_>, pool: &ThreadPool) -> Vec<f64> {
+        let none = vec![0.0; classes.count];
+        let Some(motions) = pool.install(|| self.model.all_motions(values)) else { return none };
+        let (layout, count) = (self.layout(), motions.vectors.len());
+        let moved = Candidates::by_unknown(&motions, values.len());
+        let free = vec![false; values.len()];
+        let candidates = Candidates::new(&motions, &moved, &free);
+        let equations = pool.install(|| Linearized::of_all(self, values));
+        let mut sums: Vec<Sums> = (0..classes.count).map(|_| candidates.sums()).collect();
+        let mut buffers = Buffers::default();
+        if let Some(groups) = sums.first_mut() {
+            for local in 0..layout.locals() {
+                candidates.add_local(groups, &mut buffers, layout, &equations, local);
+            }
+        }
+        self.for_ties(|tie, rows| {
+            equations.write_tie(tie, rows);
+            let width = layout.tie_columns(tie).count();
+            for row in rows.coefficients.chunks_exact(width.max(1)) {
+                let own = &mut sums[classes.of_ties[tie]];
+                candidates.add_row(own, layout.tie_columns(tie).zip(row.iter().copied()));
+            }
+        });
+        let weighted = self.weighted(values);
+        let mut shares: Vec<f64> = sums.iter().map(|own| own.share(count)).collect();
+        for (unknown, &class) in classes.of_unknowns.iter().enumerate() {
+            let observed =
+                self.sd[unknown].is_finite() || weighted.iter().any(|own| own.unknowns().contains(&unknown));
+            if observed && motions.vectors.iter().any(|vector| vector[unknown] != 0.0) {
+                shares[class] = 1.0;
+            }
+        }
+        shares
+    }
+}

@@ -1,0 +1,110 @@
+//! What an undetermined combination of unknowns is, in the terms of photogrammetry: which parameters of cameras take part in it, and
+//! which parts of the poses.
+
+use std::ops::ControlFlow;
+
+use rayon::ThreadPool;
+
+use super::error::Combination;
+use super::problem::Assembled;
+use super::{Network, NetworkError};
+use crate::adjustment::NormalEquations;
+use crate::geometry::{PoseNumbers, Vector3};
+
+/// A part of the poses of photos.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum PosePart {
+    /// Positions along the directions of view.
+    Along,
+    /// Positions across these.
+    Across,
+    /// Turns about axes across the directions of view.
+    Tilt,
+    /// Turns about the directions of view.
+    Swing,
+}
+
+impl PosePart {
+    const ALL: [Self; 4] = [Self::Along, Self::Across, Self::Tilt, Self::Swing];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Along => "along",
+            Self::Across => "across",
+            Self::Tilt => "tilt",
+            Self::Swing => "swing",
+        }
+    }
+}
+
+/// What takes part by less than this share of all, of n_ii x_i^2 summed up, is not named.
+const NOTABLE: f64 = 0.01;
+
+impl Network {
+    /// Adds to undetermined combinations which parameters of cameras and parts of poses they move. Nothing where cameras are known, or
+    /// where the normal equations of the initial values cannot be had again.
+    pub(super) fn name(
+        &self,
+        mut error: NetworkError,
+        assembled: &Assembled,
+        pool: &ThreadPool,
+    ) -> NetworkError {
+        let NetworkError::Undetermined(combinations) = &mut error else { return error };
+        if self.cameras.iter().all(super::Camera::is_held) || self.poses == PoseNumbers::Vectors {
+            return error;
+        }
+        let (problem, values) = (&assembled.problem, &assembled.problem.initial);
+        let held = problem.to_hold(values, pool);
+        let between = &mut |_| ControlFlow::Continue(());
+        let Ok(equations) = NormalEquations::form(problem, values, &held, pool, between) else {
+            return error;
+        };
+        let named = equations.combinations();
+        if named.len() == combinations.len() {
+            combinations.iter_mut().zip(named).for_each(|(one, moved)| self.describe(one, &moved, assembled));
+        }
+        error
+    }
+
+    /// Sums up the shares n x^2 of the unknowns, given with x and n, by parameters of cameras and parts of poses.
+    fn describe(&self, combination: &mut Combination, moved: &[(usize, f64, f64)], assembled: &Assembled) {
+        let (problem, model) = (&assembled.problem, &assembled.problem.model);
+        let mut all = vec![[0.0; 2]; problem.initial.len()];
+        moved.iter().for_each(|&(unknown, x, n)| all[unknown] = [x, n]);
+        let share = |unknown: usize| all[unknown][1] * all[unknown][0].powi(2);
+        let photos = model.photos(&problem.initial[model.of_stations()]);
+        let mut parts = [0.0; 4];
+        let mut parameters: Vec<Vec<f64>> =
+            self.cameras.iter().map(|camera| vec![0.0; camera.sd.len()]).collect();
+        for (index, photo) in photos.iter().enumerate() {
+            let first = model.of_block(index).start;
+            let view = photo.orientation.pose().attitude.column(2).into_owned();
+            let moved = Vector3::from_fn(|k, _| all[first + k][0]);
+            let along = if moved.norm() > 0.0 { (moved.dot(&view) / moved.norm()).powi(2) } else { 0.0 };
+            let position: f64 = (first..first + 3).map(share).sum();
+            parts[0] += along * position;
+            parts[1] += (1.0 - along) * position;
+            parts[2] += share(first + 3) + share(first + 4);
+            parts[3] += share(first + 5);
+            let camera = &mut parameters[self.photos[index].camera];
+            let own = (first + 6..model.of_block(index).end).map(share);
+            camera.iter_mut().zip(own).for_each(|(sum, share)| *sum += share);
+        }
+        for (place, &camera) in model.shared.iter().enumerate() {
+            let own = model.of_block(model.cameras.len() + place).map(share);
+            parameters[camera].iter_mut().zip(own).for_each(|(sum, share)| *sum += share);
+        }
+        let least = NOTABLE * (parts.iter().sum::<f64>() + parameters.iter().flatten().sum::<f64>());
+        let numbers = parameters.iter().enumerate().flat_map(|(camera, shares)| {
+            shares.iter().enumerate().filter(|&(_, &share)| share > least).map(move |(k, _)| (camera, k))
+        });
+        combination.parameters = numbers.collect();
+        combination.poses = PosePart::ALL
+            .into_iter()
+            .zip(parts)
+            .filter(|&(_, share)| share > least)
+            .map(|(part, _)| part)
+            .collect();
+    }
+}

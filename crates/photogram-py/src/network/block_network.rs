@@ -1,0 +1,189 @@
+//! A block as the core has it: adjusted, taken to other datums, asked for covariances.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
+use photocore::adjustment::DatumError;
+use photocore::network::{
+    Covariances, InnerConstraints, Network, NetworkDatum, NetworkError as Failure, Of, Options, State,
+};
+use pyo3::prelude::*;
+
+use super::solution::BlockSolution;
+use super::{BlockError, failure};
+use crate::options::unknown;
+use crate::work::{Workers, watched};
+
+/// Adds the classes to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<BlockNetwork>()?;
+    module.add_class::<BlockState>()?;
+    module.add_class::<BlockCovariances>()
+}
+
+/// A block with the options of its adjustment.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct BlockNetwork {
+    pub network: Network,
+    pub options: Options,
+}
+
+/// Where an adjustment has ended.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct BlockState {
+    pub state: State,
+}
+
+/// Covariances of an adjusted block, from one factor.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct BlockCovariances {
+    covariances: Covariances,
+    images: usize,
+}
+
+/// What a datum is: its name, points, photos, and whether scale counts.
+type DatumRow = (String, Vec<usize>, Vec<usize>, bool);
+
+fn datum_of((name, points, photos, scale): DatumRow) -> PyResult<NetworkDatum> {
+    Ok(match (name.as_str(), photos.first()) {
+        ("inner", _) => NetworkDatum::Inner(InnerConstraints { points, photos, scale }),
+        ("relative", Some(&photo)) => NetworkDatum::RelativeToPhoto(photo),
+        ("relative", None) => NetworkDatum::RelativeToPoints(points),
+        (other, _) => return Err(unknown("datum", other)),
+    })
+}
+
+/// Something that has cofactors: its kind and its index.
+type OfRow = (String, usize);
+
+fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
+    let of = |(kind, index): OfRow| match kind.as_str() {
+        "photo" => Ok(Of::Photo(index)),
+        "step" => Ok(Of::PhotoStep(index)),
+        "point" => Ok(Of::Point(index)),
+        "camera" => Ok(Of::Camera(index)),
+        "unknown" => Ok(Of::Common(index)),
+        other => Err(unknown("kind", other)),
+    };
+    rows.into_iter().map(of).collect()
+}
+
+fn refused(error: &Failure) -> PyErr {
+    BlockError::new_err(failure(error, "block"))
+}
+
+#[pymethods]
+impl BlockNetwork {
+    #[pyo3(signature = (*, datum, threads, progress))]
+    fn adjust(
+        &self,
+        py: Python<'_>,
+        datum: Option<DatumRow>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<BlockSolution> {
+        let workers = Workers::of(threads, self.network.images.len());
+        let inner = datum.map(datum_of).transpose()?;
+        let solution = watched(py, workers, progress, |pool, watch| match &inner {
+            Some(NetworkDatum::Inner(inner)) => {
+                self.network.adjust_in_datum(&self.options, inner, pool, watch)
+            }
+            _ => self.network.adjust(&self.options, pool, watch),
+        })?;
+        solution.map(|solution| BlockSolution { solution, unknowns: 6 }).map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, datum, *, threads, progress))]
+    fn in_datum(
+        &self,
+        py: Python<'_>,
+        state: &BlockState,
+        datum: DatumRow,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<BlockSolution> {
+        let workers = Workers::of(threads, self.network.images.len());
+        let datum = datum_of(datum)?;
+        let solution = watched(py, workers, progress, |pool, watch| {
+            self.network.in_datum(&self.options, &state.state, &datum, pool, watch)
+        })?;
+        solution.map(|solution| BlockSolution { solution, unknowns: 6 }).map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads, progress))]
+    fn covariances(
+        &self,
+        py: Python<'_>,
+        state: &BlockState,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<BlockCovariances> {
+        let images = self.network.images.len();
+        let found = watched(py, Workers::of(threads, images), progress, |pool, watch| {
+            self.network.covariances(&self.options, &state.state, None, pool, watch)
+        })?;
+        found.map(|covariances| BlockCovariances { covariances, images }).map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn resistance(
+        &self,
+        py: Python<'_>,
+        state: &BlockState,
+        threads: usize,
+    ) -> PyResult<Vec<(&'static str, f64)>> {
+        let workers = Workers::of(threads, self.network.images.len());
+        let found =
+            watched(py, workers, None, |pool, _| self.network.resistance(&self.options, &state.state, pool))?;
+        found.map_err(|error| refused(&error))
+    }
+}
+
+#[pymethods]
+impl BlockCovariances {
+    #[pyo3(signature = (rows, columns, *, threads, progress))]
+    fn cofactors<'py>(
+        &self,
+        py: Python<'py>,
+        rows: Vec<OfRow>,
+        columns: Option<Vec<OfRow>>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (rows, columns) = (of_rows(rows)?, columns.map(of_rows).transpose()?);
+        let height = self.width(&rows)?;
+        let width = columns.as_ref().map_or(Ok(height), |columns| self.width(columns))?;
+        let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
+            self.covariances.cofactors(&rows, columns.as_deref(), pool, watch)
+        })?;
+        PyArray1::from_vec(py, found.map_err(|error| refused(&error))?).reshape([height, width])
+    }
+
+    #[pyo3(signature = (partials, of, *, threads, progress))]
+    fn propagate<'py>(
+        &self,
+        py: Python<'py>,
+        partials: PyReadonlyArrayDyn<'_, f64>,
+        of: Vec<OfRow>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let of = of_rows(of)?;
+        let count = partials.as_array().shape().first().copied().unwrap_or(0);
+        let partials: Vec<f64> = partials.as_array().iter().copied().collect();
+        let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
+            self.covariances.propagate(&partials, &of, pool, watch)
+        })?;
+        PyArray1::from_vec(py, found.map_err(|error| refused(&error))?).reshape([count, count])
+    }
+}
+
+impl BlockCovariances {
+    fn width(&self, of: &[Of]) -> PyResult<usize> {
+        let widths = of.iter().map(|&each| self.covariances.width(each));
+        widths.sum::<Result<usize, Failure>>().map_err(|error| refused(&error))
+    }
+}
+
+/// Whether a failure is that the network has a datum already.
+pub fn has_datum(error: &Failure) -> bool {
+    matches!(error, Failure::Datum(DatumError::NotFree))
+}
