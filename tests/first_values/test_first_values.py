@@ -1,7 +1,5 @@
 """First values: whatever is known, the adjustment from them ends where it ends from good starts."""
 
-from pathlib import Path
-
 import networks
 import numpy as np
 import pytest
@@ -13,8 +11,9 @@ from photogram.geometry import rotation_matrix
 from photogram.giant import read_project
 from photogram.network.observations import Attitude, Distance, Position
 from photogram.network.unknowns import Boresight, LeverArm
+from shared_data import SHARED
 
-ROMA = Path(__file__).parents[3] / "shared" / "data" / "roma"
+ROMA = SHARED / "roma"
 
 
 def agree(found, good, *, datum=True):
