@@ -103,8 +103,7 @@ def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     return [
         Message(
             f"{count} beyond where the lens of the camera is one-to-one: its radial terms fold back there,"
-            " and"
-            f" the result is not to be trusted: points {points} on photos {photos}"
+            f" and the result is not to be trusted: points {points} on photos {photos}"
         )
     ]
 
