@@ -1,7 +1,7 @@
 """An aerial block with GNSS and an inertial unit: lever arm, shifts and drifts of strips, boresight.
 
-Three strips of five photos and a cross strip, four control points. What the instruments are off by is unknown and
-adjusted with the block. Prints what was found of it.
+Three strips of five photos and a cross strip, four control points. What the instruments are off by is unknown
+and adjusted with the block. Prints what was found of it.
 """
 
 from __future__ import annotations
@@ -49,6 +49,11 @@ def flight() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array(strips), np.array(positions), np.column_stack([tilts, kappas])
 
 
+def _lever_arm(random: np.random.Generator) -> LeverArm:
+    """Return the lever arm as it was measured."""
+    return LeverArm("antenna", TRUTH["lever arm"] + LEVER_ARM_SD * random.standard_normal(3), LEVER_ARM_SD)
+
+
 def measured(seed: int = 3) -> Block:
     """Return the block with its measurements, errors drawn with the given seed."""
     random = np.random.default_rng(seed)
@@ -64,7 +69,7 @@ def measured(seed: int = 3) -> Block:
 
     photo_ids = [f"{strip + 1}{k + 1}" for strip in range(4) for k in range(5)]
     point_ids = [f"P{k}" for k in range(len(points))]
-    lever_arm, boresight = LeverArm("antenna", [0.1, -0.35, 1.2], sd=LEVER_ARM_SD), Boresight("unit")
+    lever_arm, boresight = _lever_arm(random), Boresight("unit")
     shifts, drifts = ([kind(f"strip {k + 1}") for k in range(4)] for kind in (Shift, Drift))
     turned = rotation_matrix(angles).transpose(0, 2, 1)
     matrix = Attitudes.of("rotation_vector", TRUTH["boresight"][np.newaxis]).matrices[0]

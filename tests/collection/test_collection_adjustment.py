@@ -191,7 +191,7 @@ def test_what_is_on_one_photo_or_none_is_left_out_and_named():
     assert np.isfinite(result.photo_cofactors[:4]).all()
 
 
-def test_two_collections_in_one_have_no_common_datum_and_say_so():
+def test_two_collections_in_one_have_a_datum_each():
     one, two = simulate(photos=4, points=20, seed=1).truth, simulate(photos=4, points=20, seed=2).truth
     both = Collection(
         photo_parameters=np.concatenate([one.photo_parameters, two.photo_parameters]),
@@ -202,8 +202,10 @@ def test_two_collections_in_one_have_no_common_datum_and_say_so():
     )
     result = adjust(both)
     assert result.converged
-    assert np.isnan(result.photo_cofactors).all()
-    assert result.messages[0].text.startswith("there are no covariances: the observations leave")
+    assert np.isfinite(result.photo_cofactors).all()
+    assert result.messages[0].text.startswith("nothing gives a datum; covariances hold for fixed")
+    # Seven unknowns of each, pose and scale.
+    assert sorted(photo // 4 for photo, _ in result.datum) == [0] * 7 + [1] * 7
 
 
 def test_nothing_to_adjust_is_an_error():

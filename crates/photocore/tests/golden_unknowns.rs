@@ -14,7 +14,7 @@ use photocore::geometry::{
 };
 use photocore::network::observations::{Attitude, Control, Position, Quantity};
 use photocore::network::{
-    AdjustedObservation, AdjustedPhoto, Camera, Common, CommonKind, Image, Mount, Network, Observation,
+    AdjustedObservation, AdjustedPhoto, Camera, Common, CommonKind, Image, Mount, Network, Observation, Of,
     Options, Photo, Point, Precision, Solution,
 };
 use serde_json::Value;
@@ -117,12 +117,15 @@ impl<'a> File<'a> {
     }
 }
 
-fn adjusted(network: &Network) -> Solution {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+fn options() -> Options {
     let method = Method::Damped(Stop::Fraction(1e-9));
     let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
-    let options = Options { adjustment, ..Options::default() };
-    let solution = network.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).unwrap();
+    Options { adjustment, ..Options::default() }
+}
+
+fn adjusted(network: &Network) -> Solution {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let solution = network.adjust(&options(), &pool, &mut |_| ControlFlow::Continue(())).unwrap();
     assert_eq!(solution.adjustment.status, Status::Converged);
     assert!(solution.adjustment.iterations.len() <= 10, "{}", solution.adjustment.iterations.len());
     solution
@@ -194,6 +197,37 @@ fn assert_solution(file: &File<'_>, solution: &Solution) {
         };
         if !cofactors.is_null() {
             assert_cofactors(&own, cofactors, name);
+        }
+    }
+}
+
+/// Cofactors of two blocks of unknowns with each other.
+fn assert_cross_cofactors(file: &File<'_>, solution: &Solution) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let mut go = |_| ControlFlow::Continue(());
+    let of = |name: &str| {
+        let index = file.index[name];
+        match &name[..5] {
+            "photo" | "frame" => Of::PhotoStep(index),
+            "point" => Of::Point(index),
+            _ => Of::Common(index),
+        }
+    };
+    let options = options();
+    let found = file.network.covariances(&options, &solution.state, None, &pool, &mut go).unwrap();
+    let golden = &file.file["solution"]["cross_cofactors"];
+    for (name, expected) in golden.as_object().unwrap() {
+        let (a, b) = name.split_once(" | ").unwrap();
+        let own = found.cofactors(&[of(a), of(b)], None, &pool, &mut go).unwrap();
+        let [rows_of, columns_of] = [a, b].map(|name| found.width(of(name)).unwrap());
+        let width = rows_of + columns_of;
+        for (i, row) in rows(expected).iter().enumerate() {
+            for (j, expected) in row.iter().enumerate() {
+                let at = |i: usize, j: usize| own[i * width + j];
+                let (i, j) = (i, rows_of + j);
+                let scale = (at(i, i) * at(j, j)).sqrt();
+                assert!((at(i, j) - expected).abs() <= 1e-8 * scale, "{name}: {} {expected}", at(i, j));
+            }
         }
     }
 }
@@ -280,6 +314,7 @@ fn an_aerial_block_with_lever_arm_shifts_drifts_and_boresight() {
     file.network.observations = observations;
     let solution = adjusted(&file.network);
     assert_solution(&file, &solution);
+    assert_cross_cofactors(&file, &solution);
     assert_kind(&file, "image", of_images(&solution, 0..solution.images.len()));
     assert_kind(&file, "gnss", of_kind(&file.network, &solution, "position"));
     assert_kind(&file, "imu", of_kind(&file.network, &solution, "attitude"));
@@ -313,6 +348,7 @@ fn a_rig_with_an_unknown_sensor() {
     file.network.observations = file.control();
     let solution = adjusted(&file.network);
     assert_solution(&file, &solution);
+    assert_cross_cofactors(&file, &solution);
     assert_kind(&file, "image sensor 1", of_images(&solution, 0..first));
     assert_kind(&file, "image sensor 2", of_images(&solution, first..solution.images.len()));
     assert_kind(&file, "control", of_kind(&file.network, &solution, "control"));
@@ -325,6 +361,19 @@ fn a_rig_with_an_unknown_sensor() {
     }
     assert_attitude(&NUMBERS.attitude(angles), &derived["matrix_photo_to_object"], "derived");
     assert_cofactors(by_step(own).as_slice(), &derived["cofactors"], "derived");
+
+    // The same by further right-hand sides.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let mut go = |_| ControlFlow::Continue(());
+    let photo = frames + file.index["frame3"];
+    let all = file.network.covariances(&options(), &solution.state, None, &pool, &mut go).unwrap();
+    let by_steps = all.cofactors(&[Of::PhotoStep(photo)], None, &pool, &mut go).unwrap();
+    assert_cofactors(&by_steps, &derived["cofactors"], "derived, by steps");
+    let in_angles = all.cofactors(&[Of::Photo(photo)], None, &pool, &mut go).unwrap();
+    for (k, (a, b)) in in_angles.iter().zip(&own.cofactors).enumerate() {
+        let scale = (own.cofactors[k / 6 * 7] * own.cofactors[k % 6 * 7]).sqrt();
+        assert!((a - b).abs() < 1e-8 * scale);
+    }
 
     // A frame without a photo of its own: that of the first is taken away, and its images with it.
     let mut network = file.network.clone();

@@ -75,12 +75,11 @@ class Collection:
             "photo_sd": (photos, len(self.parameters)),
             "point_sd": (points, 3),
         }
-        one_for_all = np.ndim(self.photo_sd) == 0
+        if np.ndim(self.photo_sd) == 0:
+            of_each = np.where(self._constant, 0.0, self.photo_sd)
+            object.__setattr__(self, "photo_sd", np.broadcast_to(of_each, shapes["photo_sd"]))
         for name, shape in shapes.items():
             object.__setattr__(self, name, shaped(name, getattr(self, name), shape))
-        if one_for_all and self._constant.any():
-            sd = shaped("photo_sd", np.where(self._constant, 0.0, self.photo_sd), shapes["photo_sd"])
-            object.__setattr__(self, "photo_sd", sd)
         for name in ("photo_parameters", "point_positions", "image_xy"):
             _check(name, np.isfinite(getattr(self, name)), "finite")
         for name in ("photo_sd", "point_sd"):

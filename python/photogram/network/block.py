@@ -245,6 +245,15 @@ class Block:
                 raise InputError(f"refraction is a Refraction or None, not {shown(self.refraction)}")
             metres_per_unit(self.linear_unit)
 
+    def _check_mounts(self) -> None:
+        self._set("mounts", checked_mounts(self.mounts, self.photo_ids))
+        if not self.mounts:
+            return
+        mounted = np.isin(self.photo_ids, [each.photo for each in self.mounts])[:, np.newaxis]
+        why = "is weighted or fixed, but the photo is on a frame, whose pose and sensor it has"
+        for name in ("photo_position_sd", "photo_attitude_sd"):
+            self._refuse(name, mounted & np.isfinite(getattr(self, name)), why, self.photo_ids)
+
     def _check_observations(self) -> None:
         if not isinstance(self.observations, Sequence):
             raise InputError(f"observations is no list: {shown(self.observations)}")
@@ -252,7 +261,7 @@ class Block:
         for row, each in enumerate(self.observations):
             if not isinstance(each, Observation) or not each.KIND:
                 raise InputError(f"observations[{row}] is no observation: {shown(each)}")
-        self._set("mounts", checked_mounts(self.mounts, self.photo_ids))
+        self._check_mounts()
         observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
 
     def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
@@ -298,7 +307,7 @@ class Block:
             return camera_rows(self.cameras), self.photo_cameras
         distances = self.known_distances("the adjustment").tolist()
         places = {distance: row for row, distance in enumerate(dict.fromkeys(distances))}
-        rows: list[CameraRow] = [("perspective", [distance], [0.0]) for distance in places]
+        rows: list[CameraRow] = [("perspective", [distance], [0.0], None) for distance in places]
         return rows, np.array([places[distance] for distance in distances], dtype=np.int64)
 
     def known_distances(self, what: str) -> Floats:

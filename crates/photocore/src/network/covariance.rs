@@ -9,7 +9,7 @@ use super::model::Owner;
 use super::problem::Assembled;
 use super::{InnerConstraints, Network, NetworkError, Options, Solution};
 use crate::adjustment::{Adjusted, Classes, CofactorError, Datum, Event, Factored, Phase};
-use crate::geometry::{AttitudeNumbers, Matrix3, Orientation, PoseNumbers};
+use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::normals::{Function, Ordering};
 
 /// Where an adjustment of a network has ended: all that is needed to come back to it.
@@ -32,7 +32,7 @@ pub struct State {
 pub enum NetworkDatum {
     /// Chosen points and photos are, together, as near to their given places as they come: of networks that are free.
     Inner(InnerConstraints),
-    /// Cofactors are relative to a photo, as if its pose were held where it has been adjusted to. Nothing is moved, scale stays as it is
+    /// Cofactors are relative to a photo (of one on a frame: to the frame), as if its pose were held where it has been adjusted to. Nothing is moved, scale stays as it is
     /// given or held, and the network need not be free.
     RelativeToPhoto(usize),
     /// The same with points, whose mean position and orientation count.
@@ -53,7 +53,7 @@ pub enum Of {
     Point(usize),
     /// The parameters of a camera.
     Camera(usize),
-    /// Unknowns that observations, or photos on frames, have in common.
+    /// Unknowns that observations, or photos on frames, have in common; rotations are those about their own axes.
     Common(usize),
 }
 
@@ -227,7 +227,9 @@ impl Network {
                 if *photo >= self.photos.len() {
                     return Err(NetworkError::NoPhoto(*photo));
                 }
-                let pose = assembled.problem.model.of_block(*photo).take(6);
+                let model = &assembled.problem.model;
+                // A photo on a frame stands and falls with that.
+                let pose = model.of_block(model.carrier(*photo)).take(6);
                 let carriers = pose.map(|unknown| (unknown, 1.0)).collect();
                 Ok((assembled.relative(carriers), None))
             }
@@ -311,8 +313,8 @@ impl Covariances {
         let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
         let found = self.factored.cofactors(problem, rows, columns, self.memory, pool, &mut between);
         found.map_err(|error| match error {
-            CofactorError::Memory { needed, available } => NetworkError::Memory { needed, available },
             CofactorError::Adjust(error) => NetworkError::new(error, &self.assembled),
+            refused => NetworkError::Cofactors(refused),
         })
     }
 
@@ -351,9 +353,13 @@ impl Covariances {
                 Ok(themselves(first..first + 3).chain((0..3).map(turned)).collect())
             }
             Of::Common(common) => {
-                let block = model.common_block.get(common).ok_or(NetworkError::NoCommon(common))?;
-                let known = || vec![vec![]; model.commons[common].kind.unknowns().len()];
-                Ok(block.map_or_else(known, |block| themselves(model.of_block(block)).collect()))
+                let own = model.commons.get(common).ok_or(NetworkError::NoCommon(common))?;
+                let width = own.kind.unknowns().len();
+                let Some(block) = model.common_block[common] else { return Ok(vec![vec![]; width]) };
+                let range = model.of_block(block);
+                let by_unknowns = own.at(&self.factored.values()[range.clone()]).about_own_axes();
+                let row = |i: usize| range.clone().zip(by_unknowns.row(i).iter().copied()).collect();
+                Ok((0..width).map(row).collect())
             }
             Of::Point(point) => {
                 let index = self.point.get(point).ok_or(NetworkError::NoPoint(point))?;
@@ -378,16 +384,13 @@ impl Covariances {
     /// The pose of a photo that is mounted, by the unknowns of its frame and its sensor.
     fn mounted(&self, photo: usize, step: bool) -> Vec<Function> {
         let model = &self.assembled.problem.model;
-        let placed = model.placed(&self.factored.values()[model.of_stations()]);
-        let orientation = &placed.photos[photo].orientation;
-        let numbers = orientation.numbers(model.poses, model.space);
-        let by_step = Orientation::new(model.poses, model.space, &numbers).unknowns_by_step();
-        let reported = by_step.map_or_else(|| Matrix6::repeat(f64::NAN), |by| by * orientation.step_matrix());
-        let to = if step { Matrix6::identity() } else { reported };
-        let own = placed.mounted[photo].as_ref();
+        let unknowns = &self.factored.values()[model.of_stations()];
+        let Some((orientation, own)) = model.on_frame(photo, unknowns) else { return vec![] };
+        let reported = || model.reported(&orientation).1.unwrap_or_else(|| Matrix6::repeat(f64::NAN));
+        let to = if step { Matrix6::identity() } else { reported() };
         let parts: Vec<(usize, Matrix6<f64>)> = model
             .blocks_of_pose(photo)
-            .zip(own.into_iter().flat_map(|own| [own.by_frame, own.by_sensor]))
+            .zip([own.by_frame, own.by_sensor])
             .map(|(block, by)| (model.of_block(block).start, to * by))
             .collect();
         let row = |k: usize| -> Function {

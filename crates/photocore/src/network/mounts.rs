@@ -112,6 +112,23 @@ impl Bundle {
         std::iter::once(self.carrier(photo)).chain(sensor)
     }
 
+    /// The orientation of a photo that is mounted; None of others. `unknowns` are those of all stations.
+    pub(super) fn on_frame(&self, photo: usize, unknowns: &[f64]) -> Option<(Orientation, Mounted)> {
+        let mount = self.mount(photo)?;
+        let pose = &unknowns[self.first[mount.frame]..][..6];
+        let frame = self.orientation(mount.frame, &std::array::from_fn(|k| pose[k]));
+        let block = self.common_block[mount.sensor];
+        let own = block.map_or(&[] as &[f64], |block| &unknowns[self.first[block]..self.first[block + 1]]);
+        Some(mounted(self.space, &frame, &self.commons[mount.sensor].at(own), block.is_some()))
+    }
+
+    /// The six numbers of a pose, counted from the origin, and what leads to them from its own unknowns; None where angles are singular.
+    pub(super) fn reported(&self, orientation: &Orientation) -> ([f64; 6], Option<Matrix6<f64>>) {
+        let numbers = orientation.numbers(self.poses, self.space);
+        let by_step = Orientation::new(self.poses, self.space, &numbers).unknowns_by_step();
+        (numbers, by_step.map(|by_step| by_step * orientation.step_matrix()))
+    }
+
     /// The pairs of kept blocks whose cofactors those of the poses of mounted photos need.
     pub(super) fn pairs(&self) -> Vec<[u32; 2]> {
         let pair = |photo: usize| {

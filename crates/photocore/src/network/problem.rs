@@ -154,7 +154,8 @@ impl Network {
         model.minimum = options.minimum;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
-            model.turning = (0..self.photos.len()).map(|i| self.turns(i) && !unused(i)).collect();
+            let turns = |photo: usize| self.turns(photo) && !unused(photo) && model.mount(photo).is_none();
+            model.turning = (0..self.photos.len()).map(turns).collect();
         }
         let local = |pose: [f64; 6]| match self.poses {
             PoseNumbers::Angles(_) => {
@@ -283,6 +284,7 @@ impl Network {
             camera_block: self.photos.iter().map(block).collect(),
             shared,
             squares,
+            camera_priors: vec![],
             commons: self.commons.iter().map(place).collect(),
             common_block,
             uses_of_commons,
@@ -300,6 +302,7 @@ impl Network {
             anchor,
             minimum: None,
         };
+        bundle.camera_priors = self.camera_priors(&bundle);
         bundle.observations = self.tied_observations(screened, &bundle)?;
         Ok(bundle)
     }

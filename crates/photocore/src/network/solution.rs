@@ -11,7 +11,7 @@ use super::{
     Point, State, UnitVariance,
 };
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
-use crate::geometry::{AttitudeNumbers, Matrix3, Orientation, PoseNumbers};
+use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::network::model::Bundle;
 use crate::normals::Cofactors;
 
@@ -337,14 +337,11 @@ fn mounted_pose(
     cofactors: Option<&Cofactors>,
 ) -> ([f64; 6], Vec<f64>) {
     let (model, orientation) = (&problem.model, &photos[photo].orientation);
-    let numbers = orientation.numbers(network.poses, network.space);
-    let found = cofactors.zip(mounted[photo].as_ref()).and_then(|(all, own)| {
+    let (mut pose, taken) = model.reported(orientation);
+    let found = cofactors.zip(mounted[photo].as_ref()).zip(taken).map(|((all, own), taken)| {
         let cofactors = model.mounted_cofactors(problem.layout(), photo, own, all);
-        let by_step = Orientation::new(network.poses, network.space, &numbers).unknowns_by_step()?;
-        let taken = by_step * orientation.step_matrix();
-        Some((taken * cofactors * taken.transpose()).as_slice().to_vec())
+        (taken * cofactors * taken.transpose()).as_slice().to_vec()
     });
-    let mut pose = numbers;
     if let PoseNumbers::Angles(_) = network.poses {
         (0..3).for_each(|k| pose[k] += model.origin[k]);
     }

@@ -35,6 +35,7 @@ class Base(Observation):
 
     KIND = "base"
     UNKNOWNS = (("first", Sensor), ("second", Sensor))
+    NEEDS = frozenset({"second"})
     VALUES = (("length", ()),)
     COMPONENTS = ("length",)
 

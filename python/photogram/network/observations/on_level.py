@@ -34,6 +34,7 @@ class OnLevel(Observation):
     KIND = "on level"
     POINTS = ("point",)
     UNKNOWNS = (("level", Level),)
+    NEEDS = frozenset({"level"})
     VALUES = (("difference", ()),)
     COMPONENTS = ("height",)
 

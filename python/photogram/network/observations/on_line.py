@@ -37,6 +37,7 @@ class OnPlumbLine(Observation):
     KIND = "on plumb line"
     POINTS = ("point",)
     UNKNOWNS = (("line", PlumbLine),)
+    NEEDS = frozenset({"line"})
     COMPONENTS = ("X", "Y")
     LOCAL = True
 
@@ -71,6 +72,7 @@ class OnLine(Observation):
     KIND = "on line"
     POINTS = ("point",)
     UNKNOWNS = (("line", Line),)
+    NEEDS = frozenset({"line"})
     COMPONENTS = ("x", "y")
 
     point: str

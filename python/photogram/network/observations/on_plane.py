@@ -34,6 +34,7 @@ class OnPlane(Observation):
     KIND = "on plane"
     POINTS = ("point",)
     UNKNOWNS = (("plane", Plane),)
+    NEEDS = frozenset({"plane"})
     VALUES = (("distance", ()),)
     COMPONENTS = ("distance",)
 

@@ -33,6 +33,7 @@ class Prior(Observation):
 
     KIND = "prior"
     UNKNOWNS = (("unknown", Unknown),)
+    NEEDS = frozenset({"unknown"})
 
     unknown: Unknown
     sd: ArrayLike | None = None

@@ -1,6 +1,6 @@
 //! Common unknowns after the adjustment.
 
-use nalgebra::{DMatrix, Vector3 as Column};
+use nalgebra::DMatrix;
 
 use super::Common;
 use crate::adjustment::Adjustment;
@@ -57,8 +57,9 @@ impl Network {
             }
             if let Some(all) = &adjustment.cofactors {
                 let own = model.cofactors_of_block(all, block);
-                let steps: Vec<Column<f64>> = state.steps().map(|(_, turn)| turn).collect();
-                found.cofactors = about_own_axes(common, &steps, own);
+                let steps = state.about_own_axes();
+                let own = &steps * DMatrix::from_row_slice(width, width, own) * steps.transpose();
+                found.cofactors = ((&own + own.transpose()) / 2.0).as_slice().to_vec();
             }
             if let Some(all) = &adjustment.prior_redundancy {
                 found.redundancy = all[range].to_vec();
@@ -67,16 +68,4 @@ impl Network {
         };
         self.commons.iter().enumerate().map(each).collect()
     }
-}
-
-/// Takes cofactors of the components of r to those of turns about the own axes.
-fn about_own_axes(common: &Common, turns: &[Column<f64>], cofactors: &[f64]) -> Vec<f64> {
-    let components: Vec<usize> = common.kind.components().collect();
-    let width = components.len();
-    let taken = DMatrix::from_fn(width, width, |i, j| match components[i].checked_sub(3) {
-        None => f64::from(u8::from(i == j)),
-        Some(turn) => turns[j][turn],
-    });
-    let found = &taken * DMatrix::from_row_slice(width, width, cofactors) * taken.transpose();
-    ((&found + found.transpose()) / 2.0).as_slice().to_vec()
 }

@@ -7,6 +7,8 @@
 mod adjusted;
 mod motions;
 
+use nalgebra::DMatrix;
+
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::{
     Matrix3, ObjectSpace, Pose, Vector3, angle_axis_rotation, angle_axis_with_jacobian, local_vertical,
@@ -298,6 +300,15 @@ impl CommonState {
     /// Where it is, offsets in its own axes.
     fn place(&self) -> Vector3 {
         self.base + self.attitude * self.offset
+    }
+
+    /// Its unknowns with rotations about its own axes (rows) by its unknowns.
+    pub(super) fn about_own_axes(&self) -> DMatrix<f64> {
+        let components: Vec<usize> = self.kind.components().collect();
+        DMatrix::from_fn(components.len(), components.len(), |i, j| match components[i].checked_sub(3) {
+            Some(turn) if components[j] > 2 => self.turns[(turn, components[j] - 3)],
+            _ => f64::from(u8::from(i == j)),
+        })
     }
 
     /// The unknowns and, for each, the change of the offset and the turn about the own axes that a unit of it takes.

@@ -1,0 +1,416 @@
+"""What else is measured of simulated blocks: GNSS with shift and drift, inertial units, distances, rigs.
+
+Each function takes a simulation and returns one with more in it. The truth has the same observations without
+errors, and what they have in common known; in the block it is unknown and starts elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import number, shaped, whole_number
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.network import geometry
+from photogram.network.attitudes import Attitudes
+from photogram.network.block import Block
+from photogram.network.observations import Attitude, Distance, Observation, Position
+from photogram.network.rigs import Mount
+from photogram.network.simulation import Simulation
+from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Sensor, Shift
+
+__all__ = ["with_distances", "with_gnss", "with_inertial", "with_rig"]
+
+
+def with_gnss(
+    simulation: Simulation,
+    *,
+    sd: float = 0.05,
+    lever_arm: ArrayLike = 0.0,
+    lever_arm_sd: float = 0.0,
+    shift_sd: float = 0.0,
+    drift_sd: float = 0.0,
+    seconds: float = 5.0,
+    seed: int | np.random.Generator = 1,
+) -> Simulation:
+    """Add a GNSS position of every photo.
+
+    Parameters
+    ----------
+    simulation
+        A simulated block, photos strip by strip.
+    sd
+        Standard deviation of a coordinate, metres: of its error and in the block.
+    lever_arm
+        (3,) from the projection centres to the antenna, in the axes of the photos, metres.
+    lever_arm_sd
+        With what standard deviation it was measured: 0 known, infinite unknown.
+    shift_sd, drift_sd
+        Standard deviations of shifts and, a second, drifts of the strips, which are unknown: of their draw
+        alone. 0: there are none.
+    seconds
+        Between photos.
+    seed
+        Equal seeds and equal arguments give equal observations.
+
+    Raises
+    ------
+    InputError
+        Arguments outside their ranges, a block with a rig.
+    """
+    _positive(sd=sd, seconds=seconds)
+    _not_negative(shift_sd=shift_sd, drift_sd=drift_sd)
+    if simulation.block.mounts:
+        raise InputError("positions are of the photos that fly: add the rig afterwards")
+    random, truth = np.random.default_rng(seed), simulation.truth
+    arm = shaped("lever_arm", lever_arm, (3,))
+    given = arm + (lever_arm_sd if math.isfinite(lever_arm_sd) else 1.0) * random.standard_normal(3)
+    arms = LeverArm("antenna", arm, 0.0), LeverArm("antenna", given, lever_arm_sd)
+    centres, turned, frames = _geocentric(truth)
+    middle = _middle(truth)
+    strips = _strips(truth)
+    times = seconds * np.arange(len(strips))
+    shifts, drifts = (
+        deviation * random.standard_normal((strips.max() + 1, 3)) for deviation in (shift_sd, drift_sd)
+    )
+    errors = sd * random.standard_normal(centres.shape)
+    parts: list[list[Observation]] = [[], []]
+    since = times - (np.bincount(strips, times) / np.bincount(strips))[strips]
+    moved = shifts[strips] + since[:, np.newaxis] * drifts[strips]
+    antennas = centres + turned @ arm + moved @ middle
+    own = [
+        _of_strips(Shift, shifts) if shift_sd else None,
+        _of_strips(Drift, drifts) if drift_sd else None,
+    ]
+    for which, noise in enumerate((np.zeros_like(errors), errors)):
+        places = antennas + np.einsum("pki,pk->pi", frames, noise)
+        observed = _coordinates(truth, places)
+        for photo, strip in enumerate(strips.tolist()):
+            shift, drift = (None if each is None else each[which][strip] for each in own)
+            parts[which].append(
+                Position(
+                    truth.photo_ids[photo],
+                    observed[photo],
+                    sd=sd,
+                    lever_arm=arms[which],
+                    shift=shift,
+                    drift=drift,
+                    time=float(times[photo]),
+                )
+            )
+    return _observed(simulation, *parts)
+
+
+def with_inertial(
+    simulation: Simulation,
+    *,
+    sd: float = 1e-4,
+    boresight: ArrayLike = 0.0,
+    seed: int | np.random.Generator = 2,
+) -> Simulation:
+    """Add the attitude of every photo, from an inertial unit whose boresight is unknown.
+
+    Parameters
+    ----------
+    simulation
+        A simulated block.
+    sd
+        Standard deviation of a rotation about an axis of the unit, radians: of its error and in the block.
+    boresight
+        (3,) rotation vector of the boresight, from the axes of the unit to those of the photos, radians; it
+        starts at 0.
+    seed
+        Equal seeds and equal arguments give equal observations.
+
+    Raises
+    ------
+    InputError
+        Arguments outside their ranges.
+    """
+    _positive(sd=sd)
+    random, truth = np.random.default_rng(seed), simulation.truth
+    turn = _rotations(shaped("boresight", boresight, (3,))[np.newaxis])[0]
+    local = _local(truth) @ turn
+    errors = _rotations(sd * random.standard_normal((len(local), 3)))
+    known, unknown = Boresight("inertial unit", turn, 0.0), Boresight("inertial unit")
+    exact, noisy = (
+        [
+            Attitude(name, matrix, sd=sd, boresight=own)
+            for name, matrix in zip(truth.photo_ids, matrices, strict=True)
+        ]
+        for matrices, own in ((local, known), (local @ errors, unknown))
+    )
+    return _observed(simulation, exact, noisy)
+
+
+def with_distances(
+    simulation: Simulation,
+    *,
+    count: int = 10,
+    sd: float = 0.02,
+    scale: float = 1.0,
+    constant: float = 0.0,
+    unknown: bool = False,
+    seed: int | np.random.Generator = 3,
+) -> Simulation:
+    """Add distances between points that are drawn at random.
+
+    Parameters
+    ----------
+    simulation
+        A simulated block.
+    count
+        How many.
+    sd
+        Standard deviation, metres: of their errors and in the block.
+    scale, constant
+        Of the instrument; `constant` in metres.
+    unknown
+        Whether these are unknown; they start at 1 and 0. Otherwise they are 1 and 0.
+    seed
+        Equal seeds and equal arguments give equal observations.
+
+    Raises
+    ------
+    InputError
+        Arguments outside their ranges, more distances than there are points.
+    """
+    _positive(sd=sd, scale=scale)
+    truth = simulation.truth
+    if not 0 <= 2 * whole_number("count", count) <= len(truth.point_ids):
+        raise InputError(f"count must be at most half of the {len(truth.point_ids)} points: {count}")
+    if not unknown and (scale != 1 or constant != 0):
+        raise InputError("scale and constant are 1 and 0 where they are not unknown")
+    random = np.random.default_rng(seed)
+    first, second = random.permutation(len(truth.point_ids))[: 2 * count].reshape(2, -1)
+    places = _cartesian(truth, truth.point_positions)
+    lengths = scale * np.linalg.norm(places[second] - places[first], axis=1) + constant
+    names = [(truth.point_ids[p], truth.point_ids[q]) for p, q in zip(first, second, strict=True)]
+    known = Instrument("rangefinder", scale, constant, 0.0), Instrument("rangefinder")
+    errors = sd * random.standard_normal(count)
+    exact, noisy = (
+        [
+            Distance(p, q, float(length), sd, instrument=own if unknown else None)
+            for (p, q), length in zip(names, values, strict=True)
+        ]
+        for values, own in ((lengths, known[0]), (lengths + errors, known[1]))
+    )
+    return _observed(simulation, exact, noisy)
+
+
+def with_rig(
+    simulation: Simulation,
+    positions: ArrayLike,
+    rotations: ArrayLike,
+    *,
+    position_error: float = 0.01,
+    rotation_error: float = 0.005,
+    frame_size: float = 230.0,
+    seed: int | np.random.Generator = 4,
+) -> Simulation:
+    """Add cameras to the frame that carries the camera of a block: an oblique head, a stereo head.
+
+    Every photo of the block gets companions; they show the points of the block that lie in their frames, with
+    its standard deviations. The poses of the sensors are unknown.
+
+    Parameters
+    ----------
+    simulation
+        A simulated block with principal distances and without refraction.
+    positions, rotations
+        (k, 3) positions of the k sensors in the axes of the photos in metres, and rotation vectors of their
+        axes there in radians.
+    position_error, rotation_error
+        Standard deviations of the errors of their initial poses, metres and radians.
+    frame_size
+        Side of the square frame, in the unit of image coordinates.
+    seed
+        Equal seeds and equal arguments give equal images.
+
+    Raises
+    ------
+    InputError
+        Arguments outside their ranges, a block with cameras or refraction.
+    """
+    _positive(frame_size=frame_size)
+    random, truth = np.random.default_rng(seed), simulation.truth
+    if truth.refraction is not None:
+        raise InputError("a rig is simulated without refraction")
+    distances = truth.known_distances("the simulation of a rig")
+    offsets = np.atleast_2d(np.asarray(positions, dtype=np.float64))
+    turns = np.atleast_2d(np.asarray(rotations, dtype=np.float64))
+    if offsets.shape != turns.shape or offsets.shape[1] != 3:
+        raise InputError("positions and rotations of a rig have three numbers for each sensor")
+    centres, turned, _ = _geocentric(truth)
+    ids = list(truth.photo_ids)
+    mounts: tuple[list[Mount], list[Mount]] = ([], [])
+    added: dict[str, list[Any]] = {"positions": [], "attitudes": [], "photos": [], "points": [], "xy": []}
+    for k, (offset, turn) in enumerate(zip(offsets, _rotations(turns), strict=True)):
+        start = _rotations(rotation_error * random.standard_normal((1, 3)))[0]
+        sensors = (
+            Sensor(f"sensor {k + 2}", offset, turn, 0.0),
+            Sensor(f"sensor {k + 2}", offset + position_error * random.standard_normal(3), turn @ start),
+        )
+        own = _coordinates(truth, centres + turned @ offset)
+        angles = _angles(truth, own, turned @ turn)
+        photos, points, xy = _seen(truth, own, angles, distances, frame_size)
+        names = [f"{name} {k + 2}" for name in truth.photo_ids]
+        for parts, sensor in zip(mounts, sensors, strict=True):
+            parts.extend(Mount(name, frame, sensor) for name, frame in zip(names, ids, strict=False))
+        added["positions"].append(own)
+        added["attitudes"].append(angles)
+        added["photos"].append(photos + len(truth.photo_ids) * (k + 1))
+        added["points"].append(points)
+        added["xy"].append(xy)
+    names = [mount.photo for mount in mounts[0]]
+    stacked = {name: np.concatenate(parts) for name, parts in added.items()}
+    sd = np.broadcast_to(truth.image_sd[:1], stacked["xy"].shape)
+    noise = sd * random.standard_normal(sd.shape)
+    times = len(offsets)
+
+    def grown(block: Block, own: Sequence[Mount], xy: Floats) -> Block:
+        free = np.full((len(names), 3), np.inf)
+        observed = {
+            name: None if given is None else np.concatenate([given, extra])
+            for name, given, extra in (
+                ("photo_positions_observed", block.photo_positions_observed, stacked["positions"]),
+                ("photo_attitudes_observed", block.photo_attitudes_observed, stacked["attitudes"]),
+            )
+        }
+        return block.replace(
+            photo_ids=[*block.photo_ids, *names],
+            photo_positions=np.concatenate([block.photo_positions, stacked["positions"]]),
+            photo_attitudes=np.concatenate([block.photo_attitudes, stacked["attitudes"]]),
+            photo_position_sd=np.concatenate([block.photo_position_sd, free]),
+            photo_attitude_sd=np.concatenate([block.photo_attitude_sd, free]),
+            principal_distances=np.tile(distances, times + 1),
+            image_photos=np.concatenate([block.image_photos, stacked["photos"]]),
+            image_points=np.concatenate([block.image_points, stacked["points"]]),
+            image_xy=np.concatenate([block.image_xy, xy]),
+            image_sd=np.concatenate([block.image_sd, sd]),
+            mounts=[*block.mounts, *own],
+            **observed,
+        )
+
+    return replace(
+        simulation,
+        truth=grown(truth, mounts[0], stacked["xy"]),
+        block=grown(simulation.block, mounts[1], stacked["xy"] + noise),
+    )
+
+
+def _positive(**values: float) -> None:
+    for name, value in values.items():
+        if not 0 < number(name, value) < math.inf:
+            raise InputError(f"{name} must be positive and finite, not {value}")
+
+
+def _not_negative(**values: float) -> None:
+    for name, value in values.items():
+        if not 0 <= number(name, value) < math.inf:
+            raise InputError(f"{name} must be finite and not negative, not {value}")
+
+
+def _observed(
+    simulation: Simulation, exact: Sequence[Observation], noisy: Sequence[Observation]
+) -> Simulation:
+    truth, block = simulation.truth, simulation.block
+    return replace(
+        simulation,
+        truth=truth.replace(observations=[*truth.observations, *exact]),
+        block=block.replace(observations=[*block.observations, *noisy]),
+    )
+
+
+def _of_strips(kind: type[Shift] | type[Drift], values: Floats) -> tuple[list[Any], list[Any]]:
+    """Return the shifts or drifts of strips as they are, and as they are known."""
+    names = [f"strip {k + 1}" for k in range(len(values))]
+    known = [kind(name, value, 0.0) for name, value in zip(names, values, strict=True)]
+    return known, [kind(name) for name in names]
+
+
+def _strips(block: Block) -> Indices:
+    """Return (P,) the strip of each photo, from the first half of its name."""
+    names = [name[: len(name) // 2] for name in block.photo_ids]
+    places = {name: row for row, name in enumerate(dict.fromkeys(names))}
+    return np.array([places[name] for name in names], dtype=np.int64)
+
+
+def _rotations(vectors: Floats) -> Floats:
+    return np.asarray(Attitudes.of("rotation_vector", vectors).matrices)
+
+
+def _cartesian(block: Block, coordinates: Floats) -> Floats:
+    if block.spheroid is None:
+        return coordinates
+    return geometry.geographic_to_geocentric(coordinates, block.spheroid)
+
+
+def _coordinates(block: Block, places: Floats) -> Floats:
+    if block.spheroid is None:
+        return places
+    return geometry.geocentric_to_geographic(places, block.spheroid)
+
+
+def _frames(block: Block, positions: Floats) -> Floats:
+    """Return (P, 3, 3) the local axes at positions, as rows."""
+    if block.spheroid is None:
+        return np.broadcast_to(np.eye(3), (len(positions), 3, 3))
+    return geometry.local_frames(positions)
+
+
+def _middle(block: Block) -> Floats:
+    """Return the axes, as rows, that shifts and drifts are told in."""
+    return np.asarray(_frames(block, np.median(block.photo_positions, axis=0)[np.newaxis])[0])
+
+
+def _local(block: Block) -> Floats:
+    """Return (P, 3, 3) the axes of the photos, as columns, in local axes."""
+    matrices = geometry.rotation_matrix(block.photo_attitudes)
+    return matrices if block.photo_to_ground else matrices.transpose(0, 2, 1)
+
+
+def _geocentric(block: Block) -> tuple[Floats, Floats, Floats]:
+    """Return the cartesian positions of the photos, their axes there as columns, and local axes as rows."""
+    frames = _frames(block, block.photo_positions)
+    turned = frames.transpose(0, 2, 1) @ _local(block)
+    return _cartesian(block, block.photo_positions), turned, frames
+
+
+def _angles(block: Block, positions: Floats, turned: Floats) -> Floats:
+    """Return the angles of photos with given axes in cartesian space."""
+    local = _frames(block, positions) @ turned
+    matrices = local if block.photo_to_ground else local.transpose(0, 2, 1)
+    return geometry.rotation_angles(matrices)
+
+
+def _seen(
+    block: Block, positions: Floats, angles: Floats, distances: Floats, frame_size: float
+) -> tuple[Indices, Indices, Floats]:
+    """Return photos, points and image coordinates of what lies in the frames, in front."""
+    photos, points, images = [], [], []
+    everything = np.arange(len(block.point_ids))
+    axes = _geocentric(block.replace(photo_positions=positions, photo_attitudes=angles))
+    places = _cartesian(block, block.point_positions)
+    for photo in range(len(positions)):
+        repeated = np.full(len(everything), photo)
+        xy = geometry.project(
+            block.point_positions,
+            positions[repeated],
+            angles[repeated],
+            distances[repeated],
+            spheroid=block.spheroid,
+            photo_to_ground=block.photo_to_ground,
+        )
+        depth = (places - axes[0][photo]) @ axes[1][photo][:, 2]
+        inside = (depth < 0) & (np.abs(xy).max(axis=1) < frame_size / 2)
+        photos.append(repeated[inside])
+        points.append(everything[inside])
+        images.append(xy[inside])
+    return np.concatenate(photos), np.concatenate(points), np.concatenate(images)
