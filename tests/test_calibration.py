@@ -7,6 +7,7 @@ import pytest
 
 from example_scripts import load
 from photogram import Block, Camera, adjust
+from photogram.network.geometry import project
 from photogram.results.calibration import calibrations
 from photogram.results.distortion import distortion_curve
 from photogram.results.lens_field import lens_field
@@ -220,6 +221,54 @@ def test_other_terms_have_a_field_of_vectors(example, result, tmp_path):
     assert lens_field(bare, bare.cameras[0]) is None
     with pytest.raises(ValueError, match="no terms beside the radial ones"):
         draw_lens_field(bare, bare.cameras[0], tmp_path / "none.png")
+
+
+def flat(example):
+    """Return nearly vertical photos of a nearly flat field: they hardly tell c from the flying height."""
+    random = np.random.default_rng(6)
+    plane = np.array([[x, y, 0.0] for x in np.linspace(0, 8, 9) for y in np.linspace(0, 4, 5)])
+    plane[:, 2] = random.uniform(-0.02, 0.02, len(plane))
+    stations = np.array([[x, y, 6.0] for x in (2.0, 3.5, 5.0, 6.5) for y in (1.3, 2.7)])
+    attitudes = random.uniform(-0.01, 0.01, stations.shape)
+    photos, seen = (each.ravel() for each in np.indices((len(stations), len(plane))))
+    ideal = project(plane[seen], stations[photos], attitudes[photos], np.full(len(photos), -1.0))
+    xy = example.TRUTH.project(np.column_stack([ideal, np.full(len(ideal), -1.0)]))
+    inside = (np.abs(xy) < [18.0, 12.0]).all(axis=1)
+    return Block(
+        photo_ids=[f"{i}" for i in range(1, 9)],
+        photo_positions=stations,
+        photo_attitudes=attitudes,
+        cameras=[example.TRUTH.replace(sd={"c": FREE, "K1": FREE}, name="lens")],
+        point_ids=[f"P{i}" for i in range(len(plane))],
+        point_positions=plane,
+        point_sd=np.where(np.arange(len(plane)) % 4 == 0, 0.001, np.inf)[:, np.newaxis] * np.ones(3),
+        image_photos=photos[inside],
+        image_points=seen[inside],
+        image_xy=xy[inside] + random.normal(0, 0.001, xy[inside].shape),
+        image_sd=0.001,
+    )
+
+
+def test_correlations_with_poses_name_parameter_component_and_photos(example):
+    result = adjust(flat(example))
+    [found] = calibrations(result)
+    [heights] = [each for each in found.poses if (each.parameter, each.component) == ("c", "Z")]
+    assert set(heights.photos) == set(result.block.photo_ids)
+    # Against the joint covariance matrix of camera and photo.
+    camera, photo = result.cameras[0], heights.photos[0]
+    joint = result.covariance([("camera", "lens"), ("photo", photo)])
+    c, z = camera.names.index("c"), len(camera.names) + 2
+    expected = abs(joint[c, z]) / np.sqrt(joint[c, c] * joint[z, z])
+    assert heights.coefficient == pytest.approx(expected, abs=1e-6)
+    report = result.report()
+    first = ", ".join(heights.photos[:3])
+    assert f"c and Z of photo {first} and 5 others: {heights.coefficient:.4f}" in report
+    [member] = json.loads(result.to_json())["calibrations"]
+    said = [each for each in member["pose_correlations"] if each["component"] == "Z"]
+    assert said[0]["photos"] == list(heights.photos)
+    # Convergent photos tell them apart.
+    [apart] = calibrations(adjust(example.measured()))
+    assert not [each for each in apart.poses if each.parameter == "c"]
 
 
 def test_report_document_and_picture(example, result, tmp_path, capsys):

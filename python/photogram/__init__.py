@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from photogram.network.attitudes import Attitudes
     from photogram.network.block import Block
     from photogram.network.cameras import Camera
+    from photogram.network.datum import InnerConstraints, MinimumConstraints
     from photogram.network.geometry import Spheroid
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
@@ -34,9 +35,11 @@ __all__ = [
     "Block",
     "Camera",
     "FirstValues",
+    "InnerConstraints",
     "InputError",
     "Iteration",
     "Message",
+    "MinimumConstraints",
     "Orientation",
     "OutOfMemoryError",
     "PhotogramError",
@@ -67,9 +70,11 @@ _HOMES = {
     "Block": "network.block",
     "Camera": "network.cameras",
     "FirstValues": "adjustment.first_values",
+    "InnerConstraints": "network.datum",
     "InputError": "errors",
     "Iteration": "results.iteration",
     "Message": "messages",
+    "MinimumConstraints": "network.datum",
     "Orientation": "absolute_orientation",
     "OutOfMemoryError": "errors",
     "PhotogramError": "errors",

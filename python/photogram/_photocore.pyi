@@ -21,8 +21,8 @@ IterationRow = tuple[int, float, float, float]
 """Number from 1, weighted sum of squares after it, largest change in standard deviations, damping."""
 
 CombinationRow = tuple[list[int], list[int], list[int], list[tuple[int, int]], list[str]]
-"""Photos; cameras that several of them share; common unknowns; cameras with parameters that take a notable part; parts of
-poses that do: positions `along` and `across` the directions of view, `tilt`, `swing` about these."""
+"""Photos; cameras that several of them share; common unknowns; cameras with parameters that take a notable
+part; parts of poses that do: positions `along` and `across` the view, `tilt`, `swing` about the view."""
 
 FailureRow = tuple[str, str, list[CombinationRow], list[int]]
 """Why a network cannot be adjusted, as in :class:`BlockError`."""
@@ -166,9 +166,9 @@ def camera_partials(model: str, parameters: _Floats, u: _Floats) -> tuple[_Float
 
     Returns
     -------
-    (n, 2) images, (n, 2, 3) their partials by u, (n, 2, k) by the parameters, 0 for those that are constants of
-    a lens; not finite where there are none. Those of a backward camera are the ones of the measured position
-    that corresponds to u.
+    (n, 2) images, (n, 2, 3) their partials by u, (n, 2, k) by the parameters, 0 for those that are constants
+    of a lens; not finite where there are none. Those of a backward camera are the ones of the measured
+    position that corresponds to u.
 
     Raises
     ------
@@ -179,10 +179,10 @@ def camera_partials(model: str, parameters: _Floats, u: _Floats) -> tuple[_Float
 def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None:
     """Return the radius up to which the radial part of a lens is one-to-one, and what it becomes.
 
-    Of a forward camera the radius is the tangent of the angle from the axis, of a fisheye the angle (rad), and
-    becomes what the focal length multiplies; `brown_forward` has lengths in the image. Of a backward camera it
-    is that of the measured position from the principal point, which becomes that of the corrected one.
-    Infinite where only the image ends.
+    Of a forward camera the radius is the tangent of the angle from the axis, of a fisheye the angle (rad),
+    and becomes what the focal length multiplies; `brown_forward` has lengths in the image. Of a backward
+    camera it is that of the measured position from the principal point, which becomes that of the corrected
+    one. Infinite where only the image ends.
 
     Returns
     -------
@@ -470,7 +470,7 @@ def find_first_values(
         (m, 3) unit directions in the axes of the photos, not finite where there is none, and (m,) their
         standard deviations in radians.
     threads
-        As for `adjust_block`.
+        As for `block_network`.
 
     Returns
     -------
@@ -486,7 +486,7 @@ def find_first_values(
         An argument of another shape or length, an index out of range; the message names it.
     """
 
-def adjust_block(
+def block_network(
     photo_positions: _Floats,
     photo_attitudes: _Floats,
     photo_positions_observed: _Floats,
@@ -494,7 +494,7 @@ def adjust_block(
     photo_position_sd: _Floats,
     photo_attitude_sd: _Floats,
     photo_cameras: _Indices,
-    cameras: list[tuple[str, list[float], list[float]]],
+    cameras: list[tuple[str, list[float], list[float], list[float] | None]],
     point_positions: _Floats,
     point_sd: _Floats,
     image_photos: _Indices,
@@ -515,11 +515,10 @@ def adjust_block(
     loss: tuple[str, float] | None,
     ordering: str,
     unit_variance: str,
-    threads: int,
+    minimum: tuple[int, tuple[int, int] | None] | None,
     memory: int | None,
-    progress: Callable[[str, int, int, IterationRow | None], None] | None,
-) -> BlockSolution:
-    """Adjust a block by least squares (GIANT guide, sections 4 to 9).
+) -> BlockNetwork:
+    """Return a block as it is adjusted by least squares (GIANT guide, sections 4 to 9).
 
     Standard deviations are infinite for free unknowns, zero for fixed ones. Positions are X, Y, Z, or
     longitude (rad), latitude (rad), height when a spheroid is given.
@@ -535,7 +534,8 @@ def adjust_block(
     photo_cameras
         (P,) indices into the cameras; photos with the same one share its unknowns.
     cameras
-        Model, parameters in its order and their standard deviations.
+        Model, parameters in its order and their standard deviations, covariance matrix of those that are
+        weighted row by row, None where these were observed one by one.
     point_positions, point_sd
         (n, 3) coordinates, NaN where unknown, and standard deviations, finite for held components.
     image_photos, image_points
@@ -576,23 +576,101 @@ def adjust_block(
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     unit_variance
         `free`, `constrained` or `unity` (GIANT guide, Appendix E).
-    threads
-        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
-        the calling thread, larger work has all processors.
+    minimum
+        Photo whose pose is held where nothing else gives a datum, and for the scale a photo and the number of
+        its coordinate; None leaves either to the core.
     memory
-        Bytes that the adjustment may take; None for any number.
-    progress
-        Called on the calling thread as (phase, points done, points in all, None), or ("iteration", number, 0,
-        row). What it raises stops the adjustment and is passed on. Signals are looked after at the same time,
-        so that Ctrl-C stops it too.
+        Bytes that the adjustment, or covariances that are asked for, may take; None for any number.
 
     Raises
     ------
-    BlockError
-        A block that cannot be adjusted.
     ValueError
         An argument of another shape, length or choice; the message names it.
     """
+
+@final
+class BlockNetwork:
+    """A block with the options of its adjustment.
+
+    A datum is (`inner`, points, photos, whether scale counts) for inner constraints, (`relative`, [],
+    [photo], False) or (`relative`, points, [], False) for cofactors relative to these. Of all methods:
+
+    threads
+        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
+        the calling thread, larger work has all processors.
+    progress
+        Called on the calling thread as (phase, points done, points in all, None), or ("iteration", number, 0,
+        row). What it raises stops the work and is passed on. Signals are looked after at the same time,
+        so that Ctrl-C stops it too.
+
+    They raise BlockError for a block that cannot be adjusted, or taken to a datum.
+    """
+
+    def adjust(
+        self,
+        *,
+        datum: tuple[str, list[int], list[int], bool] | None,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> BlockSolution:
+        """Adjust it; a free one may be taken to the datum of inner constraints."""
+
+    def in_datum(
+        self,
+        state: BlockState,
+        datum: tuple[str, list[int], list[int], bool],
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> BlockSolution:
+        """Take an adjusted block to another datum: values, cofactors, redundancy numbers; no iterations."""
+
+    def covariances(
+        self,
+        state: BlockState,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> BlockCovariances:
+        """Factor the normal equations where the adjustment has ended, in the datum that it was taken to."""
+
+    def resistance(self, state: BlockState, *, threads: int) -> list[tuple[str, float]]:
+        """Return what keeps the block from moving as a whole: kinds of observations.
+
+        With each the greatest share of what a motion changes in them that remains when all unknowns move.
+        """
+
+@final
+class BlockState:
+    """Where the adjustment of a block has ended, and the datum that it was taken to."""
+
+@final
+class BlockCovariances:
+    """Cofactors (a priori unit weight) of anything in an adjusted block, from one factor.
+
+    What has cofactors is told by its kind and index: `photo` (position and angles), `step` (position and
+    rotation about the photo's axes), `point`, `camera`, `unknown`. Arguments as of :class:`BlockNetwork`.
+    """
+
+    def cofactors(
+        self,
+        rows: list[tuple[str, int]],
+        columns: list[tuple[str, int]] | None,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> _Floats:
+        """Return the cofactors of every two unknowns of `rows`, or of those with what `columns` names."""
+
+    def propagate(
+        self,
+        partials: _Floats,
+        of: list[tuple[str, int]],
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> _Floats:
+        """Return J Q J^T, for (m, k) partials J of m functions of the k unknowns of what is named."""
 
 class _NetworkSolution:
     """What adjusted blocks and collections have alike, in the order of photos (P), points (n), images (m).
@@ -721,6 +799,10 @@ class BlockSolution(_NetworkSolution):
         """Indices of the images whose point stands behind the camera, ascending."""
 
     @property
+    def images_folded(self) -> _Indices:
+        """Indices of the images beyond where the lens of their camera is one-to-one, ascending."""
+
+    @property
     def weak(self) -> list[tuple[int, int]]:
         """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
 
@@ -733,6 +815,14 @@ class BlockSolution(_NetworkSolution):
 
         Empty where observations and weights give one.
         """
+
+    @property
+    def state(self) -> BlockState:
+        """Where the adjustment has ended."""
+
+    @property
+    def lost_digits(self) -> float:
+        """About how large a part of the variances rounding may be in the datum that it was taken to."""
 
     @property
     def weak_unknowns(self) -> list[tuple[int, int]]:
@@ -1100,7 +1190,7 @@ def orient_model(
     tolerance
         Fraction of its standard deviation by which no unknown changes any more (rigorous method).
     threads
-        Number of threads; 0 leaves it to the core (see `adjust_block`).
+        Number of threads; 0 leaves it to the core (see `BlockNetwork`).
     trace
         Whether the report's methods keep what each cycle computed on its way.
 
@@ -1381,7 +1471,7 @@ class StellarProblem:
         fraction
             Converged when no unknown changes by more than this fraction of its standard deviation.
         max_iterations, covariance, threads, progress
-            As for `adjust_block`.
+            As for `block_network`.
         whole
             Whether to compute the cofactors of every two parameters, where there are cofactors.
 
@@ -1582,7 +1672,7 @@ def adjust_collection(
     memory
         Bytes that the adjustment may take; None for any number.
     progress
-        See :func:`adjust_block`.
+        See :class:`BlockNetwork`.
 
     Raises
     ------

@@ -1,15 +1,15 @@
 """Networks with start values, and what may go wrong with them."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from photogram import Attitudes, Block
 from photogram.geometry import rotation_angles, rotation_matrix
+from shared_data import SHARED
 
-NETWORKS = Path(__file__).parents[3] / "shared" / "data" / "network"
+NETWORKS = SHARED / "network"
 PITCH = 0.006
 HALF = {"aerial": [115.0, 115.0], "selfcal": [18.0, 12.0]}
 

@@ -9,7 +9,7 @@ from photogram import Camera, InputError, RankError, Spheroid, adjust, hints, si
 from photogram.adjustment.hints import verdicts
 from photogram.adjustment.regression import eligible, regressions, spread, view
 from photogram.geometry import project
-from photogram.giant import Project, check
+from photogram.giant import Project, check, write_project
 from photogram.network.directions import image_directions, without_lenses
 from photogram.network.observations import Distance
 
@@ -261,6 +261,22 @@ def test_adjustments_that_fail_tell_hints():
     ) as raised:
         adjust(block.replace(principal_distances=-block.principal_distances))
     assert raised.value.points
+
+
+def test_the_command_line_tells_them(run, tmp_path):
+    block = aerial(9)
+    for name, changed, said in (
+        ("down", {"image_xy": block.image_xy * [1, -1]}, "y of the images has the wrong sign"),
+        (
+            "sign",
+            {"principal_distances": -block.principal_distances},
+            "hint: probably the principal distance",
+        ),
+    ):
+        write_project(Project.from_block(block.replace(**changed)), tmp_path / name)
+        done = run("giant", "adjust", tmp_path / name)
+        assert done.exit_code != 0
+        assert said in " ".join(done.output.split())
 
 
 def test_good_adjustments_look_for_none(monkeypatch):

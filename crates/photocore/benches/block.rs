@@ -112,7 +112,7 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
 /// The block with one camera for all photographs, its focal length and two radial terms free.
 fn with_shared_camera(block: &Network) -> Network {
     let camera = Bal { focal_length: -PRINCIPAL_DISTANCE, radial: [0.0; 2] };
-    Network { cameras: vec![Camera { camera: camera.into(), sd: vec![f64::INFINITY; 3] }], ..block.clone() }
+    Network { cameras: vec![Camera::new(camera.into(), vec![f64::INFINITY; 3])], ..block.clone() }
 }
 
 /// The observation equations of a block, ready-made, so that the phases of the normal equations are timed without the model.

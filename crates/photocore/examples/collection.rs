@@ -29,9 +29,8 @@ pub fn read(text: &str) -> Result<Network, Box<dyn Error>> {
         let pose = [a, b, c, d, e, f];
         Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera }
     };
-    let camera = |&[.., f, k1, k2]: &[f64; 9]| Camera {
-        camera: Bal::with_parameters([f, k1, k2]).into(),
-        sd: vec![f64::INFINITY; 3],
+    let camera = |&[.., f, k1, k2]: &[f64; 9]| {
+        Camera::new(Bal::with_parameters([f, k1, k2]).into(), vec![f64::INFINITY; 3])
     };
     let photos = photos.as_chunks().0;
     Ok(Network {

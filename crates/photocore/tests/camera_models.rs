@@ -235,6 +235,47 @@ fn series_continue_what_they_stand_for() {
     }
 }
 
+/// What lies beyond is folded back, and cameras that see more than half of the sphere have nothing behind them.
+#[test]
+fn cameras_say_what_they_fold_and_where_they_look() {
+    let aside = |tangent: f64| Vector3::new(0.6 * tangent, -0.8 * tangent, -1.0);
+    for (name, parameters) in [
+        ("bal", vec![1000.0, -0.3, 0.0]),
+        ("radial", vec![1000.0, 500.0, 500.0, -0.3, 0.0]),
+        ("simple_radial", vec![1000.0, 500.0, 500.0, -0.3]),
+        ("brown_forward", vec![-1.0, 0.0, 0.0, -0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    ] {
+        let camera = Camera::named(name, &parameters).unwrap();
+        let limit = camera.radial_limit().unwrap().radius;
+        for (part, folded) in [(0.5, false), (0.999, false), (1.001, true)] {
+            assert_eq!(camera.folds(&aside(part * limit), [0.0; 2]), folded, "{name} {part}");
+        }
+        assert!(camera.faces(&aside(0.1)) && !camera.faces(&-aside(0.1)), "{name}");
+    }
+    let brown = [-30.0, 1.0, 2.0, -1e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let camera = Camera::named("brown", &brown).unwrap();
+    let limit = camera.radial_limit().unwrap().radius;
+    for (part, folded) in [(0.999, false), (1.001, true)] {
+        assert_eq!(camera.folds(&aside(0.1), [1.0, 2.0 - part * limit]), folded);
+    }
+    let behind = Vector3::new(0.4, 0.3, 0.2);
+    for (name, parameters, faces) in [
+        ("fisheye", vec![1.0, 1.0, 0.0, 0.0], true),
+        ("equirectangular", vec![1000.0, 500.0], true),
+        ("simple_division", vec![1.0, 0.0, 0.0, -0.2], true),
+        ("simple_division", vec![1.0, 0.0, 0.0, 0.01], false),
+        ("eucm", vec![1.0, 1.0, 0.0, 0.0, 0.7, 1.0], true),
+        ("eucm", vec![1.0, 1.0, 0.0, 0.0, 0.2, 1.0], false),
+        ("pinhole", vec![1.0, 1.0, 0.0, 0.0], false),
+    ] {
+        let camera = Camera::named(name, &parameters).unwrap();
+        assert_eq!(camera.faces(&behind), faces, "{name}");
+        let back = camera.direction(camera.image(&behind));
+        let same = back.is_some_and(|back| (back - behind.normalize()).amax() < 1e-12);
+        assert_eq!(same, faces, "{name}: {back:?}");
+    }
+}
+
 /// The last column is beside the first.
 #[test]
 fn residuals_of_a_panorama_are_wrapped() {

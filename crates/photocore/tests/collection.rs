@@ -141,7 +141,7 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
     };
     let coarse_camera = |i: usize| {
         let [focal_length, k1, k2] = [6, 7, 8].map(|k| coarse(i, k));
-        Camera { camera: Bal { focal_length, radial: [k1, k2] }.into(), sd: vec![f64::INFINITY; 3] }
+        Camera::new(Bal { focal_length, radial: [k1, k2] }.into(), vec![f64::INFINITY; 3])
     };
     let coarse_point = |i: usize| {
         let exact = position(i);
@@ -285,8 +285,7 @@ fn cameras_of_both_kinds_and_held_ones_stand_in_one_network() {
     // The exact photos with known cameras, the first a perspective of the same focal length without distortion.
     let mut network = collection(9, 80, 0.0);
     network.cameras.iter_mut().skip(1).for_each(|camera| *camera = Camera::held(camera.camera));
-    network.cameras[0] =
-        Camera { camera: Perspective { principal_distance: -1000.0 }.into(), sd: vec![f64::INFINITY] };
+    network.cameras[0] = Camera::new(Perspective { principal_distance: -1000.0 }.into(), vec![f64::INFINITY]);
     for image in network.images.iter_mut().filter(|image| image.photo == 0) {
         let ideal = network.cameras[1].camera.direction(image.xy).unwrap();
         image.xy = [-1000.0 * ideal.x / ideal.z, -1000.0 * ideal.y / ideal.z];

@@ -85,7 +85,7 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
             let known = [0.0; 3];
             let given = [&list(&observed["camera prior"]["observed"][0])[..], &known].concat();
             let sd = [&deviations("camera prior")[..], &known].concat();
-            Camera { camera: geometry::Camera::named("brown", &given).unwrap(), sd }
+            Camera::new(geometry::Camera::named("brown", &given).unwrap(), sd)
         }
     };
     let network = Network {

@@ -6,8 +6,9 @@ use std::ops::{ControlFlow, Range};
 
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64 as C;
-use photocore::adjustment::{self, Method, Status, Stop};
+use photocore::adjustment::{self, CofactorError, Method, Status, Stop};
 use photocore::geometry::{self, Bal, ObjectSpace, Perspective, PoseNumbers, RotationSense};
 use photocore::network::observations::Distance;
 use photocore::network::{
@@ -34,16 +35,16 @@ const BROWN: [f64; 11] = [-1000.0, 3.0, -5.0, -5e-8, 2e-13, 0.0, 1e-6, -2e-6, 3e
 fn cameras() -> Vec<Camera> {
     let bal = |focal_length, radial| geometry::Camera::from(Bal { focal_length, radial });
     vec![
-        Camera { camera: bal(1000.0, [0.05, -0.02]), sd: vec![FREE; 3] },
+        Camera::new(bal(1000.0, [0.05, -0.02]), vec![FREE; 3]),
         // Weighted, free, fixed.
-        Camera { camera: bal(1100.0, [0.03, 0.01]), sd: vec![0.3, FREE, 0.0] },
-        Camera { camera: bal(900.0, [-0.04, 0.02]), sd: vec![FREE, 0.004, 0.01] },
+        Camera::new(bal(1100.0, [0.03, 0.01]), vec![0.3, FREE, 0.0]),
+        Camera::new(bal(900.0, [-0.04, 0.02]), vec![FREE, 0.004, 0.01]),
         Camera::held(bal(950.0, [0.0, 0.02])),
-        Camera { camera: Perspective { principal_distance: -1050.0 }.into(), sd: vec![FREE] },
-        Camera {
-            camera: geometry::Camera::named("brown", &BROWN).unwrap(),
-            sd: vec![FREE, FREE, 0.5, FREE, FREE, 0.0, FREE, 1e-6, FREE, FREE, 0.0],
-        },
+        Camera::new(Perspective { principal_distance: -1050.0 }.into(), vec![FREE]),
+        Camera::new(
+            geometry::Camera::named("brown", &BROWN).unwrap(),
+            vec![FREE, FREE, 0.5, FREE, FREE, 0.0, FREE, 1e-6, FREE, FREE, 0.0],
+        ),
     ]
 }
 
@@ -415,12 +416,16 @@ fn what_has_no_cofactors_is_refused() {
     let mut refused = |of: Of| covariances.cofactors(&[of], None, &pool, &mut go).unwrap_err();
     assert_eq!(refused(Of::Photo(PHOTOS)), NetworkError::NoPhoto(PHOTOS));
     assert_eq!(refused(Of::Point(POINTS)), NetworkError::NoPoint(POINTS));
-    assert_eq!(refused(Of::Camera(5)), NetworkError::CameraIndex(5));
+    let cameras = network.cameras.len();
+    assert_eq!(refused(Of::Camera(cameras)), NetworkError::CameraIndex(cameras));
     let partials = covariances.propagate(&[1.0; 4], &[Of::Point(0)], &pool, &mut go).unwrap_err();
     assert_eq!(partials, NetworkError::Partials { unknowns: 3, numbers: 4 });
     let many = vec![Of::Point(0); 4000];
     let too_many = covariances.cofactors(&many, None, &pool, &mut go).unwrap_err();
-    assert!(matches!(too_many, NetworkError::Memory { needed, .. } if needed > 8 * 12_000 * 12_000));
+    let NetworkError::Cofactors(CofactorError::Memory { needed, .. }) = too_many else {
+        panic!("{too_many:?}");
+    };
+    assert!(needed > 8 * 12_000 * 12_000);
     let stopped = covariances.cofactors(&[Of::Point(0)], None, &pool, &mut |_| ControlFlow::Break(()));
     assert_eq!(stopped.unwrap_err(), NetworkError::Interrupted);
     let mut other = solution.state;
@@ -458,7 +463,7 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
         space: ObjectSpace::Rectangular,
         poses: PoseNumbers::Vectors,
         refraction: None,
-        cameras: vec![Camera::held(camera.into()), Camera { camera: camera.into(), sd: vec![FREE] }],
+        cameras: vec![Camera::held(camera.into()), Camera::new(camera.into(), vec![FREE])],
         photos: vec![],
         points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
         images: vec![],
@@ -505,7 +510,7 @@ fn what_is_not_determined_is_named_by_parameters_and_parts_of_poses() {
             space: ObjectSpace::Rectangular,
             poses: PoseNumbers::Angles(sense),
             refraction: None,
-            cameras: vec![Camera { camera: lens, sd }],
+            cameras: vec![Camera::new(lens, sd)],
             photos: vec![],
             points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
             images: vec![],
@@ -534,4 +539,78 @@ fn what_is_not_determined_is_named_by_parameters_and_parts_of_poses() {
     let parameters: Vec<_> = found.iter().flat_map(|one| one.parameters.clone()).collect();
     assert_eq!(parameters, [(0, 1), (0, 2)]);
     assert!(found.iter().all(|one| one.poses == [PosePart::Across]), "{found:?}");
+}
+
+/// The same weights one by one and as a matrix; correlated ones against what a free camera and the prior make together.
+#[test]
+fn parameters_may_be_observed_with_their_covariance() {
+    let deviations = |of: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(of).map(|sd| sd * sd));
+    let (mut one, mut matrix) = (network(), network());
+    for (camera, sd) in [(0, [0.4, 0.003, 0.004]), (2, [0.5, 0.002, 0.006])] {
+        (one.cameras[camera].sd, matrix.cameras[camera].sd) = (sd.to_vec(), sd.to_vec());
+        matrix.cameras[camera].covariance = Some(deviations(&sd));
+    }
+    let (one, matrix) = (adjust(&one, TIGHT).unwrap(), adjust(&matrix, TIGHT).unwrap());
+    for (own, other) in one.cameras.iter().zip(&matrix.cameras) {
+        for (k, sd) in own.cofactors.iter().step_by(own.parameters.len() + 1).map(|q| q.sqrt()).enumerate() {
+            assert!((own.parameters[k] - other.parameters[k]).abs() <= 1e-7 * sd);
+            assert!((own.redundancy[k] - other.redundancy[k]).abs() < 1e-8);
+            assert!((own.information[k] - other.information[k]).abs() <= 1e-8 * own.information[k]);
+        }
+        let apart = own.cofactors.iter().zip(&other.cofactors).map(|(a, b)| (a - b).abs());
+        assert!(
+            apart.fold(0.0, f64::max)
+                <= 1e-9 * own.cofactors.iter().fold(0.0, |most: f64, q| most.max(q.abs()))
+        );
+    }
+    assert!((one.sums_of_squares.total() / matrix.sums_of_squares.total() - 1.0).abs() < 1e-10);
+    assert_eq!(one.degrees_of_freedom, matrix.degrees_of_freedom);
+
+    for camera in [0, 2] {
+        let mut free = network();
+        free.cameras[camera].sd = vec![FREE; 3];
+        let before = adjust(&free, TIGHT).unwrap().cameras[camera].clone();
+        let q = DMatrix::from_row_slice(3, 3, &before.cofactors);
+        // As good as the images, and correlated otherwise.
+        let sd: Vec<f64> = (0..3).map(|k| q[(k, k)].sqrt()).collect();
+        let s = DMatrix::from_fn(3, 3, |i, j| {
+            sd[i] * sd[j] * if i == j { 1.0 } else { 0.6 - 0.5 * (i + j) as f64 / 3.0 }
+        });
+        let found = DVector::from_column_slice(&before.parameters);
+        let given = DVector::from_fn(3, |k, _| found[k] + [0.5, -0.4, 0.3][k] * sd[k]);
+        let mut weighted = network();
+        let lens = weighted.cameras[camera].camera.with_parameters(given.as_slice()).unwrap();
+        weighted.cameras[camera] = Camera { covariance: Some(s.clone()), ..Camera::new(lens, sd.clone()) };
+        let solution = adjust(&weighted, TIGHT).unwrap();
+        let after = &solution.cameras[camera];
+        let w = s.clone().try_inverse().unwrap();
+        let together = (q.clone().try_inverse().unwrap() + &w).try_inverse().unwrap();
+        let expected = &found + &together * &w * (&given - &found);
+        for k in 0..3 {
+            // The network is not quite linear.
+            assert!(
+                (after.parameters[k] - expected[k]).abs() < 2e-3 * sd[k],
+                "{} {}",
+                after.parameters[k],
+                expected[k]
+            );
+            let own = 1.0 - (&together * &w)[(k, k)];
+            assert!((after.redundancy[k] - own).abs() < 1e-2, "{} {own}", after.redundancy[k]);
+            for j in 0..3 {
+                assert!((after.cofactors[3 * k + j] - together[(k, j)]).abs() < 1e-2 * sd[k] * sd[j]);
+            }
+        }
+        let of_images = solution.images.iter().flatten().flat_map(|image| image.redundancy);
+        let of_cameras = solution.cameras.iter().flat_map(|camera| camera.redundancy.clone());
+        let of_points = solution.points.iter().flatten().flat_map(|point| point.redundancy);
+        let of_lengths = solution.observations.iter().flatten().flat_map(|own| own.redundancy.clone());
+        let total: f64 = of_images.chain(of_cameras).chain(of_points).chain(of_lengths).sum();
+        assert!(
+            (total - solution.degrees_of_freedom as f64).abs() < 1e-6,
+            "{total} {}",
+            solution.degrees_of_freedom
+        );
+        weighted.cameras[camera].covariance = Some(DMatrix::from_element(3, 3, 1.0));
+        assert_eq!(adjust(&weighted, TIGHT).unwrap_err(), NetworkError::CameraCovariance(camera));
+    }
 }

@@ -103,7 +103,7 @@ fn camera_partials<'py>(
     let values = numbers("parameters", &parameters)?;
     let camera = named(model, &values)?;
     let images: Vec<_> = rows("u", &u)?.into_iter().map(|u: [f64; 3]| camera.linearize(&u.into())).collect();
-    let by_u = images.iter().flat_map(|image| image.by_u).flat_map(|row| <[f64; 3]>::from(row)).collect();
+    let by_u = images.iter().flat_map(|image| image.by_u).flat_map(<[f64; 3]>::from).collect();
     let by_parameters = images.iter().flat_map(|image| image.by_parameters.concat()).collect();
     let count = images.len();
     Ok((

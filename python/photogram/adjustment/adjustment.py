@@ -11,18 +11,25 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.ends import behind, datum, rounded, too_coarse, undetermined
+from photogram.adjustment.ends import behind, folded, rounded, too_coarse, undetermined
 from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.undetermined import undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
-from photogram.memory import available_memory, threads_that_fit, turned
+from photogram.memory import threads_that_fit, turned
 from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
-from photogram.network.observations import observation_rows
+from photogram.network.core import CoreOptions, block_network
+from photogram.network.datum import (
+    DatumRow,
+    InnerConstraints,
+    MinimumConstraints,
+    datum_row,
+    minimum_row,
+)
 from photogram.network.refracted import check_cameras, remarks
-from photogram.network.rigs import mount_rows
+from photogram.results.datum import datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
 from photogram.results.result import Result
 
@@ -83,6 +90,7 @@ def adjust(
     loss: Loss | None = None,
     scale: float | None = None,
     fix_photos: bool = False,
+    datum: InnerConstraints | MinimumConstraints | None = None,
     ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -121,6 +129,10 @@ def adjust(
         None.
     fix_photos
         Keep positions and attitudes as they are: every point by itself.
+    datum
+        Of a block that is free: what is held (minimum constraints), or chosen points and photos that stay as
+        near as they come to their given places (inner constraints); see docs/datum.md. None: minimum
+        constraints, chosen where nothing else gives a datum.
     ordering
         How photos are ordered for elimination: in input order, in a narrow band (reverse Cuthill-McKee), by
         approximate minimum degree, by nested dissection across their positions, or across their ties alone.
@@ -142,11 +154,13 @@ def adjust(
         The observations do not determine all unknowns; names the photos and points concerned.
     AdjustmentError
         There is nothing to adjust, the initial values give no finite image coordinates, or double precision
-        is too coarse for coordinates so large; names the photos and points concerned.
+        is too coarse for coordinates so large; names the photos and points concerned. A datum was asked for,
+        and the block is not free.
     OutOfMemoryError
         The adjustment would take more memory than there is.
     InputError
-        An option that cannot be, or a photo that is not above the water of the block.
+        An option that cannot be, a datum of points and photos that do not carry it, or a photo that is not
+        above the water of the block.
     KeyboardInterrupt
         Ctrl-C.
     """
@@ -155,6 +169,8 @@ def adjust(
     checked(block)
     truth_value("covariance", covariance)
     truth_value("fix_photos", fix_photos)
+    if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
+        raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, progress)
     processors = core_threads(threads)
     row = loss_row(loss, scale)
@@ -168,70 +184,42 @@ def adjust(
             photo_positions_observed=None,
             photo_attitudes_observed=None,
         )
-    unknowns = block.unknowns
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, unknowns)
-    cameras, photo_cameras = block.core_cameras()
-    positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
-
+    inner = datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
+    options = CoreOptions(
+        criterion="percent" if as_published else "fraction",
+        limit=as_published.percent if as_published else tolerance,
+        max_iterations=as_published.max_iterations if as_published else max_iterations,
+        covariance=covariance,
+        loss=row,
+        ordering=ordering,
+        unit_variance=unit_variance,
+        minimum=minimum_row(block, datum) if isinstance(datum, MinimumConstraints) else None,
+    )
+    network = block_network(block, options)
     try:
-        solution = _photocore.adjust_block(
-            block.photo_positions,
-            block.photo_attitudes,
-            block.photo_positions if positions is None else positions,
-            block.photo_attitudes if attitudes is None else attitudes,
-            block.photo_position_sd,
-            block.photo_attitude_sd,
-            photo_cameras,
-            cameras,
-            block.point_positions,
-            block.point_sd,
-            block.image_photos,
-            block.image_points,
-            block.image_xy,
-            block.image_sd,
-            observation_groups=[group for _, group in groups],
-            unknowns=[each.row() for each in unknowns],
-            mounts=mount_rows(block.mounts, block.photo_ids, unknowns),
-            spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
-            photo_to_ground=block.photo_to_ground,
-            refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
-            criterion="percent" if as_published else "fraction",
-            limit=as_published.percent if as_published else tolerance,
-            max_iterations=as_published.max_iterations if as_published else max_iterations,
-            covariance=covariance,
-            loss=row,
-            ordering=ordering,
-            unit_variance=unit_variance,
-            threads=processors,
-            memory=None if _fits_anywhere(block) else available_memory(),
-            progress=None if progress is None else teller(progress),
-        )
+        told = None if progress is None else teller(progress)
+        solution = network.adjust(datum=inner, threads=processors, progress=told)
     except _photocore.BlockError as error:
+        if error.args[0] in ("not free", "datum"):
+            raise refused(block, network, None, error) from None
         raise hinted(_named(block, *error.args), block) from None
     with turned("the adjusted block"):
-        return with_hints(_result(block, solution, unit_variance, row, as_published))
-
-
-def _fits_anywhere(block: Block) -> bool:
-    """Whether a block is so small that asking how much memory there is would take longer than it needs.
-
-    A full factor of 100 photos takes 3 MB, and 10,000 image points with all their results 10 MB.
-    """
-    others = len(block.observations) <= 100
-    return others and len(block.photo_ids) <= 100 and len(block.image_xy) <= 10_000
+        return with_hints(_result(block, solution, options, inner, as_published))
 
 
 def _result(
     block: Block,
     solution: _photocore.BlockSolution,
-    unit_variance: UnitVariance,
-    row: tuple[str, float] | None,
+    options: CoreOptions,
+    inner: DatumRow | None,
     as_published: AsPublished | None,
 ) -> Result:
-    messages = _messages(block, solution) + remark(row, solution.image_weights)
+    datum = datum_of(block, solution, inner)
+    messages = datum_messages(block, datum, solution.point_rays) + _messages(block, solution)
+    messages += remark(options.loss, solution.image_weights)
     if as_published:
         messages += _rises([Iteration(*row) for row in solution.iterations])
-    return Result.from_solution(block, solution, unit_variance, row, messages)
+    return Result.from_solution(block, solution, options, datum, messages)
 
 
 def teller(
@@ -289,13 +277,12 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
         by_reason.setdefault(reason, []).append(block.point_ids[point])
     error = None if solution.undetermined is None else _named(block, *solution.undetermined)
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
-    messages += behind(block, solution)
+    messages += behind(block, solution) + folded(block, solution)
     messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
     dropped = {block.point_ids[point] for point, _ in solution.dropped}
     lost = [each.name for each in block.observations if dropped.intersection(each.points)]
     if lost:
         messages.append(Message(f"left out with their points: {listed(lost)}"))
-    messages = datum(block, solution) + messages
     return messages + remarks(block, solution.photo_positions)
 
 

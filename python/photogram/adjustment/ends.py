@@ -14,7 +14,7 @@ from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["behind", "datum", "hidden", "rounded", "too_coarse", "undetermined"]
+__all__ = ["behind", "folded", "hidden", "rounded", "too_coarse", "undetermined"]
 
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
@@ -36,21 +36,6 @@ def undetermined(
             )
         )
     return messages
-
-
-def datum(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Remark on what a block without control rests on: the weights of its photos, or what was held."""
-    held = np.isfinite(block.point_sd) & (solution.point_rays > 0)[:, np.newaxis]
-    if solution.datum:
-        return [
-            Message(
-                "there is no control, and nothing else gives a datum: held at their initial values are"
-                f" {_unknowns(block, solution.datum)}; coordinates and standard deviations refer to these"
-            )
-        ]
-    if held.any() or block.observations or (block.photo_position_sd == 0).all():
-        return []
-    return [Message("there is no control: the datum of the block rests on the weights of its photos")]
 
 
 def _unknowns(
@@ -105,6 +90,22 @@ def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     points = [block.point_ids[point] for point in np.unique(block.image_points[images])]
     photos = [block.photo_ids[photo] for photo in np.unique(block.image_photos[images])]
     return hidden(len(images), points, photos)
+
+
+def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+    """Remark on images beyond where the radial terms of a lens are one-to-one: they fit two directions."""
+    images = solution.images_folded
+    if not len(images):
+        return []
+    points = listed([block.point_ids[point] for point in np.unique(block.image_points[images])])
+    photos = listed([block.photo_ids[photo] for photo in np.unique(block.image_photos[images])])
+    count = "1 image point lies" if len(images) == 1 else f"{len(images)} image points lie"
+    return [
+        Message(
+            f"{count} beyond where the lens of the camera is one-to-one: its radial terms fold back there,"
+            f" and the result is not to be trusted: points {points} on photos {photos}"
+        )
+    ]
 
 
 def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:

@@ -114,9 +114,24 @@ def hints(block: Block | Result) -> list[Message]:
     if isinstance(block, Result):
         return hints(block.block) or (weight_hints(block) if block.converged else [])
     with np.errstate(all="ignore"):
-        block = without_lenses(checked(block))
+        block = _of_frames(without_lenses(checked(block)))
         found = [Message(verdict.text) for verdict in verdicts(block)]
         return [*found, *_latitudes(block), *(_readings(block) if not found else []), *_bars(block)]
+
+
+def _of_frames(block: Block) -> Block:
+    """Return a block without the images of mounted photos, whose poses are not those that it gives."""
+    mounted = {each.photo for each in block.mounts}
+    if not mounted:
+        return block
+    own = np.array([photo not in mounted for photo in block.photo_ids])[block.image_photos]
+    return block.replace(
+        mounts=(),
+        image_photos=block.image_photos[own],
+        image_points=block.image_points[own],
+        image_xy=block.image_xy[own],
+        image_sd=block.image_sd[own],
+    )
 
 
 def hinted(error: AdjustmentError, block: Block) -> AdjustmentError:

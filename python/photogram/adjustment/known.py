@@ -11,6 +11,7 @@ from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Attitude, Control, Position
+from photogram.network.unknowns import Boresight, LeverArm
 
 __all__ = ["Cartesian", "Known"]
 
@@ -119,16 +120,22 @@ def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: F
     positions = [each for each in block.observations if isinstance(each, Position)]
     for antenna in positions:
         centres[place[antenna.photo]] = axes.positions(antenna.observed[np.newaxis, :3])[0]
+        if antenna.shift is not None and axes.spheroid is None:
+            centres[place[antenna.photo]] -= antenna.shift.position
     for each in block.observations:
         if isinstance(each, Attitude):
             row = place[each.photo]
-            own = each.observed[:9].reshape(3, 3) @ each.observed[9:18].reshape(3, 3).T
+            given, known = each.boresight, each.observed[9:18].reshape(3, 3)
+            boresight = given.attitude if isinstance(given, Boresight) else known
+            own = each.observed[:9].reshape(3, 3) @ boresight.T
             at = axes.from_cartesian(centres[row : row + 1])
             turned[row] = axes.from_local(own[np.newaxis], at)[0]
     for antenna in positions:
         row = place[antenna.photo]
         if np.isfinite(turned[row]).all():
-            centres[row] -= turned[row] @ antenna.observed[3:6]
+            unknown = antenna.lever_arm
+            arm = unknown.position if isinstance(unknown, LeverArm) else antenna.observed[3:6]
+            centres[row] -= turned[row] @ arm
 
 
 def _control(block: Block, axes: Cartesian) -> tuple[Floats, Floats]:

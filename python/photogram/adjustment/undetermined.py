@@ -113,8 +113,8 @@ def in_words(names: set[str], poses: set[str]) -> str:
         return "principal distance and scale of the network: a distance or control tells them apart"
     if names <= _POINTS and poses & {"across", "tilt"}:
         return (
-            "principal point and position or tilt of all photos: photos turned by 90 or 180 degrees about"
-            " their axes tell them apart"
+            "principal point and position or tilt of all photos: relief, convergent photos or, where points"
+            " are unknown, photos turned by 90 or 180 degrees about their axes tell them apart"
         )
     if names <= _POINTS | _DECENTRING and names & _DECENTRING and names & _POINTS:
         return "decentring and principal point, as with long lenses: leave the decentring out"

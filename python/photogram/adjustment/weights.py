@@ -66,7 +66,8 @@ def _kinds(result: Result) -> Iterator[_Kind]:
     redundancy = float(np.nansum(result.redundancy))
     yield _Kind("image coordinates", result.sums_of_squares.plates, redundancy, result.standardized)
     for name, observed in (("control", result.control), ("positions and attitudes", result.stations)):
-        square = float(np.nansum((observed.residuals / observed.sd) ** 2))
+        weighted = (observed.sd > 0) & np.isfinite(observed.sd)
+        square = float(((observed.residuals[weighted] / observed.sd[weighted]) ** 2).sum())
         yield _Kind(name, square, float(np.nansum(observed.redundancy)), observed.standardized)
     for kind in result.kinds.values():
         yield _Kind(

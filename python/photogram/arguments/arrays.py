@@ -19,6 +19,7 @@ from photogram.errors import InputError
 __all__ = [
     "frozen",
     "indices",
+    "is_covariance",
     "length",
     "names",
     "number",
@@ -31,6 +32,9 @@ __all__ = [
     "truth_value",
     "whole_number",
 ]
+
+_SYMMETRIC = 1e-9
+"""What a covariance matrix may be unsymmetric by, relative to its diagonal."""
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -271,6 +275,16 @@ def shown(value: object) -> str:
         return ascii(value)[:80]
     except Exception:  # a foreign object may fail at anything, a deep one at its depth
         return f"a {type(value).__name__}"
+
+
+def is_covariance(matrix: NDArray[np.float64]) -> bool:
+    """Whether a square matrix is one of covariances: symmetric, positive definite."""
+    variances = np.diag(matrix)
+    if not (np.isfinite(matrix).all() and (variances > 0).all()):
+        return False
+    correlations = matrix / np.sqrt(np.outer(variances, variances))
+    symmetric = np.abs(correlations - correlations.T).max() <= _SYMMETRIC
+    return bool(symmetric and np.linalg.eigvalsh(correlations).min() > 0)
 
 
 def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -307,7 +307,7 @@ class Block:
             return camera_rows(self.cameras), self.photo_cameras
         distances = self.known_distances("the adjustment").tolist()
         places = {distance: row for row, distance in enumerate(dict.fromkeys(distances))}
-        rows: list[CameraRow] = [("perspective", [distance], [0.0]) for distance in places]
+        rows: list[CameraRow] = [("perspective", [distance], [0.0], None) for distance in places]
         return rows, np.array([places[distance] for distance in distances], dtype=np.int64)
 
     def known_distances(self, what: str) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import number, one_of, shaped, shown, text
+from photogram.arguments.arrays import is_covariance, number, one_of, shaped, shown, text
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 
@@ -21,8 +21,9 @@ __all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "checked_cameras",
 ImageUnit = Literal["mm", "px"]
 """What image coordinates are measured in."""
 
-CameraRow = tuple[str, list[float], list[float]]
-"""Model, parameters and their standard deviations, as the core takes a camera."""
+CameraRow = tuple[str, list[float], list[float], list[float] | None]
+"""Model, parameters, their standard deviations, and the covariance matrix of those that are weighted, row by
+row, where these are correlated: as the core takes a camera."""
 
 _GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta"})
 """Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras. Where w and h
@@ -54,12 +55,16 @@ class Camera:
     unit
         Of image coordinates, `mm` or `px`. None: `px` where the model has a focal length `f` or `fx`, `mm`
         where it has a principal distance `c`.
+    covariance
+        Names of parameters that were observed together, as by a calibration of its own, and their (w, w)
+        covariance matrix; they need not stand in `sd`.
 
     Raises
     ------
     InputError
         A model or a parameter that there is not, a principal distance that is missing or zero, values that
-        are not finite, negative standard deviations, a constant of the model that is not held.
+        are not finite, negative standard deviations, a constant of the model that is not held, a matrix
+        that is not symmetric and positive definite or contradicts `sd`.
     """
 
     model: str
@@ -67,6 +72,7 @@ class Camera:
     sd: Mapping[str, float] | float = 0.0
     name: str = ""
     unit: ImageUnit | None = None
+    covariance: tuple[Sequence[str], ArrayLike] | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, str) or self.model not in _photocore.CAMERAS:
@@ -76,6 +82,7 @@ class Camera:
             self._set("unit", "mm" if "c" in self.names else "px")
         one_of("unit", self.unit, get_args(ImageUnit))
         self._set("parameters", self._checked_parameters())
+        self._set("covariance", self._checked_covariance())
         self._set("sd", self._checked_sd())
 
     def _set(self, name: str, value: object) -> None:
@@ -174,12 +181,56 @@ class Camera:
         else:
             own = number(f"sd of the camera {self.title}", self.sd)
             given = {name: own for name in self.names if name not in self.constants}
+        given |= self._of_covariance(given if isinstance(self.sd, Mapping) else {})
         for name, value in given.items():
             if not value >= 0:
                 raise InputError(f"sd of {name} of the camera {self.title} is no standard deviation: {value}")
             if value > 0 and name in self.constants:
                 raise InputError(f"{name} of the camera {self.title} is a constant: its sd is 0")
         return {name: given.get(name, 0.0) for name in self.names}
+
+    def _checked_covariance(self) -> tuple[tuple[str, ...], Floats] | None:
+        if self.covariance is None:
+            return None
+        what = f"covariance of the camera {self.title}"
+        try:
+            of, matrix = self.covariance
+            listed = tuple(of)
+        except (TypeError, ValueError):
+            raise InputError(f"{what} is no pair of names and a matrix: {shown(self.covariance)}") from None
+        self._named("covariance", dict.fromkeys(listed, 0.0))
+        if not listed or len(set(listed)) < len(listed):
+            raise InputError(f"{what}: names are missing, or stand there more than once")
+        found = shaped(what, matrix, (len(listed), len(listed)))
+        if not is_covariance(found):
+            raise InputError(f"{what} is not symmetric and positive definite: {found.tolist()}")
+        return listed, found
+
+    def _of_covariance(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Return the standard deviations that the covariance matrix has."""
+        if self.covariance is None:
+            return {}
+        names, matrix = self.covariance
+        own = dict(zip(names, np.sqrt(np.diag(np.asarray(matrix))).tolist(), strict=True))
+        for name in given.keys() & own.keys():
+            if not math.isclose(given[name], own[name], rel_tol=1e-9):
+                raise InputError(
+                    f"sd of {name} of the camera {self.title} is not that of its covariance matrix"
+                )
+        return own
+
+    @property
+    def prior_covariance(self) -> Floats | None:
+        """Covariance matrix of all weighted parameters, in their order; None where none are correlated."""
+        if self.covariance is None:
+            return None
+        names, matrix = self.covariance
+        weighted = [name for name in self.names if 0 < self._sd[name] < math.inf]
+        whole = np.diag([self._sd[name] ** 2 for name in weighted])
+        rows = [weighted.index(name) for name in names]
+        own = np.asarray(matrix)
+        whole[np.ix_(rows, rows)] = (own + own.T) / 2
+        return whole
 
     def project(self, u: ArrayLike) -> Floats:
         """Return the images of directions.
@@ -312,4 +363,12 @@ def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> 
 
 def camera_rows(cameras: Sequence[Camera]) -> list[CameraRow]:
     """Return cameras as the core takes them."""
-    return [(each.model, each.values.tolist(), each.deviations.tolist()) for each in cameras]
+    return [
+        (
+            each.model,
+            each.values.tolist(),
+            each.deviations.tolist(),
+            None if each.prior_covariance is None else each.prior_covariance.ravel().tolist(),
+        )
+        for each in cameras
+    ]

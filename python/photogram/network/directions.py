@@ -26,7 +26,7 @@ def image_directions(block: Block) -> Floats:
     order = np.argsort(of_images, kind="stable")
     ends = np.searchsorted(of_images[order], np.arange(len(cameras)), side="right")
     directions = np.full((len(order), 3), np.nan)
-    for (model, parameters, _), own in zip(cameras, np.split(order, ends[:-1]), strict=True):
+    for (model, parameters, *_), own in zip(cameras, np.split(order, ends[:-1]), strict=True):
         directions[own] = _photocore.camera_rays(model, np.array(parameters), block.image_xy[own])
     return directions
 

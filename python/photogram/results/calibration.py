@@ -17,16 +17,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram import _photocore
+from photogram.network.block import ATTITUDE_COLUMNS, position_columns
 from photogram.results.cameras import AdjustedCamera
+from photogram.results.covariance import Covariances
 from photogram.results.distortion import INTERIOR
 from photogram.results.result import Result
 
-__all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "calibrations"]
+__all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
 
 LEVEL = 0.05
 """Probability that a term that is not there is called significant."""
 CORRELATED = 0.95
 """Larger correlations are named."""
+ASKED = 20
+"""Cameras whose correlations with the poses of photos are computed."""
 INSEPARABLE = 0.9999
 """R^2 above this: nothing tells the parameter from the others."""
 FROM_PRIOR = 0.05
@@ -135,6 +139,26 @@ class Correlation:
     coefficient: float
 
 
+@dataclass(frozen=True)
+class PoseCorrelation:
+    """A parameter that is correlated with one component of the poses of photos.
+
+    Attributes
+    ----------
+    parameter, component
+        Their names; a component is a coordinate, or omega, phi or kappa.
+    photos
+        The photos where the correlation is above 0.95, the largest first.
+    coefficient
+        The largest.
+    """
+
+    parameter: str
+    component: str
+    photos: tuple[str, ...]
+    coefficient: float
+
+
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """A calibrated camera.
@@ -149,6 +173,8 @@ class Calibration:
         Families of terms, tested together.
     correlations
         Pairs of its parameters that are correlated by more than 0.95, largest first.
+    poses
+        Correlations above 0.95 with positions and attitudes of photos, by parameter and component.
     removable
         The term that may be left out: the least significant one that stands alone; None where all are needed.
         Never several at once: without one of them the others have other tests.
@@ -158,6 +184,7 @@ class Calibration:
     parameters: tuple[ParameterTest, ...]
     groups: tuple[GroupTest, ...]
     correlations: tuple[Correlation, ...]
+    poses: tuple[PoseCorrelation, ...]
     removable: str | None
 
     def remarks(self) -> list[str]:
@@ -187,15 +214,24 @@ class Calibration:
 
 
 def calibrations(result: Result) -> list[Calibration]:
-    """Return what has been found of each camera with unknown parameters; none without covariances."""
-    cameras = [each for each in result.cameras if each.estimated]
-    return [_calibration(result, each) for each in cameras if np.isfinite(each.cofactors).all()]
+    """Return what has been found of each camera with unknown parameters; none without covariances.
+
+    Correlations with the poses of photos take a factor of the normal equations, and a solution for each
+    parameter; they are computed of the first 20 cameras.
+    """
+    cameras = [each for each in result.cameras if each.estimated and np.isfinite(each.cofactors).all()]
+    covariances = result.covariances() if cameras else None
+    return [
+        _calibration(result, each, covariances if number < ASKED else None)
+        for number, each in enumerate(cameras)
+    ]
 
 
-def _calibration(result: Result, camera: AdjustedCamera) -> Calibration:
+def _calibration(result: Result, camera: AdjustedCamera, covariances: Covariances | None) -> Calibration:
     parameters = tuple(_parameter(result, camera, k) for k in camera.estimated)
     groups = tuple(_group(result, camera, names) for names in _families(camera))
-    return Calibration(camera, parameters, groups, _correlations(camera), _removable(parameters))
+    poses = () if covariances is None else _poses(result, camera, covariances)
+    return Calibration(camera, parameters, groups, _correlations(camera), poses, _removable(parameters))
 
 
 def _a_posteriori(result: Result) -> bool:
@@ -263,6 +299,25 @@ def _correlations(camera: AdjustedCamera) -> tuple[Correlation, ...]:
         if abs(table[i, j]) > CORRELATED
     ]
     return tuple(sorted(pairs, key=lambda pair: -abs(pair.coefficient)))
+
+
+def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> tuple[PoseCorrelation, ...]:
+    rows = camera.estimated
+    found = covariances.covariance(("camera", camera.name), ("photo", None))[rows]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        table = np.abs(found / np.outer(camera.sd[rows], result.photo_sd.ravel()))
+    table = table.reshape(len(rows), -1, 6)
+    components = [*position_columns(result.block), *ATTITUDE_COLUMNS]
+    pairs = []
+    for row, k in zip(table, rows, strict=True):
+        for column, component in enumerate(components):
+            order = np.argsort(-np.nan_to_num(row[:, column]), kind="stable")
+            above = order[np.nan_to_num(row[order, column]) > CORRELATED]
+            if above.size:
+                photos = tuple(result.block.photo_ids[photo] for photo in above.tolist())
+                name = component.removesuffix("_deg")
+                pairs.append(PoseCorrelation(camera.names[k], name, photos, float(row[above[0], column])))
+    return tuple(sorted(pairs, key=lambda pair: -pair.coefficient))
 
 
 def _removable(parameters: tuple[ParameterTest, ...]) -> str | None:

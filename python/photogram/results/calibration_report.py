@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ __all__ = ["calibration_members", "calibration_sections"]
 
 LISTED = 20
 """Cameras that a report describes in full; the table of cameras and the JSON document have all."""
+NAMED = 3
+"""Photos that are named of each correlation."""
 RADII = 9
 """Radii of a curve in the report."""
 
@@ -95,11 +98,20 @@ def _group_lines(found: Calibration) -> list[str]:
 
 
 def _correlation_lines(found: Calibration) -> list[str]:
-    if not found.correlations:
-        return ["", "no two parameters are correlated by more than 0.95"]
-    return ["", "correlated by more than 0.95:"] + [
-        f"  {each.first} and {each.second}: {each.coefficient:.4f}" for each in found.correlations
+    if not (found.correlations or found.poses):
+        return ["", "no parameter is correlated with another, or with a pose, by more than 0.95"]
+    pairs = [f"  {each.first} and {each.second}: {each.coefficient:.4f}" for each in found.correlations]
+    pairs += [
+        f"  {each.parameter} and {each.component} of {_first_photos(each.photos)}: {each.coefficient:.4f}"
+        for each in found.poses
     ]
+    return ["", "correlated by more than 0.95:", *pairs]
+
+
+def _first_photos(photos: Sequence[str]) -> str:
+    """Name three photos at the most."""
+    named = f"photo {', '.join(photos[:NAMED])}"
+    return named if len(photos) <= NAMED else f"{named} and {len(photos) - NAMED} others"
 
 
 def _curve_lines(curve: DistortionCurve, unit: str) -> list[str]:
@@ -176,6 +188,15 @@ def _member(result: Result, found: Calibration) -> dict[str, Any]:
         "correlations": [
             {"first": each.first, "second": each.second, "coefficient": each.coefficient}
             for each in found.correlations
+        ],
+        "pose_correlations": [
+            {
+                "parameter": each.parameter,
+                "component": each.component,
+                "photos": list(each.photos),
+                "coefficient": each.coefficient,
+            }
+            for each in found.poses
         ],
         "removable": found.removable,
         "remarks": found.remarks(),

@@ -91,6 +91,13 @@ class AdjustedCamera:
         sd = self.given.deviations
         return np.flatnonzero((sd > 0) & np.isfinite(sd)).tolist()
 
+    def observed(self) -> Camera:
+        """Return the camera as an observation for other adjustments: estimated parameters and covariances."""
+        rows = self.estimated
+        names = [self.names[k] for k in rows]
+        covariance = (names, self.covariance[np.ix_(rows, rows)]) if names else None
+        return self.camera.replace(sd=0.0, covariance=covariance)
+
     def value(self, name: str) -> float:
         """Return an adjusted parameter."""
         return self.camera.parameters[name]

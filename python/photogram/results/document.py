@@ -42,6 +42,7 @@ def _document(result: Result) -> dict[str, Any]:
             "difference": "adjusted minus supplied",
             "control, stations": "residual: observed minus adjusted; sd 0: fixed, null: free or not held",
         },
+        "datum": result.datum.document(),
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
         "status": result.status,
         "problems": problems_of(result),

@@ -142,6 +142,7 @@ def _adjustment(result: Result) -> list[str]:
         ),
         ("object space", "geographic" if block.geographic else "rectangular"),
         ("rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
+        ("datum", str(result.datum)),
         ("refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
     ]
     return [f"{name:<36}{value}" for name, value in rows]
@@ -256,9 +257,15 @@ def _images(result: Result) -> list[str]:
     return image_lines(result, block.image_photos, block.photo_ids, block.point_ids, *image_unit(result))
 
 
+def _datum(result: Result) -> list[str]:
+    """Say what standard deviations refer to, where they would be others in another datum."""
+    return [f"standard deviations: {result.datum}"] if result.datum.is_chosen else []
+
+
 def _photos(result: Result) -> list[str]:
     position, sd_position = _position_formats(result)
     lines = [
+        *_datum(result),
         f"{'photo':<10}{_position_head(result)}{'omega deg':>15}{'phi deg':>15}{'kappa deg':>15}",
         f"{'':<10}{_sd_head(result)}{'sd arcsec':>15}{'sd arcsec':>15}{'sd arcsec':>15}",
     ]
@@ -286,7 +293,11 @@ def _held_cameras(result: Result) -> list[str]:
 
 def _points(result: Result) -> list[str]:
     position, sd_position = _position_formats(result)
-    lines = [f"{'point':<10}{_position_head(result)}  rays  kind", f"{'':<10}{_sd_head(result)}"]
+    lines = [
+        *_datum(result),
+        f"{'point':<10}{_position_head(result)}  rays  kind",
+        f"{'':<10}{_sd_head(result)}",
+    ]
     rows = zip(
         result.block.point_ids,
         result.point_positions,

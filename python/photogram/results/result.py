@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.network.core import CoreOptions, block_network
+from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
+from photogram.results.covariance import Covariances, Propagated
+from photogram.results.datum import (
+    ResultDatum,
+    datum_messages,
+    datum_of,
+    inner_datum,
+    refused,
+    relative_datum,
+)
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
+from photogram.results.selection import Adjusted, Selection, photo_components, point_components
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from photogram import _photocore
 
 __all__ = ["Result", "SumsOfSquares"]
 
@@ -92,6 +103,10 @@ class Result(AdjustedNetwork):
         `block.unknowns`.
     dropped
         Points left out, with the reason.
+    datum
+        What coordinates and standard deviations refer to.
+    options, state
+        How the core adjusted the block, and where that ended: what covariances are computed from.
     """
 
     block: Block
@@ -106,14 +121,17 @@ class Result(AdjustedNetwork):
     cameras: tuple[AdjustedCamera, ...]
     unknowns: tuple[AdjustedUnknown, ...]
     dropped: Mapping[str, str]
+    datum: ResultDatum
+    options: CoreOptions
+    state: _photocore.BlockState
 
     @classmethod
     def from_solution(
         cls,
         block: Block,
         solution: _photocore.BlockSolution,
-        unit_variance: str,
-        loss: tuple[str, float] | None,
+        options: CoreOptions,
+        datum: ResultDatum,
         messages: list[Message],
     ) -> Self:
         """Take over what the core found."""
@@ -123,14 +141,107 @@ class Result(AdjustedNetwork):
             solution,
             block=block.kept(),
             messages=messages,
-            loss=loss,
+            loss=options.loss,
+            options=options,
+            datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
-            unit_variance=unit_variance,
+            unit_variance=options.unit_variance,
             kinds=observed_kinds(block, solution),
             cameras=adjusted_cameras(block, solution, scale),
             unknowns=adjusted_unknowns(block, solution, scale),
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
         )
+
+    def covariances(self) -> Covariances:
+        """Return an object that answers for covariances of anything with anything, from one factor.
+
+        The normal equations are formed and factored once, at the adjusted values; the object keeps the
+        factor, as long as you keep the object.
+
+        Raises
+        ------
+        OutOfMemoryError
+            The factor would take more memory than there is.
+        KeyboardInterrupt
+            Ctrl-C.
+        """
+        network = block_network(self.block, self.options)
+        return Covariances(adjusted(self), network, self.state, self.covariance_scale)
+
+    def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
+        """Return the joint covariance matrix of a selection, or that of one with another.
+
+        For several questions ask one object: :meth:`covariances`, which says what a selection is and what
+        errors there are.
+        """
+        return self.covariances().covariance(a, b)
+
+    def propagate(
+        self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
+    ) -> Propagated:
+        """Return a function of adjusted unknowns with its covariance; see `Covariances.propagate`."""
+        return self.covariances().propagate(function, unknowns, bias=bias)
+
+    def in_datum(self, datum: InnerConstraints) -> Self:
+        """Return the result in another datum, without adjusting again (S-transformation, docs/datum.md).
+
+        Residuals, redundancy numbers, test values and the variance of unit weight are the same in all.
+
+        Raises
+        ------
+        InputError
+            Points or photos that are not there, or that do not carry the datum.
+        AdjustmentError
+            The block is not free: the message says what gives its datum.
+        OutOfMemoryError, KeyboardInterrupt
+            As :meth:`covariances`.
+        """
+        return self._in(datum_row(self.block, inner_datum(datum)))
+
+    def relative_to(self, *, photo: str | None = None, points: Sequence[str] | None = None) -> Self:
+        """Return the result with covariances relative to a photo or to points, whether or not it is free.
+
+        They are those that holding the pose of the photo, or the mean position and orientation of the points,
+        would give; scale stays as it is. Adjusted values stay, too.
+
+        Raises
+        ------
+        InputError
+            Neither or both, names that are not there, points on one line.
+        OutOfMemoryError, KeyboardInterrupt
+            As :meth:`covariances`.
+        """
+        return self._in(relative_datum(self.block, photo, points))
+
+    def _in(self, row: DatumRow) -> Self:
+        block = self.block
+        network = block_network(block, self.options)
+        try:
+            solution = network.in_datum(self.state, row, threads=0, progress=None)
+        except _photocore.BlockError as error:
+            raise refused(block, network, self.state, error) from None
+        datum = datum_of(block, solution, row)
+        before = datum_messages(block, self.datum, self.point_rays)
+        kept = [message for message in self.messages if message not in before]
+        return replace(
+            self,
+            photo_positions=solution.photo_positions,
+            photo_attitudes=solution.photo_attitudes,
+            photo_cofactors=solution.photo_cofactors,
+            point_positions=solution.point_positions,
+            point_cofactors=solution.point_cofactors,
+            cameras=adjusted_cameras(block, solution, self.covariance_scale),
+            unknowns=adjusted_unknowns(block, solution, self.covariance_scale),
+            datum=datum,
+            state=solution.state,
+            messages=[*datum_messages(block, datum, self.point_rays), *kept],
+        )
+
+    def _table(self, what: str) -> pd.DataFrame:
+        """Return what the result says about one kind of thing; `attrs` name the datum."""
+        table = super()._table(what)
+        table.attrs["datum"] = str(self.datum)
+        return table
 
     @property
     def image_points(self) -> Indices:
@@ -223,6 +334,47 @@ class Result(AdjustedNetwork):
 def _least_turns(angles: Floats) -> Floats:
     """Take away whole turns."""
     return np.asarray(angles - math.tau * np.round(angles / math.tau))
+
+
+def adjusted(result: Result) -> Adjusted:
+    """Return the adjusted values of a result by kinds and names."""
+    block = result.block
+    photos = np.hstack([result.photo_positions, result.photo_attitudes])
+    of_photos = [photo_components(block)] * len(photos)
+    steps = (*point_components(block), "rho x", "rho y", "rho z")
+    # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
+    cameras, unknowns = result.cameras, result.unknowns
+    return Adjusted(
+        block=block,
+        ids={
+            "photo": block.photo_ids,
+            "step": block.photo_ids,
+            "point": block.point_ids,
+            "camera": [each.name for each in cameras],
+            "unknown": [each.name for each in unknowns],
+        },
+        components={
+            "photo": of_photos,
+            "step": [steps] * len(photos),
+            "point": [point_components(block)] * len(block.point_ids),
+            "camera": [each.names for each in cameras],
+            "unknown": [each.components for each in unknowns],
+        },
+        values={
+            "photo": photos,
+            "step": photos,
+            "point": result.point_positions,
+            "camera": [each.values for each in cameras],
+            "unknown": [each.values for each in unknowns],
+        },
+        sd={
+            "photo": result.photo_sd,
+            "step": result.photo_sd,
+            "point": result.point_sd,
+            "camera": [each.sd for each in cameras],
+            "unknown": [each.sd for each in unknowns],
+        },
+    )
 
 
 AdjustedBlock = Result

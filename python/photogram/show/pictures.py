@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.quiver import Quiver
 
-__all__ = ["arrows", "drawn", "files", "new_figure", "open_frame", "round_length"]
+__all__ = ["arrows", "drawn", "ellipses", "files", "new_figure", "open_frame", "round_length"]
 
 DPI = 120
 """Dots an inch of pictures that are made of dots."""
@@ -64,6 +66,18 @@ def arrows(axes: Axes, places: Floats, vectors: Floats, scale: float = 1.0, **st
     axes.update_datalim(ends)
     axes.autoscale_view()
     return drawn
+
+
+def ellipses(axes: Axes, places: Floats, covariances: Floats, scale: float = 1.0, **style: Any) -> None:
+    """Draw standard ellipses (39 percent) of (n, 2, 2) covariances about (n, 2) places, magnified."""
+    around = np.linspace(0.0, math.tau, 73)
+    circle = np.stack([np.cos(around), np.sin(around)])
+    variances, turned = np.linalg.eigh(covariances)
+    for place, variance, turn in zip(places, variances, turned, strict=True):
+        outline = place[:, np.newaxis] + scale * turn @ (
+            np.sqrt(np.maximum(variance, 0.0))[:, np.newaxis] * circle
+        )
+        axes.plot(*outline, **style)
 
 
 def open_frame(axes: Axes) -> None:

@@ -197,6 +197,9 @@ fn moved<M: Model>(
     let (mut before, mut stalls) = (f64::INFINITY, 0);
     for _ in 0..MOST_MOVES {
         let (motions, kept) = motions_of(problem, &unknowns, datum, pool).ok_or(DatumError::NotFree)?;
+        if motions.vectors.is_empty() {
+            return Err(DatumError::NotCarried);
+        }
         let open = if datum.relative {
             Open::all(&motions)
         } else {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector};
 use rayon::ThreadPool;
 
 use super::loss::Reweighting;
@@ -81,21 +81,22 @@ pub struct Motions {
     pub preferred: Vec<usize>,
 }
 
-/// The equations, of unit weight, of three unknowns of one kept block that are weighted, and step together.
-#[derive(Debug, Clone, Copy)]
+/// The equations, of unit weight, of unknowns of one kept block, one after the other, that are weighted together: they step together, or
+/// were observed with a covariance matrix.
+#[derive(Debug, Clone)]
 pub struct Weighted {
     /// The first of the unknowns.
     pub first: usize,
-    /// Observed minus computed.
-    pub constant: Vector3<f64>,
-    /// The partials of the computed by the step, row by row; zero where nothing is observed.
-    pub coefficients: Matrix3<f64>,
+    /// Observed minus computed, as many as unknowns.
+    pub constant: DVector<f64>,
+    /// The partials of the computed by the step, square; zero where nothing is observed.
+    pub coefficients: DMatrix<f64>,
 }
 
 impl Weighted {
     /// Where the unknowns stand.
     pub(super) fn unknowns(&self) -> Range<usize> {
-        self.first..self.first + 3
+        self.first..self.first + self.constant.len()
     }
 }
 
@@ -164,7 +165,8 @@ impl<M: Model> Problem<M> {
             .map(|i| if self.is_weighted(i) { weight[i] * (self.prior[i] - values[i]) } else { 0.0 })
             .collect();
         let mut prior = Prior { weight, right, between: vec![] };
-        self.weighted(values).iter().for_each(|own| add_weighted(&mut prior, own, held));
+        let is_held = |unknown: usize| self.sd[unknown] == 0.0 || held.contains(&unknown);
+        self.weighted(values).iter().for_each(|own| add_weighted(&mut prior, own, &is_held));
         prior
     }
 
@@ -297,17 +299,18 @@ impl<M: Model> Linearized<'_, M> {
     }
 }
 
-/// Puts the equations of three unknowns that step together in the place of those of each; none is of a held one.
-fn add_weighted(prior: &mut Prior, own: &Weighted, held: &[usize]) {
-    let mut coefficients = own.coefficients;
-    let is_held = own.unknowns().map(|unknown| held.contains(&unknown)).collect::<Vec<_>>();
-    for k in (0..3).filter(|&k| is_held[k]) {
+/// Puts the equations of unknowns that are weighted together in the place of those of each; none is of a held one.
+fn add_weighted(prior: &mut Prior, own: &Weighted, is_held: &dyn Fn(usize) -> bool) {
+    let mut coefficients = own.coefficients.clone();
+    let is_held = own.unknowns().map(is_held).collect::<Vec<_>>();
+    for k in (0..is_held.len()).filter(|&k| is_held[k]) {
         coefficients.column_mut(k).fill(0.0);
     }
     let (normal, right) = (coefficients.tr_mul(&coefficients), coefficients.tr_mul(&own.constant));
-    for i in (0..3).filter(|&i| !is_held[i]) {
+    for i in (0..is_held.len()).filter(|&i| !is_held[i]) {
         (prior.weight[own.first + i], prior.right[own.first + i]) = (normal[(i, i)], right[i]);
-        prior.between.extend((0..i).map(|j| (own.first + i, own.first + j, normal[(i, j)])));
+        let others = (0..i).filter(|&j| !is_held[j]);
+        prior.between.extend(others.map(|j| (own.first + i, own.first + j, normal[(i, j)])));
     }
 }
 

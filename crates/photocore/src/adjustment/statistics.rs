@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::Matrix3;
+use nalgebra::DMatrix;
 use rayon::ThreadPool;
 
 use super::problem::{Model, Problem, Weighted};
@@ -92,8 +92,9 @@ impl<M> Problem<M> {
             let (range, width) = (layout.kept_range(kept), layout.kept_dim(kept));
             while let Some(own) = weighted.next_if(|own| own.first < range.end) {
                 let first = start + (own.first - range.start) * (width + 1);
-                let q = Matrix3::from_fn(|i, j| cofactors.kept[first + i * width + j]);
-                let shares = (own.coefficients * q * own.coefficients.transpose()).diagonal();
+                let count = own.constant.len();
+                let q = DMatrix::from_fn(count, count, |i, j| cofactors.kept[first + i * width + j]);
+                let shares = (&own.coefficients * q * own.coefficients.transpose()).diagonal();
                 for (k, unknown) in own.unknowns().enumerate().filter(|&(_, i)| self.is_weighted(i)) {
                     redundancy[unknown] = 1.0 - shares[k];
                 }

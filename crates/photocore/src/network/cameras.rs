@@ -74,6 +74,11 @@ impl Network {
         for (shared, &index) in model.shared.iter().enumerate() {
             cameras[index].take_block(model, model.cameras.len() + shared, adjustment, unknowns);
         }
+        for (camera, given) in cameras.iter_mut().zip(&self.cameras) {
+            if let Some(redundancy) = given.redundancy(&camera.cofactors) {
+                camera.redundancy = redundancy;
+            }
+        }
         cameras
     }
 
@@ -86,8 +91,7 @@ impl Network {
         unknowns: &[f64],
     ) {
         for (camera, given) in cameras.iter_mut().zip(&self.cameras).filter(|(_, given)| !given.is_held()) {
-            let weight = |&sd: &f64| if sd > 0.0 { sd.powi(2).recip() } else { 0.0 };
-            camera.information = given.sd.iter().map(weight).collect();
+            camera.information = given.weights();
         }
         let stations = model.prepare(unknowns);
         for point in 0..model.points.len() {

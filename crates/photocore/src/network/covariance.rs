@@ -32,7 +32,7 @@ pub struct State {
 pub enum NetworkDatum {
     /// Chosen points and photos are, together, as near to their given places as they come: of networks that are free.
     Inner(InnerConstraints),
-    /// Cofactors are relative to a photo, as if its pose were held where it has been adjusted to. Nothing is moved, scale stays as it is
+    /// Cofactors are relative to a photo (of one on a frame: to the frame), as if its pose were held where it has been adjusted to. Nothing is moved, scale stays as it is
     /// given or held, and the network need not be free.
     RelativeToPhoto(usize),
     /// The same with points, whose mean position and orientation count.
@@ -313,8 +313,8 @@ impl Covariances {
         let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
         let found = self.factored.cofactors(problem, rows, columns, self.memory, pool, &mut between);
         found.map_err(|error| match error {
-            CofactorError::Memory { needed, available } => NetworkError::Memory { needed, available },
             CofactorError::Adjust(error) => NetworkError::new(error, &self.assembled),
+            refused => NetworkError::Cofactors(refused),
         })
     }
 

@@ -1,6 +1,6 @@
 //! The datum of networks that are free: how they move as a whole, and what carries their datum.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::Vector6;
 
@@ -286,7 +286,9 @@ impl Assembled {
             of.map(|(index, &point)| (point, model.of_point(index).start)).collect();
         let points = inner.points.iter().filter_map(|point| first.get(point).copied());
         let photos = inner.photos.iter().filter(|&&photo| photo < model.cameras.len());
-        let photos = photos.map(|&photo| model.of_block(photo).start);
+        // The position of a photo on a frame is that of the frame.
+        let frames: BTreeSet<usize> = photos.map(|&photo| model.carrier(photo)).collect();
+        let photos = frames.into_iter().map(|photo| model.of_block(photo).start);
         let lengths = |first: usize| {
             let at = std::array::from_fn(|k| self.problem.initial[first + k]);
             let partials = Point::new(model.space, at).partials();

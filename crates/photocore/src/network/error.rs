@@ -7,7 +7,7 @@ use super::naming::PosePart;
 use super::observations::Fault;
 use super::precision::Coarse;
 use super::problem::Assembled;
-use crate::adjustment::{AdjustError, DatumError, gib};
+use crate::adjustment::{AdjustError, CofactorError, DatumError, gib};
 use crate::normals::LayoutError;
 
 /// Why a network cannot be adjusted, or has no cofactors. Photos, cameras and points are indices into the network.
@@ -48,6 +48,9 @@ pub enum NetworkError {
     /// A camera has more or fewer standard deviations than parameters.
     #[error("camera {0} has not as many standard deviations as parameters")]
     CameraDeviations(usize),
+    /// A camera has a covariance matrix that is not one of its weighted parameters.
+    #[error("camera {0} has a covariance matrix that is not that of its weighted parameters")]
+    CameraCovariance(usize),
     /// A common unknown has more or fewer standard deviations than unknowns.
     #[error("common unknown {0} has not as many standard deviations as unknowns")]
     CommonDeviations(usize),
@@ -105,6 +108,9 @@ pub enum NetworkError {
         /// Bytes that it may take.
         available: usize,
     },
+    /// More cofactors than there may be.
+    #[error(transparent)]
+    Cofactors(CofactorError),
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,

@@ -53,6 +53,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod camera_priors;
 mod cameras;
 pub mod commons;
 mod covariance;
@@ -72,6 +73,7 @@ mod weighted_angles;
 
 use std::ops::ControlFlow;
 
+use nalgebra::DMatrix;
 use rayon::ThreadPool;
 
 use crate::adjustment::{self, Adjustment, Event};
@@ -113,12 +115,19 @@ pub struct Camera {
     pub camera: geometry::Camera,
     /// Standard deviations of the parameters: infinite free, zero fixed.
     pub sd: Vec<f64>,
+    /// Covariance matrix of those that are weighted, in their order; None where these were observed one by one.
+    pub covariance: Option<DMatrix<f64>>,
 }
 
 impl Camera {
+    /// A camera whose parameters are known one by one: standard deviations, infinite free, zero fixed.
+    pub fn new(camera: geometry::Camera, sd: Vec<f64>) -> Self {
+        Self { camera, sd, covariance: None }
+    }
+
     /// A camera whose parameters are known.
     pub fn held(camera: geometry::Camera) -> Self {
-        Self { camera, sd: vec![0.0; camera.parameter_names().len()] }
+        Self::new(camera, vec![0.0; camera.parameter_names().len()])
     }
 
     /// Whether its parameters are known.
@@ -356,6 +365,9 @@ impl Network {
         for (index, camera) in self.cameras.iter().enumerate() {
             if camera.sd.len() != camera.camera.parameter_names().len() {
                 return Err(NetworkError::CameraDeviations(index));
+            }
+            if !camera.has_sound_covariance() {
+                return Err(NetworkError::CameraCovariance(index));
             }
             let known = camera.camera.parameter_names();
             let unknowns = known.len() - camera.camera.constants();

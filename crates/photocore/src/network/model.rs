@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::Matrix2x6;
 use rayon::prelude::*;
 
+use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
 use super::datum::Minimum;
 use super::mounts::{Mount, Mounted, mounted};
@@ -38,6 +39,8 @@ pub struct Bundle {
     pub shared: Vec<usize>,
     /// The kept block of each photo's camera where that is shared.
     pub camera_block: Vec<Option<usize>>,
+    /// What was observed of cameras with a covariance matrix.
+    pub camera_priors: Vec<CameraPrior>,
     /// The common unknowns.
     pub commons: Vec<PlacedCommon>,
     /// The kept block of each, unless it is known.
@@ -559,7 +562,12 @@ impl Model for Bundle {
     }
 
     fn weighted(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Weighted> {
-        self.weighted_angles(values, prior, sd)
+        let mut all = self.weighted_angles(values, prior, sd);
+        if !self.camera_priors.is_empty() {
+            all.extend(self.camera_priors.iter().map(|own| own.equations(values, prior)));
+            all.sort_by_key(|own| own.first);
+        }
+        all
     }
 
     /// Intersects the points anew.

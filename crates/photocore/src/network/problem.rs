@@ -284,6 +284,7 @@ impl Network {
             camera_block: self.photos.iter().map(block).collect(),
             shared,
             squares,
+            camera_priors: vec![],
             commons: self.commons.iter().map(place).collect(),
             common_block,
             uses_of_commons,
@@ -301,6 +302,7 @@ impl Network {
             anchor,
             minimum: None,
         };
+        bundle.camera_priors = self.camera_priors(&bundle);
         bundle.observations = self.tied_observations(screened, &bundle)?;
         Ok(bundle)
     }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::model::{Owner, Placed};
+use super::model::{Owner, Placed, Station};
 use super::problem::Assembled;
 use super::{
     AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
@@ -93,6 +93,8 @@ pub struct Solution {
     pub kinds: Vec<KindSums>,
     /// The images whose point stands behind the camera, ascending.
     pub behind: Vec<usize>,
+    /// The images beyond where the lens of their camera is one-to-one, ascending: they may belong to another direction.
+    pub folded: Vec<usize>,
     /// Why there are no cofactors although they were asked for: what the adjusted values leave undetermined.
     pub undetermined: Option<NetworkError>,
     /// What a combination of unknowns moves that is determined so weakly that no step could follow it to its end, photo and
@@ -160,6 +162,7 @@ impl Solution {
             kinds: KindSums::all(&network.observations, &observations),
             observations,
             behind: vec![],
+            folded: vec![],
             undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, assembled)),
             weak: adjustment.weak.iter().filter_map(of_photo).collect(),
             weak_cameras: adjustment.weak.iter().filter_map(|&unknown| of_camera(problem, unknown)).collect(),
@@ -187,7 +190,7 @@ impl Solution {
         solution
     }
 
-    /// Finds the images whose point stands behind the camera.
+    /// Finds the images whose point stands behind the camera, or beyond where its lens ends.
     fn find_behind(&mut self, Assembled { problem, points, .. }: &Assembled, unknowns: &[f64]) {
         let model = &problem.model;
         let photos = model.photos(&unknowns[model.of_stations()]);
@@ -195,8 +198,20 @@ impl Solution {
             points.iter().zip(model.coordinates(unknowns)).zip(model.start.windows(2))
         {
             let position = model.space.cartesian(at);
-            let hidden =
-                |&image: &usize| photos[model.images[image].photo].orientation.pose().depth(&position) < 0.0;
+            let seen = |image: usize| {
+                let Station { orientation, camera } = &photos[model.images[image].photo];
+                (camera, orientation.pose().sight(&position))
+            };
+            let hidden = |&image: &usize| {
+                let (camera, u) = seen(image);
+                !camera.faces(&u)
+            };
+            let folded = |&image: &usize| {
+                let (camera, u) = seen(image);
+                camera.folds(&u, model.images[image].xy)
+            };
+            let beyond = (images[0]..images[1]).filter(folded).map(|image| model.order[image]);
+            self.folded.extend(beyond);
             let found: Vec<usize> =
                 (images[0]..images[1]).filter(hidden).map(|image| model.order[image]).collect();
             if let Some(point) = &mut self.points[point] {
@@ -205,6 +220,7 @@ impl Solution {
             self.behind.extend(found);
         }
         self.behind.sort_unstable();
+        self.folded.sort_unstable();
     }
 }
 

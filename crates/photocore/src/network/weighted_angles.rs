@@ -1,5 +1,7 @@
 //! Angles of photos that are weighted, while the attitude steps by a rotation vector.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::model::Bundle;
 use super::observations::misalignment;
 use crate::adjustment::Weighted;
@@ -31,7 +33,12 @@ impl Bundle {
             } else {
                 angle_equations(sense, angles, observed, &sd)
             };
-            Some(Weighted { first, constant, coefficients })
+            let constant = DVector::from_column_slice(constant.as_slice());
+            Some(Weighted {
+                first,
+                constant,
+                coefficients: DMatrix::from_fn(3, 3, |i, j| coefficients[(i, j)]),
+            })
         };
         (0..self.cameras.len()).filter_map(of_photo).collect()
     }

@@ -1,5 +1,6 @@
 //! What an adjustment of a block is given: photos with their cameras, poses in angles.
 
+use nalgebra::DMatrix;
 use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
 use photocore::geometry::PoseNumbers;
@@ -20,11 +21,15 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(block_network, module)?)
 }
 
-/// Model, parameters and their standard deviations of a camera.
-type CameraRow = (String, Vec<f64>, Vec<f64>);
+/// Model, parameters and their standard deviations of a camera, covariance matrix of the weighted ones row by row.
+type CameraRow = (String, Vec<f64>, Vec<f64>, Option<Vec<f64>>);
 
-fn camera((model, parameters, sd): CameraRow) -> PyResult<Camera> {
-    Ok(Camera { camera: named(&model, &parameters)?, sd })
+fn camera((model, parameters, sd, covariance): CameraRow) -> PyResult<Camera> {
+    let square = |values: Vec<f64>| {
+        let count = values.len().isqrt();
+        DMatrix::from_row_iterator(count, count, values.into_iter().take(count * count))
+    };
+    Ok(Camera { covariance: covariance.map(square), ..Camera::new(named(&model, &parameters)?, sd) })
 }
 
 #[pyfunction]

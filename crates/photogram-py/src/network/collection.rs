@@ -95,10 +95,8 @@ fn adjust_collection(
         sd: std::array::from_fn(|k| sd[k]),
         camera,
     };
-    let own = |((_, camera), sd): (&(_, geometry::Camera), &Vec<f64>)| Camera {
-        camera: *camera,
-        sd: sd[POSE..].to_vec(),
-    };
+    let own =
+        |((_, camera), sd): (&(_, geometry::Camera), &Vec<f64>)| Camera::new(*camera, sd[POSE..].to_vec());
     let network = Network {
         space: ObjectSpace::Rectangular,
         poses: PoseNumbers::Vectors,

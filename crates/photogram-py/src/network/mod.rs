@@ -102,10 +102,13 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Datum(_) => ("datum", vec![], vec![]),
         Failure::LeftOut(point) => ("left out", vec![], vec![*point]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
-        Failure::Memory { .. } | Failure::OutOfMemory(_) => ("memory", vec![], vec![]),
+        Failure::Memory { .. } | Failure::OutOfMemory(_) | Failure::Cofactors(_) => {
+            ("memory", vec![], vec![])
+        }
         Failure::Index(_)
         | Failure::NoCamera(_)
         | Failure::CameraDeviations(_)
+        | Failure::CameraCovariance(_)
         | Failure::NoPhoto(_)
         | Failure::NoPoint(_)
         | Failure::CameraIndex(_)

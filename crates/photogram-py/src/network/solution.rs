@@ -261,6 +261,11 @@ solution_class! {
         }
 
         #[getter]
+        fn images_folded<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+            PyArray1::from_vec(py, self.solution.folded.iter().map(|&image| image as i64).collect())
+        }
+
+        #[getter]
         fn weak(&self) -> Vec<(usize, usize)> {
             self.solution.weak.clone()
         }

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.arrays import names, shaped, shown
+from photogram.arguments.arrays import is_covariance, names, shaped, shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.unknowns import Unknown, rotation
@@ -21,8 +21,6 @@ Group = tuple[str, Indices, Indices, Indices, Floats, Floats]
 
 AXES = ("X", "Y", "Z")
 ROTATIONS = ("rotation x", "rotation y", "rotation z")
-_SYMMETRIC = 1e-9
-"""What a covariance matrix may be unsymmetric by, relative to its diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,21 +161,11 @@ class Observation:
         if sd is not None or covariance is None:
             raise InputError(f"{self.name} needs either sd or covariance")
         matrix = shaped(f"covariance of {self.name}", covariance, (r, r), missing=True)
-        if not _definite(matrix[np.ix_(use, use)]):
+        if not is_covariance(matrix[np.ix_(use, use)]):
             raise InputError(
                 f"covariance of {self.name} is not symmetric and positive definite: {matrix.tolist()}"
             )
         return matrix
-
-
-def _definite(matrix: Floats) -> bool:
-    """Whether a matrix is that of covariances."""
-    variances = np.diag(matrix)
-    if not (np.isfinite(matrix).all() and (variances > 0).all()):
-        return False
-    correlations = matrix / np.sqrt(np.outer(variances, variances))
-    symmetric = np.abs(correlations - correlations.T).max() <= _SYMMETRIC
-    return bool(symmetric and np.linalg.eigvalsh(correlations).min() > 0)
 
 
 def observation_rows(

@@ -50,6 +50,9 @@ pub trait BackwardModel: Copy {
     /// The measured position that g takes to the given one.
     fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]>;
 
+    /// See [`CameraModel::folds`]; of the measured position alone.
+    fn folds(&self, measured: [f64; 2]) -> bool;
+
     /// See [`CameraModel::radial_limit`].
     fn radial_limit(&self) -> Option<RadialLimit>;
 }
@@ -104,6 +107,10 @@ impl<T: BackwardModel> CameraModel for T {
         let Corrected { xy, by_measured: [[a, b], [c, d]], .. } = self.correct(xy);
         let positive = a > 0.0 && a * d - 0.25 * (b + c) * (b + c) > 0.0;
         if positive { self.perspective().direction(xy) } else { None }
+    }
+
+    fn folds(&self, _: &Vector3, measured: [f64; 2]) -> bool {
+        BackwardModel::folds(self, measured)
     }
 
     fn correction(&self, measured: [f64; 2]) -> Option<[f64; 2]> {

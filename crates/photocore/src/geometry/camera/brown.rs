@@ -53,6 +53,14 @@ impl<const AFTER: bool> BrownCorrection<AFTER> {
     fn affine(&self) -> ([f64; 2], [f64; 2]) {
         if AFTER { ([0.0; 2], self.affinity) } else { (self.affinity, [0.0; 2]) }
     }
+
+    /// A measured position from the principal point, and as the argument of the lens.
+    #[inline(always)]
+    fn place(&self, measured: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+        let [dx, dy] = [measured[0] - self.principal_point[0], measured[1] - self.principal_point[1]];
+        let ([a1, a2], _) = self.affine();
+        ([dx, dy], [dx * (1.0 + a1) + dy * a2, dy])
+    }
 }
 
 /// 1 + R as a function of r^2.
@@ -112,9 +120,8 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
 
     #[inline(always)]
     fn correct(&self, measured: [f64; 2]) -> Corrected<[f64; 11]> {
-        let [dx, dy] = [measured[0] - self.principal_point[0], measured[1] - self.principal_point[1]];
+        let ([dx, dy], place) = self.place(measured);
         let ([a1, a2], [b1, b2]) = self.affine();
-        let place = [dx * (1.0 + a1) + dy * a2, dy];
         let bent = self.lens().bend(place);
         let [[xx, xy], [yx, yy]] = bent.by_place;
         let by_measured = [[xx * (1.0 + a1) + b1, xx * a2 + xy + b2], [yx * (1.0 + a1), yx * a2 + yy]];
@@ -148,6 +155,11 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
         })?;
         let dx = (x - a2 * y) / (1.0 + a1);
         Some([self.principal_point[0] + dx, self.principal_point[1] + y])
+    }
+
+    fn folds(&self, measured: [f64; 2]) -> bool {
+        let (_, [x, y]) = self.place(measured);
+        self.lens().radial.folds(x.hypot(y))
     }
 
     fn radial_limit(&self) -> Option<RadialLimit> {

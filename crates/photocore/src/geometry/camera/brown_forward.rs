@@ -132,6 +132,11 @@ impl CameraModel for BrownForward {
         self.perspective().direction(ideal)
     }
 
+    fn folds(&self, u: &Vector3, _: [f64; 2]) -> bool {
+        let [x, y] = self.perspective().image(u);
+        self.lens().radial.folds(x.hypot(y))
+    }
+
     fn radial_limit(&self) -> Option<RadialLimit> {
         self.lens().radial.limit()
     }

@@ -64,6 +64,10 @@ impl CameraModel for Equirectangular {
         ([column - w * (column / w).round(), measured[1] - image.xy[1]], image)
     }
 
+    fn faces(&self, _: &Vector3) -> bool {
+        true
+    }
+
     /// None above or below the picture.
     fn direction(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
         let [w, h] = self.size;

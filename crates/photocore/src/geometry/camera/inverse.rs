@@ -70,15 +70,25 @@ impl RadialFactor {
         Some(RadialLimit { radius: q.sqrt(), distorted: q.sqrt() * self.value(q).abs() })
     }
 
+    /// Whether r s has stopped to rise before a radius.
+    pub fn folds(&self, radius: f64) -> bool {
+        !self.surely_rises(&self.slope(), radius) && self.limit().is_some_and(|limit| radius > limit.radius)
+    }
+
+    /// Whether r s rises up to a radius because what the negative terms take away by then leaves something: most lenses need no root.
+    fn surely_rises(&self, slope: &[f64], radius: f64) -> bool {
+        let q = radius * radius;
+        lower_bound(slope, q) > 0.0 && lower_bound(&self.denominator, q) > 0.0
+    }
+
     /// The radius that becomes the given one; None where there is none before the limit.
     pub fn invert(&self, distorted: f64) -> Option<f64> {
         if !distorted.is_finite() {
             return None;
         }
         let slope = self.slope();
-        // Most lenses need no root: what the negative terms take away by then leaves something.
-        let certain = |q: f64| lower_bound(&slope, q) > 0.0 && lower_bound(&self.denominator, q) > 0.0;
-        if let Some(radius) = self.newton(distorted, &slope, f64::INFINITY).filter(|r| certain(r * r)) {
+        let free = self.newton(distorted, &slope, f64::INFINITY);
+        if let Some(radius) = free.filter(|&radius| self.surely_rises(&slope, radius)) {
             return Some(radius);
         }
         match self.limit() {

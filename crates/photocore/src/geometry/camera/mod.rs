@@ -1,6 +1,7 @@
 //! Cameras: from a direction in the photo's axes to an image position, with all partials.
 //!
-//! Each camera is a file with a type that implements [`CameraModel`], and a line of `cameras!` below.
+//! Each camera is a type that implements [`CameraModel`] in a file of its own, or in one with others of its family, and a line of
+//! `cameras!` below.
 
 pub mod backward;
 mod inverse;
@@ -9,7 +10,9 @@ mod radial_tangential;
 
 use super::Vector3;
 
+pub use brown::BrownCorrection;
 pub use inverse::{Matrix2, RadialLimit};
+pub use orthogonal::{Ebner12, Gruen44, Orthogonal, OrthogonalSet};
 
 /// How a camera maps u, a point in the photo's axes (it looks along -z), to image coordinates.
 ///
@@ -62,6 +65,18 @@ pub trait CameraModel: Copy {
 
     /// The unit direction in the photo's axes, in front of the camera, of an image position; None where no direction has it.
     fn direction(&self, xy: [f64; 2]) -> Option<Vector3>;
+
+    /// Whether a camera looks to where u is: in front of it, but for those that see more than half of the sphere.
+    #[inline]
+    fn faces(&self, u: &Vector3) -> bool {
+        u.z <= 0.0
+    }
+
+    /// Whether u, or what was measured of it, lies beyond where the radial part of the lens is one-to-one: its image is that of another
+    /// direction, too.
+    fn folds(&self, _u: &Vector3, _measured: [f64; 2]) -> bool {
+        false
+    }
 
     /// What a measured position is corrected to; None of a forward camera.
     fn correction(&self, _measured: [f64; 2]) -> Option<[f64; 2]> {
@@ -290,6 +305,16 @@ impl Camera {
     /// See [`CameraModel::direction`].
     pub fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
         each_camera!(self, camera => camera.direction(xy))
+    }
+
+    /// See [`CameraModel::faces`].
+    pub fn faces(&self, u: &Vector3) -> bool {
+        each_camera!(self, camera => camera.faces(u))
+    }
+
+    /// See [`CameraModel::folds`].
+    pub fn folds(&self, u: &Vector3, measured: [f64; 2]) -> bool {
+        each_camera!(self, camera => camera.folds(u, measured))
     }
 
     /// See [`CameraModel::correction`].

@@ -289,6 +289,10 @@ where
         })
     }
 
+    fn folds(&self, _: [f64; 2]) -> bool {
+        false
+    }
+
     /// They have no radial part.
     fn radial_limit(&self) -> Option<RadialLimit> {
         None

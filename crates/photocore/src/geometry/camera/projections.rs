@@ -28,6 +28,11 @@ pub trait RayProjection {
     /// A ray that goes there, of any length; None where there is none.
     fn ray(ab: [f64; 2], own: [f64; 2]) -> Option<[f64; 3]>;
 
+    /// Whether it looks to where a ray goes.
+    fn faces([_, _, z]: [f64; 3], _own: [f64; 2]) -> bool {
+        z >= 0.0
+    }
+
     /// Up to where it is one-to-one; the radius is X / Z.
     fn limit(_own: [f64; 2]) -> Option<RadialLimit> {
         None
@@ -81,9 +86,9 @@ impl RayProjection for Equidistant {
         (theta <= PI).then(|| [ratio * a, ratio * b, theta.cos()])
     }
 
-    /// None that the projection itself has: all angles up to pi are seen.
-    fn limit(_: [f64; 2]) -> Option<RadialLimit> {
-        None
+    /// All angles up to pi are seen.
+    fn faces(_: [f64; 3], _: [f64; 2]) -> bool {
+        true
     }
 }
 
@@ -165,6 +170,11 @@ impl RayProjection for DivisionByRadius {
         (k * square < 1.0).then_some([a, b, 1.0 + k * square])
     }
 
+    /// With k below zero it sees more than half of the sphere.
+    fn faces([x, y, z]: [f64; 3], [k, _]: [f64; 2]) -> bool {
+        z + (z * z - 4.0 * k * (x * x + y * y)).sqrt() > 0.0
+    }
+
     fn limit([k, _]: [f64; 2]) -> Option<RadialLimit> {
         let root = k.abs().sqrt();
         match k {
@@ -205,6 +215,12 @@ impl RayProjection for ExtendedUnified {
         let inside = 1.0 - (2.0 * alpha - 1.0) * square;
         let depth = (1.0 - alpha * alpha * square) / (alpha * inside.sqrt() + 1.0 - alpha);
         (inside >= 0.0 && depth.is_finite()).then_some([a, b, depth])
+    }
+
+    /// Beyond its limit behind the camera two rays have one image.
+    fn faces([x, y, z]: [f64; 3], [alpha, beta]: [f64; 2]) -> bool {
+        let d = (beta * (x * x + y * y) + z * z).sqrt();
+        alpha * d + (1.0 - alpha) * z > 0.0 && (alpha <= 0.5 || alpha * z > -(1.0 - alpha) * d)
     }
 
     fn limit([alpha, beta]: [f64; 2]) -> Option<RadialLimit> {

@@ -64,6 +64,10 @@ impl CameraModel for Radial {
         self.lens.direction([x - cx, cy - y])
     }
 
+    fn folds(&self, u: &Vector3, measured: [f64; 2]) -> bool {
+        self.lens.folds(u, measured)
+    }
+
     fn radial_limit(&self) -> Option<RadialLimit> {
         self.lens.radial_limit()
     }

@@ -206,6 +206,16 @@ trait Table<const N: usize>: Copy {
         Some(Vector3::new(x, -y, -z).normalize())
     }
 
+    fn looks_to(&self, u: &Vector3) -> bool {
+        Self::Projection::faces([u.x, -u.y, -u.z], self.parts().own)
+    }
+
+    fn turns_over(&self, u: &Vector3) -> bool {
+        let parts = self.parts();
+        let [a, b] = Self::Projection::project([u.x, -u.y, -u.z], parts.own).ab;
+        parts.lens.radial.folds(a.hypot(b))
+    }
+
     fn limit(&self) -> Option<RadialLimit> {
         let parts = self.parts();
         parts.lens.radial.limit().or_else(|| Self::Projection::limit(parts.own))
@@ -266,6 +276,14 @@ macro_rules! cameras_of_vision {
 
             fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
                 self.sight(xy)
+            }
+
+            fn faces(&self, u: &Vector3) -> bool {
+                self.looks_to(u)
+            }
+
+            fn folds(&self, u: &Vector3, _: [f64; 2]) -> bool {
+                self.turns_over(u)
             }
 
             fn radial_limit(&self) -> Option<RadialLimit> {

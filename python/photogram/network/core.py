@@ -1,0 +1,75 @@
+"""A block as the core takes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from photogram import _photocore
+from photogram.memory import available_memory
+from photogram.network.block import Block
+from photogram.network.observations import observation_rows
+from photogram.network.rigs import mount_rows
+
+__all__ = ["CoreOptions", "block_network"]
+
+
+@dataclass(frozen=True)
+class CoreOptions:
+    """How the core adjusts a block: the options of :func:`photogram.adjust` as it knows them."""
+
+    criterion: str
+    limit: float
+    max_iterations: int
+    covariance: bool
+    loss: tuple[str, float] | None
+    ordering: str
+    unit_variance: str
+    minimum: tuple[int, tuple[int, int] | None] | None
+
+
+def block_network(block: Block, options: CoreOptions) -> _photocore.BlockNetwork:
+    """Return a block as the core adjusts it, and answers questions about it afterwards."""
+    unknowns = block.unknowns
+    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, unknowns)
+    cameras, photo_cameras = block.core_cameras()
+    positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
+    return _photocore.block_network(
+        block.photo_positions,
+        block.photo_attitudes,
+        block.photo_positions if positions is None else positions,
+        block.photo_attitudes if attitudes is None else attitudes,
+        block.photo_position_sd,
+        block.photo_attitude_sd,
+        photo_cameras,
+        cameras,
+        block.point_positions,
+        block.point_sd,
+        block.image_photos,
+        block.image_points,
+        block.image_xy,
+        block.image_sd,
+        observation_groups=[group for _, group in groups],
+        unknowns=[each.row() for each in unknowns],
+        mounts=mount_rows(block.mounts, block.photo_ids, unknowns),
+        spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
+        photo_to_ground=block.photo_to_ground,
+        refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
+        criterion=options.criterion,
+        limit=options.limit,
+        max_iterations=options.max_iterations,
+        covariance=options.covariance,
+        loss=options.loss,
+        ordering=options.ordering,
+        unit_variance=options.unit_variance,
+        minimum=options.minimum,
+        memory=None if fits_anywhere(block) else available_memory(),
+    )
+
+
+def fits_anywhere(block: Block) -> bool:
+    """Whether a block is so small that asking how much memory there is would take longer than it needs.
+
+    A full factor of 100 photos takes 3 MB, and 10,000 image points with all their results 10 MB.
+    """
+    others = len(block.observations) <= 100
+    return others and len(block.photo_ids) <= 100 and len(block.image_xy) <= 10_000

@@ -1,0 +1,121 @@
+"""Datums of free networks: what is held, or what stays nearest to its given place (docs/datum.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from photogram.arguments.arrays import names, shown, text, truth_value
+from photogram.errors import InputError
+from photogram.network.block import Block, position_columns
+
+__all__ = ["DatumRow", "InnerConstraints", "MinimumConstraints", "datum_row", "minimum_row"]
+
+DatumRow = tuple[str, list[int], list[int], bool]
+"""`inner` or `relative`, points, photos, whether scale counts."""
+
+
+@dataclass(frozen=True)
+class InnerConstraints:
+    """Chosen points and photos together are as near as they come to their given places (Meissl 1969).
+
+    Of all datums that the same points and photos carry, this one gives them the least sum of variances. What
+    has no given place is compared with the place where it started from.
+
+    Parameters
+    ----------
+    points
+        Names of points; None for all that take part.
+    photos
+        Names of photos, whose positions count; None for all.
+    scale
+        Whether scale is taken from them, too, where nothing else gives one. Otherwise it stays as it is held.
+
+    Raises
+    ------
+    InputError
+        Names that are none.
+    """
+
+    points: Sequence[str] | None = None
+    photos: Sequence[str] | None = ()
+    scale: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("points", "photos"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, tuple(names(name, value)))
+        truth_value("scale", self.scale)
+
+
+@dataclass(frozen=True)
+class MinimumConstraints:
+    """What is held at its initial values where nothing else gives a datum.
+
+    Parameters
+    ----------
+    photo
+        The photo whose position and attitude are held; None for the one with most images.
+    coordinate
+        Photo and name of its coordinate (`X`, `Y`, `Z`, or `longitude`, `latitude`, `height`), held for the
+        scale; None for the one in which a photo is farthest from the first.
+
+    Raises
+    ------
+    InputError
+        A coordinate without a photo to hold, or one that is no pair of names.
+    """
+
+    photo: str | None = None
+    coordinate: tuple[str, str] | None = None
+
+    def __post_init__(self) -> None:
+        if self.photo is not None:
+            text("photo", self.photo)
+        if self.coordinate is not None:
+            if self.photo is None:
+                raise InputError("a coordinate is held beside the pose of a photo: name this, too")
+            if isinstance(self.coordinate, str) or len(tuple(self.coordinate)) != 2:
+                raise InputError(f"coordinate is no photo with an axis: {shown(self.coordinate)}")
+
+
+def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
+    """Return inner constraints as the core knows them.
+
+    Raises
+    ------
+    InputError
+        Points or photos that are not in the block.
+    """
+    points = range(len(block.point_ids)) if datum.points is None else _indices(block, "point", datum.points)
+    photos = range(len(block.photo_ids)) if datum.photos is None else _indices(block, "photo", datum.photos)
+    return "inner", list(points), list(photos), datum.scale
+
+
+def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int, int] | None] | None:
+    """Return what is to be held as the core knows it; None where it is left to the core.
+
+    Raises
+    ------
+    InputError
+        A photo or coordinate that is not there.
+    """
+    if datum.photo is None:
+        return None
+    photo = _indices(block, "photo", [datum.photo])[0]
+    if datum.coordinate is None:
+        return photo, None
+    other, axis = datum.coordinate
+    axes = [name.removesuffix("_deg") for name in position_columns(block)]
+    if axis not in axes:
+        raise InputError(f"{axis!r} is no coordinate: they are {', '.join(axes)}")
+    return photo, (_indices(block, "photo", [other])[0], axes.index(axis))
+
+
+def _indices(block: Block, kind: str, wanted: Sequence[str]) -> list[int]:
+    ids = block.photo_ids if kind == "photo" else block.point_ids
+    index = {name: i for i, name in enumerate(ids)}
+    if missing := [name for name in wanted if name not in index]:
+        raise InputError(f"the datum names the {kind} {missing[0]!r}, which is not in the block")
+    return [index[name] for name in wanted]

@@ -1,0 +1,245 @@
+"""Covariances of anything in an adjusted block with anything else, and of functions of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.results.datum import refused
+from photogram.results.selection import Adjusted, Selected, Selection
+
+__all__ = ["Covariances", "Propagated"]
+
+STEP = 0.01
+"""Of differences, in standard deviations."""
+TOGETHER = 32
+"""Things whose joint covariance is computed for its diagonal."""
+COMPLEX_STEP = 1e-30
+SPREAD = 0.1
+"""Of second differences, in standard deviations along the axes of the ellipsoid."""
+
+
+@dataclass(frozen=True, eq=False)
+class Propagated:
+    """A function of adjusted unknowns with its covariance.
+
+    Attributes
+    ----------
+    value
+        f(x): a number, or an array.
+    standard_deviation
+        Of each, in the shape of the value.
+    covariance
+        (m, m) of all m values, in their order: J Q J^T times the variance of unit weight.
+    partials
+        (m, k) J.
+    bias
+        Where it was asked for, 1/2 trace(f'' Q): by how much the mean of f(x) exceeds f of the mean, in the
+        shape of the value; None otherwise.
+    """
+
+    value: Any
+    standard_deviation: Any
+    covariance: Floats
+    partials: Floats
+    bias: Any = None
+
+
+class Covariances:
+    """The covariances of an adjusted block, in its datum: it keeps a factor of the normal equations.
+
+    A selection is a kind with a name, `("point", "P12")`, several names, `("photo", ["1", "2"])`, or None for
+    all that took part, `("camera", None)`; or a list of these. Kinds are `photo` (position, omega, phi,
+    kappa), `step` (of a photo: its position, and the rotation about its own axes, which is never singular),
+    `point`, `camera` and `unknown` (of observations in common). Rows and columns stand in this order.
+    Units are those of the result: the linear unit, radians, the units of cameras.
+    """
+
+    def __init__(
+        self, adjusted: Adjusted, network: _photocore.BlockNetwork, state: _photocore.BlockState, scale: float
+    ) -> None:
+        self._adjusted, self._scale = adjusted, scale
+        self._network, self._state = network, state
+        try:
+            self._core = network.covariances(state, threads=0, progress=None)
+        except _photocore.BlockError as error:
+            raise refused(adjusted.block, network, state, error) from None
+
+    def labels(self, selection: Selection) -> list[tuple[str, str, str]]:
+        """Return what the rows of a selection are: kind, name, component.
+
+        Raises
+        ------
+        InputError
+            A kind or name that is not there.
+        """
+        return self._adjusted.selected(selection).labels
+
+    def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
+        """Return the joint covariance matrix of a selection, or that of one with another.
+
+        It takes half of a solution for each unknown, or a whole one for each of the smaller side where that
+        is much smaller. Memory is estimated first: (unknowns of a) x (unknowns of b) numbers, and what the
+        fronts of the factor need.
+
+        Parameters
+        ----------
+        a, b
+            Selections; without b every two unknowns of a.
+
+        Raises
+        ------
+        InputError
+            A kind or name that is not there, or a point that was left out.
+        OutOfMemoryError
+            It would take more memory than there is.
+        KeyboardInterrupt
+            Ctrl-C.
+        """
+        rows = self._adjusted.selected(a).rows
+        columns = None if b is None else self._adjusted.selected(b).rows
+        found = self._asked(lambda: self._core.cofactors(rows, columns, threads=0, progress=None))
+        found *= self._scale
+        return found
+
+    def correlation(self, a: Selection, b: Selection | None = None) -> Floats:
+        """Return correlation coefficients in place of covariances; NaN for what is held.
+
+        A camera with all photos, `correlation(("camera", "wide"), ("step", None))`, takes as many solutions
+        as the camera has parameters.
+
+        Raises
+        ------
+        InputError, OutOfMemoryError, KeyboardInterrupt
+            As :meth:`covariance`.
+        """
+        covariance = self.covariance(a, b)
+        if b is None:
+            left = right = np.sqrt(np.diag(covariance))
+        else:
+            left, right = (self._deviations(each) for each in (a, b))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(covariance / np.outer(left, right))
+
+    def _deviations(self, selection: Selection) -> Floats:
+        """Return standard deviations; of rotation steps from the core, of all others from the result."""
+        selected = self._adjusted.selected(selection)
+        if all(kind != "step" for kind, _ in selected.rows):
+            return selected.sd
+        parts = range(0, len(selected.rows), TOGETHER)
+        return np.concatenate([self._own(selected.rows[k : k + TOGETHER]) for k in parts])
+
+    def _own(self, rows: list[tuple[str, int]]) -> Floats:
+        """Return the standard deviations of a few things."""
+        cofactors = self._asked(lambda: self._core.cofactors(rows, None, threads=0, progress=None))
+        return np.asarray(np.sqrt(self._scale * np.diag(cofactors)))
+
+    def propagate(
+        self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
+    ) -> Propagated:
+        """Return a function of adjusted unknowns with its covariance.
+
+        Partials are central differences over a hundredth of each standard deviation. Where the function takes
+        complex arrays and agrees with these, they are exact (complex step).
+
+        Parameters
+        ----------
+        function
+            Takes an array for each item of the selection: (k,) for one name, (n, k) for several; returns a
+            number or an array.
+        unknowns
+            What it is a function of.
+        bias
+            Whether to compute the bias, too: from second differences along the axes of the joint ellipsoid.
+
+        Raises
+        ------
+        InputError
+            A selection that is not there, or a function that returns no finite numbers.
+        OutOfMemoryError, KeyboardInterrupt
+            As :meth:`covariance`.
+        """
+        selected = self._adjusted.selected(unknowns)
+        if any(kind == "step" for kind, _ in selected.rows):
+            raise InputError("a rotation step has no value: take the photo")
+        value = _evaluated(function, selected, selected.values)
+        partials = _partials(function, selected, value)
+        cofactors = self._asked(
+            lambda: self._core.propagate(partials, selected.rows, threads=0, progress=None)
+        )
+        covariance = self._scale * cofactors
+        sd = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(np.shape(value))
+        found = _bias(function, selected, value, self.covariance(unknowns)) if bias else None
+        if np.ndim(value) == 0:
+            scalar = None if found is None else float(found)
+            return Propagated(float(value), float(sd), covariance, partials, scalar)
+        return Propagated(value, sd, covariance, partials, found)
+
+    def _asked(self, ask: Callable[[], Floats]) -> Floats:
+        try:
+            return ask()
+        except _photocore.BlockError as error:
+            raise refused(self._adjusted.block, self._network, self._state, error) from None
+
+
+def _evaluated(function: Callable[..., Any], selected: Selected, values: Floats) -> Floats:
+    """Evaluate a function; refuse what is no finite number."""
+    found = np.asarray(function(*selected.arrays(values)))
+    if found.dtype.kind not in "fiub" or not np.isfinite(found).all():
+        raise InputError("the function returns what is no finite real number at the adjusted values")
+    return found.astype(float)
+
+
+def _partials(function: Callable[..., Any], selected: Selected, value: Floats) -> Floats:
+    """Return J: a row for each value, a column for each unknown."""
+    partials = np.zeros((value.size, len(selected.values)))
+    for k, sd in enumerate(selected.sd.tolist()):
+        if not sd > 0:  # held: no variance, whatever the partial
+            continue
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = selected.values.copy()
+            moved[k] += sign * STEP * sd
+            ends.append((moved[k], _evaluated(function, selected, moved).ravel()))
+        (to, after), (fro, before) = ends
+        partials[:, k] = (after - before) / (to - fro)
+    return _complex_partials(function, selected, partials)
+
+
+def _complex_partials(function: Callable[..., Any], selected: Selected, differences: Floats) -> Floats:
+    """Return J by complex steps where the function takes them and agrees with differences, else these."""
+    partials = np.zeros_like(differences)
+    try:
+        for k in np.flatnonzero(selected.sd > 0).tolist():
+            moved = selected.values.astype(complex)
+            moved[k] += 1j * COMPLEX_STEP
+            found = np.asarray(function(*selected.arrays(moved)))
+            if found.dtype.kind != "c" or found.size != len(partials):
+                return differences
+            partials[:, k] = found.ravel().imag / COMPLEX_STEP
+    except (TypeError, ValueError, ArithmeticError):
+        return differences
+    # An absolute value on the way would be lost.
+    scale = np.abs(differences * selected.sd).max(axis=1, initial=0.0, keepdims=True)
+    agrees = np.abs((partials - differences) * selected.sd) <= 1e-3 * scale
+    return partials if agrees.all() else differences
+
+
+def _bias(function: Callable[..., Any], selected: Selected, value: Floats, covariance: Floats) -> Floats:
+    """Return 1/2 trace(f'' Q), by second differences along the axes of the ellipsoid."""
+    scale = np.where(selected.sd > 0, selected.sd, 1.0)
+    variances, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+    total = np.zeros(value.size)
+    for variance, axis in zip(variances.tolist(), axes.T, strict=True):
+        if variance <= 0:
+            continue
+        step = SPREAD * np.sqrt(variance) * axis * scale
+        ends = [_evaluated(function, selected, selected.values + sign * step).ravel() for sign in (1, -1)]
+        total += (ends[0] - 2 * value.ravel() + ends[1]) / SPREAD**2
+    return np.asarray(0.5 * total.reshape(np.shape(value)))

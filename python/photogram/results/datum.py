@@ -1,0 +1,208 @@
+"""What coordinates and standard deviations of a result refer to, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
+from photogram.messages import Message, listed
+from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
+from photogram.network.datum import DatumRow, InnerConstraints
+
+if TYPE_CHECKING:
+    from photogram._photocore import BlockNetwork, BlockSolution
+
+__all__ = ["ResultDatum", "datum_messages", "datum_of", "inner_datum", "refused", "relative_datum"]
+
+NOTABLE_LOSS = 1e-9
+"""A larger part of a variance that is rounding is told."""
+
+
+@dataclass(frozen=True)
+class ResultDatum:
+    """What coordinates and standard deviations refer to.
+
+    Attributes
+    ----------
+    kind
+        `observations` (control, weights and observations give it), `minimum constraints`, `inner
+        constraints` or `relative`.
+    held
+        Photos with the names of their unknowns that are held; of other kinds than minimum constraints those
+        from which the network was taken to its datum.
+    points, photos
+        What carries inner constraints, or what cofactors are relative to.
+    scale
+        Whether inner constraints take the scale from them, too.
+    lost
+        About how large a part of the variances rounding may be.
+    """
+
+    kind: str
+    held: tuple[tuple[str, str], ...] = ()
+    points: tuple[str, ...] = ()
+    photos: tuple[str, ...] = ()
+    scale: bool = False
+    lost: float = 0.0
+    row: DatumRow | None = field(default=None, repr=False)
+    """As the core knows it."""
+
+    def __str__(self) -> str:
+        counts = [
+            f"{len(names)} {kind}{'s' if len(names) != 1 else ''}"
+            for kind, names in (("point", self.points), ("photo", self.photos))
+            if names
+        ]
+        if self.kind == "minimum constraints":
+            return f"minimum constraints: held are {held_lines(self.held)}"
+        if self.kind == "inner constraints":
+            scale = ", scale included" if self.scale else ""
+            return f"inner constraints over {' and '.join(counts)}{scale}"
+        if self.kind == "relative":
+            return f"relative to {listed([*self.photos, *self.points])}"
+        return "given by the observations"
+
+    @property
+    def is_chosen(self) -> bool:
+        """Whether standard deviations would be others in another datum."""
+        return self.kind != "observations"
+
+    def document(self) -> dict[str, Any]:
+        """Return what the JSON document says of it."""
+        held = [{"photo": photo, "unknown": unknown} for photo, unknown in self.held]
+        return {
+            "kind": self.kind,
+            "held": held,
+            "points": list(self.points),
+            "photos": list(self.photos),
+            "scale": self.scale,
+        }
+
+
+def held_lines(held: Sequence[tuple[str, str]]) -> str:
+    """Name unknowns with their photos, those of one name together."""
+    unknowns = dict.fromkeys(unknown for _, unknown in held)
+    return "; ".join(
+        f"{unknown} of {listed([photo for photo, other in held if other == unknown])}" for unknown in unknowns
+    )
+
+
+def datum_of(block: Block, solution: BlockSolution, row: DatumRow | None = None) -> ResultDatum:
+    """Return the datum of what the core found: that of inner constraints or, without, what it held."""
+    names = [name.removesuffix("_deg") for name in (*position_columns(block), *ATTITUDE_COLUMNS)]
+    held = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
+    if row is None:
+        return ResultDatum("minimum constraints" if held else "observations", held)
+    name, points, photos, scale = row
+    used = solution.point_rays > 0
+    return ResultDatum(
+        kind="inner constraints" if name == "inner" else name,
+        held=held,
+        points=tuple(block.point_ids[point] for point in points if used[point]),
+        photos=tuple(block.photo_ids[photo] for photo in photos),
+        scale=scale,
+        lost=solution.lost_digits,
+        row=row,
+    )
+
+
+def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> list[Message]:
+    """Remark on what a block without control rests on: its datum, or the weights of its photos."""
+    messages = []
+    if datum.lost > NOTABLE_LOSS:
+        messages.append(
+            Message(
+                f"up to {datum.lost:.0e} of the variances is rounding: the datum that was held first is far"
+                " from the one asked for, or short; hold a photo in the middle (MinimumConstraints)"
+            )
+        )
+    if datum.kind == "inner constraints":
+        return [
+            Message(
+                f"there is no control: the datum is that of {datum}; coordinates and standard deviations"
+                " refer to it"
+            ),
+            *messages,
+        ]
+    if datum.kind == "relative":
+        return [Message(f"standard deviations are {datum}"), *messages]
+    if datum.kind == "minimum constraints":
+        return [
+            Message(
+                "there is no control, and nothing else gives a datum: held at their initial values are"
+                f" {held_lines(datum.held)}; coordinates and standard deviations refer to these"
+            )
+        ]
+    held = np.isfinite(block.point_sd) & (point_rays > 0)[:, np.newaxis]
+    if held.any() or block.observations or (block.photo_position_sd == 0).all():
+        return []
+    return [Message("there is no control: the datum of the block rests on the weights of its photos")]
+
+
+def inner_datum(datum: object) -> InnerConstraints:
+    """Return inner constraints; refuse anything else.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    if not isinstance(datum, InnerConstraints):
+        raise InputError(f"the datum is no InnerConstraints but of the type {type(datum).__name__}")
+    return datum
+
+
+def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None) -> DatumRow:
+    """Return what cofactors are to be relative to, as the core knows it.
+
+    Raises
+    ------
+    InputError
+        Neither or both, or names that are not in the block.
+    """
+    if (photo is None) == (points is None):
+        raise InputError("relative to what: a photo, or points?")
+    if photo is not None:
+        if photo not in block.photo_ids:
+            raise InputError(f"there is no photo {photo!r}")
+        return "relative", [], [block.photo_ids.index(photo)], False
+    index = {name: i for i, name in enumerate(block.point_ids)}
+    wanted = list(points or [])
+    if missing := [name for name in wanted if name not in index]:
+        raise InputError(f"there is no point {missing[0]!r}")
+    return "relative", [index[name] for name in wanted], [], False
+
+
+def refused(
+    block: Block, network: BlockNetwork, state: _photocore.BlockState | None, error: _photocore.BlockError
+) -> AdjustmentError | InputError:
+    """Return what the core has refused, with the names concerned."""
+    kind, message, _, points, *_ = error.args
+    if kind == "memory":
+        return OutOfMemoryError(message)
+    if kind == "left out":
+        return InputError(f"the point {block.point_ids[points[0]]} was left out of the adjustment")
+    if kind == "datum":
+        return InputError(
+            "the points and photos of the datum do not carry it: there must be three points or photos that do"
+            " not lie on a line, in each part that it is for"
+        )
+    if kind == "not free":
+        state = network.adjust(datum=None, threads=0, progress=None).state if state is None else state
+        return AdjustmentError(f"the block is not free: {_holding(network.resistance(state, threads=0))}")
+    return AdjustmentError(message)
+
+
+def _holding(resistance: Sequence[tuple[str, float]]) -> str:
+    """Say what keeps a network from moving, and by how much."""
+    parts = [f"{kind} ({share:.2g})" for kind, share in sorted(resistance, key=lambda each: -each[1])]
+    return (
+        "its datum is given by observations of the kinds "
+        + ", ".join(parts)
+        + "; in parentheses, the part of what a motion changes in them that remains when the whole moves"
+    )
