@@ -253,10 +253,10 @@ fn assert_kind<'s>(
     assert_eq!(count as f64, golden["rows"].as_f64().unwrap(), "{kind}");
 }
 
-fn of_images<'s>(
-    solution: &'s Solution,
+fn of_images(
+    solution: &Solution,
     range: std::ops::Range<usize>,
-) -> impl Iterator<Item = (&'s [f64], &'s [f64], &'s [f64])> {
+) -> impl Iterator<Item = (&[f64], &[f64], &[f64])> {
     let images = solution.images[range].iter().map(|image| image.as_ref().unwrap());
     images.map(|image| (&image.residual[..], &image.redundancy[..], &image.standardized[..]))
 }

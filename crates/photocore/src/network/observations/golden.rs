@@ -13,9 +13,9 @@ use crate::network::commons::{Common, CommonKind, CommonState, PlacedCommon};
 use crate::network::mounts::mounted;
 
 #[path = "../../../tests/golden/mod.rs"]
-mod golden;
+mod data;
 
-use golden::{golden, list, rows};
+use data::{golden, list, rows};
 
 const SPACE: ObjectSpace = ObjectSpace::Rectangular;
 
