@@ -415,7 +415,8 @@ fn what_has_no_cofactors_is_refused() {
     let mut refused = |of: Of| covariances.cofactors(&[of], None, &pool, &mut go).unwrap_err();
     assert_eq!(refused(Of::Photo(PHOTOS)), NetworkError::NoPhoto(PHOTOS));
     assert_eq!(refused(Of::Point(POINTS)), NetworkError::NoPoint(POINTS));
-    assert_eq!(refused(Of::Camera(5)), NetworkError::CameraIndex(5));
+    let cameras = network.cameras.len();
+    assert_eq!(refused(Of::Camera(cameras)), NetworkError::CameraIndex(cameras));
     let partials = covariances.propagate(&[1.0; 4], &[Of::Point(0)], &pool, &mut go).unwrap_err();
     assert_eq!(partials, NetworkError::Partials { unknowns: 3, numbers: 4 });
     let many = vec![Of::Point(0); 4000];
