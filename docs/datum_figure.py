@@ -25,12 +25,12 @@ TITLES = (
     "inner constraints\nover all points",
     "inner constraints\nover four points (filled)",
 )
-WIDEST = 0.16
+WIDEST = 0.42
 """Of the largest semi-axis as it is drawn, metres of the plan."""
 
 
 def draw() -> Figure:
-    """Draw the points in plan with their ellipses, photos with theirs."""
+    """Draw the points in plan with their ellipses, and where the photos are."""
     results = in_three_datums()
     figure = new_figure(10.5, 4.2)
     largest = max(np.linalg.eigvalsh(result.point_covariances[:, :2, :2]).max() for result in results) ** 0.5
@@ -47,7 +47,6 @@ def draw() -> Figure:
         ellipses(axes, places, result.point_covariances[:, :2, :2], scale, color="#0072b2", linewidth=1.0)
         stations = result.photo_positions[:, :2]
         axes.scatter(*stations.T, s=22, marker="^", color="#d55e00")
-        ellipses(axes, stations, result.photo_covariances[:, :2, :2], scale, color="#d55e00", linewidth=0.8)
         axes.set_title(title.format(result.datum.held[0][0]), fontsize=10)
         axes.set(aspect="equal", xlim=(-1.9, 2.1), ylim=(-1.9, 1.9))
         axes.axis("off")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -237,3 +238,13 @@ def test_the_example_is_the_same_network_in_three_datums(capsys):
         np.testing.assert_allclose(result.redundancy, minimum.redundancy, atol=1e-8)
     trace = [np.trace(result.point_cofactors.sum(axis=0)) for result in (minimum, inner, corners)]
     assert trace[1] == min(trace)
+
+
+def test_the_figure_of_the_page_is_what_its_script_draws(monkeypatch):
+    pytest.importorskip("matplotlib")
+    docs = Path(__file__).parents[1] / "docs"
+    monkeypatch.syspath_prepend(str(docs))
+    import datum_figure
+
+    drawn = datum_figure.svg(datum_figure.draw)
+    assert (docs / "datum.svg").read_text(encoding="utf-8").count("<path") == drawn.count("<path")
