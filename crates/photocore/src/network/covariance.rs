@@ -286,7 +286,7 @@ impl Covariances {
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Vec<f64>, NetworkError> {
         let unknowns = self.unknowns(of)?;
-        if unknowns.is_empty() || partials.len() % unknowns.len() != 0 {
+        if unknowns.is_empty() || !partials.len().is_multiple_of(unknowns.len()) {
             return Err(NetworkError::Partials { unknowns: unknowns.len(), numbers: partials.len() });
         }
         let function = |row: &[f64]| -> Function {
