@@ -1,4 +1,4 @@
-"""Simulated GNSS, inertial units, distances and rigs: what is exact is exact, and the truth is found again."""
+"""Simulated GNSS, inertial units, distances, rigs: what is exact is exact, the truth is found again."""
 
 import numpy as np
 import pytest

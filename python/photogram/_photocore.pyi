@@ -166,9 +166,9 @@ def camera_partials(model: str, parameters: _Floats, u: _Floats) -> tuple[_Float
 
     Returns
     -------
-    (n, 2) images, (n, 2, 3) their partials by u, (n, 2, k) by the parameters, 0 for those that are constants of
-    a lens; not finite where there are none. Those of a backward camera are the ones of the measured position
-    that corresponds to u.
+    (n, 2) images, (n, 2, 3) their partials by u, (n, 2, k) by the parameters, 0 for those that are constants
+    of a lens; not finite where there are none. Those of a backward camera are the ones of the measured
+    position that corresponds to u.
 
     Raises
     ------
@@ -179,10 +179,10 @@ def camera_partials(model: str, parameters: _Floats, u: _Floats) -> tuple[_Float
 def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None:
     """Return the radius up to which the radial part of a lens is one-to-one, and what it becomes.
 
-    Of a forward camera the radius is the tangent of the angle from the axis, of a fisheye the angle (rad), and
-    becomes what the focal length multiplies; `brown_forward` has lengths in the image. Of a backward camera it
-    is that of the measured position from the principal point, which becomes that of the corrected one.
-    Infinite where only the image ends.
+    Of a forward camera the radius is the tangent of the angle from the axis, of a fisheye the angle (rad),
+    and becomes what the focal length multiplies; `brown_forward` has lengths in the image. Of a backward
+    camera it is that of the measured position from the principal point, which becomes that of the corrected
+    one. Infinite where only the image ends.
 
     Returns
     -------

@@ -248,6 +248,7 @@ fn adjust(criterion: &mut Criterion) {
         start: Start::Intersected,
         hold_unused: false,
         memory: None,
+        minimum: None,
     };
     let adjust = |block: &Network| {
         block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).expect("a determined block")

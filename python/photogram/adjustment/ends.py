@@ -102,8 +102,8 @@ def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     count = "1 image point lies" if len(images) == 1 else f"{len(images)} image points lie"
     return [
         Message(
-            f"{count} beyond where the lens of the camera is one-to-one: its radial terms fold back there, and"
-            f" the result is not to be trusted: points {points} on photos {photos}"
+            f"{count} beyond where the lens of the camera is one-to-one: its radial terms fold back there,"
+            f" and the result is not to be trusted: points {points} on photos {photos}"
         )
     ]
 
