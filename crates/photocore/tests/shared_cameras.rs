@@ -587,7 +587,7 @@ fn parameters_may_be_observed_with_their_covariance() {
         let together = (q.clone().try_inverse().unwrap() + &w).try_inverse().unwrap();
         let expected = &found + &together * &w * (&given - &found);
         for k in 0..3 {
-            // The network is not quite linear, the lens terms are small beside their deviations.
+            // The network is not quite linear over deviations as large as these.
             assert!(
                 (after.parameters[k] - expected[k]).abs() < 0.02 * sd[k],
                 "{} {}",
