@@ -587,17 +587,17 @@ fn parameters_may_be_observed_with_their_covariance() {
         let together = (q.clone().try_inverse().unwrap() + &w).try_inverse().unwrap();
         let expected = &found + &together * &w * (&given - &found);
         for k in 0..3 {
-            // The network is not quite linear.
+            // The network is not quite linear over deviations as large as these.
             assert!(
-                (after.parameters[k] - expected[k]).abs() < 2e-3 * sd[k],
+                (after.parameters[k] - expected[k]).abs() < 0.02 * sd[k],
                 "{} {}",
                 after.parameters[k],
                 expected[k]
             );
             let own = 1.0 - (&together * &w)[(k, k)];
-            assert!((after.redundancy[k] - own).abs() < 1e-2, "{} {own}", after.redundancy[k]);
+            assert!((after.redundancy[k] - own).abs() < 0.03, "{} {own}", after.redundancy[k]);
             for j in 0..3 {
-                assert!((after.cofactors[3 * k + j] - together[(k, j)]).abs() < 1e-2 * sd[k] * sd[j]);
+                assert!((after.cofactors[3 * k + j] - together[(k, j)]).abs() < 0.02 * sd[k] * sd[j]);
             }
         }
         let of_images = solution.images.iter().flatten().flat_map(|image| image.redundancy);
