@@ -16,6 +16,8 @@ const LIMIT: f64 = 0.05;
 /// and what fits within this multiple of the median, or part of the extent, takes part.
 const SPREAD: f64 = 5.0;
 const ROUNDING: f64 = 1e-6;
+/// What rays of two models may miss each other by at first, in what they may in each.
+const WIDER: f64 = 3.0;
 /// Common points are on one line when their extent across it is this part of that along it.
 const LINE: f64 = 0.02;
 
@@ -67,7 +69,7 @@ impl Search<'_> {
         for (own, other) in object.poses.iter_mut().zip(&carried.poses) {
             *own = own.or(*other);
         }
-        object.tolerance = 0.0;
+        object.tolerance = WIDER * object.tolerance.max(carried.tolerance);
         object.intersect(self);
         self.adjust(object)?;
         self.grow(object, &|_| true)

@@ -235,7 +235,19 @@ impl Search<'_> {
                 self.adjust(object)?;
             }
         }
+        self.leave_out_misfits(object);
         Ok(())
+    }
+
+    /// A pose that hardly any image fits is none.
+    fn leave_out_misfits(&self, object: &mut Model) {
+        let mut fitting = vec![0; self.given.photos.len()];
+        object.misfits(self).iter().for_each(|(image, _)| fitting[self.given.sightings[*image].photo] += 1);
+        for (pose, fitting) in object.poses.iter_mut().zip(fitting) {
+            *pose = pose.filter(|(_, source)| {
+                fitting >= RESECTED || matches!(source, Source::Given | Source::Observed)
+            });
+        }
     }
 
     fn found(&self, object: Model, apart: &[Model], frame: Frame) -> Found {
