@@ -2,8 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::model::Bundle;
-use super::{Camera, Network};
+use super::Camera;
 use crate::adjustment::Weighted;
 
 /// The observation of the weighted parameters of a camera.
@@ -16,6 +15,16 @@ pub struct CameraPrior {
 }
 
 impl CameraPrior {
+    /// What was observed of a camera whose first parameter is the given unknown; None without a covariance matrix.
+    pub fn of(camera: &Camera, first: usize) -> Option<Self> {
+        let (whitening, weighted, count) = (camera.whitening()?, camera.weighted(), camera.sd.len());
+        let mut root = DMatrix::zeros(count, count);
+        for (i, &row) in weighted.iter().enumerate() {
+            weighted.iter().enumerate().for_each(|(j, &column)| root[(row, column)] = whitening[(i, j)]);
+        }
+        Some(Self { first, root })
+    }
+
     /// Its equations at given values of the unknowns: L^-1 (p0 - p), S = L L^T.
     pub fn equations(&self, values: &[f64], prior: &[f64]) -> Weighted {
         let count = self.root.nrows();
@@ -75,27 +84,5 @@ impl Camera {
         let mut redundancy = vec![0.0; count];
         weighted.iter().enumerate().for_each(|(i, &k)| redundancy[k] = 1.0 - shares[(i, i)]);
         Some(redundancy)
-    }
-}
-
-impl Network {
-    /// What was observed of the cameras with a covariance matrix, those with photos.
-    pub(super) fn camera_priors(&self, model: &Bundle) -> Vec<CameraPrior> {
-        let prior = |(index, camera): (usize, &Camera)| {
-            let whitening = camera.whitening()?;
-            let first = match model.shared.binary_search(&index) {
-                Ok(shared) => model.of_block(model.cameras.len() + shared).start,
-                Err(_) => {
-                    model.of_block(self.photos.iter().position(|photo| photo.camera == index)?).start + 6
-                }
-            };
-            let (weighted, count) = (camera.weighted(), camera.sd.len());
-            let mut root = DMatrix::zeros(count, count);
-            for (i, &row) in weighted.iter().enumerate() {
-                weighted.iter().enumerate().for_each(|(j, &column)| root[(row, column)] = whitening[(i, j)]);
-            }
-            Some(CameraPrior { first, root })
-        };
-        self.cameras.iter().enumerate().filter_map(prior).collect()
     }
 }

@@ -55,15 +55,6 @@ pub(super) struct Parts {
     of_common: Vec<Option<usize>>,
 }
 
-/// The photo, and the coordinate of another one, that are to be held where nothing else gives a datum.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Minimum {
-    /// The photo whose pose is held.
-    pub photo: usize,
-    /// Photo and number of its unknown, held for the scale; where there is none, the one in which a photo is farthest from the first.
-    pub coordinate: Option<(usize, usize)>,
-}
-
 /// Parts that are given a datum at the most: a network in more of them is a mistake.
 const MOST_PARTS: usize = 8;
 

@@ -3,7 +3,6 @@
 use thiserror::Error;
 
 use super::model::Owner;
-use super::naming::PosePart;
 use super::observations::Fault;
 use super::precision::Coarse;
 use super::problem::Assembled;
@@ -138,6 +137,33 @@ pub struct Combination {
     pub poses: Vec<PosePart>,
     /// Common unknowns.
     pub commons: Vec<usize>,
+}
+
+/// A part of the poses of photos.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum PosePart {
+    /// Positions along the directions of view.
+    Along,
+    /// Positions across these.
+    Across,
+    /// Turns about axes across the directions of view.
+    Tilt,
+    /// Turns about the directions of view.
+    Swing,
+}
+
+impl PosePart {
+    pub(super) const ALL: [Self; 4] = [Self::Along, Self::Across, Self::Tilt, Self::Swing];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Along => "along",
+            Self::Across => "across",
+            Self::Tilt => "tilt",
+            Self::Swing => "swing",
+        }
+    }
 }
 
 impl NetworkError {

@@ -64,6 +64,7 @@ mod mounts;
 mod naming;
 mod neighbourhood;
 pub mod observations;
+mod on_frames;
 mod precision;
 mod problem;
 mod screening;
@@ -83,10 +84,9 @@ use crate::normals::Ordering;
 pub use cameras::AdjustedCamera;
 pub use commons::{AdjustedCommon, Common, CommonKind};
 pub use covariance::{Covariances, NetworkDatum, Of, State};
-pub use datum::{InnerConstraints, Minimum};
-pub use error::{Combination, NetworkError};
+pub use datum::InnerConstraints;
+pub use error::{Combination, NetworkError, PosePart};
 pub use mounts::Mount;
-pub use naming::PosePart;
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub(crate) use precision::median;
@@ -210,6 +210,15 @@ pub enum Start {
     Intersected,
     /// Their given coordinates where these are known, otherwise as above.
     Given,
+}
+
+/// The photo, and the coordinate of another one, that are to be held where nothing else gives a datum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Minimum {
+    /// The photo whose pose is held.
+    pub photo: usize,
+    /// Photo and number of its unknown, held for the scale; where there is none, the one in which a photo is farthest from the first.
+    pub coordinate: Option<(usize, usize)>,
 }
 
 /// How to adjust a network.

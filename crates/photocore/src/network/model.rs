@@ -7,10 +7,9 @@ use rayon::prelude::*;
 
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
-use super::datum::Minimum;
 use super::mounts::{Mount, Mounted, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
-use super::{Image, Point};
+use super::{Image, Minimum, Point};
 use crate::adjustment::{Model, Motions, Weighted};
 use crate::geometry::camera::each_camera;
 use crate::geometry::{

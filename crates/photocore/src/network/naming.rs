@@ -5,38 +5,11 @@ use std::ops::ControlFlow;
 
 use rayon::ThreadPool;
 
-use super::error::Combination;
+use super::error::{Combination, PosePart};
 use super::problem::Assembled;
 use super::{Network, NetworkError};
 use crate::adjustment::NormalEquations;
 use crate::geometry::{PoseNumbers, Vector3};
-
-/// A part of the poses of photos.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum PosePart {
-    /// Positions along the directions of view.
-    Along,
-    /// Positions across these.
-    Across,
-    /// Turns about axes across the directions of view.
-    Tilt,
-    /// Turns about the directions of view.
-    Swing,
-}
-
-impl PosePart {
-    const ALL: [Self; 4] = [Self::Along, Self::Across, Self::Tilt, Self::Swing];
-
-    /// What it is called.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Along => "along",
-            Self::Across => "across",
-            Self::Tilt => "tilt",
-            Self::Swing => "swing",
-        }
-    }
-}
 
 /// What takes part by less than this share of all, of n_ii x_i^2 summed up, is not named.
 const NOTABLE: f64 = 0.01;

@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+use super::camera_priors::CameraPrior;
 use super::commons::PlacedCommon;
 use super::model::{Bundle, Station};
 use super::observations::{Fault, Observation, TiedObservation, Touches};
@@ -302,7 +303,8 @@ impl Network {
             anchor,
             minimum: None,
         };
-        bundle.camera_priors = self.camera_priors(&bundle);
+        let prior = |(index, camera)| CameraPrior::of(camera, self.first_parameter(&bundle, index)?);
+        bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
         bundle.observations = self.tied_observations(screened, &bundle)?;
         Ok(bundle)
     }
@@ -331,6 +333,14 @@ impl Network {
             (first, None) if first.is_some_and(fixed) => (false, first),
             _ => (true, None),
         }
+    }
+
+    /// The unknown that the first parameter of a camera is; None where no photo has it.
+    fn first_parameter(&self, model: &Bundle, camera: usize) -> Option<usize> {
+        Some(match model.shared.binary_search(&camera) {
+            Ok(shared) => model.of_block(model.cameras.len() + shared).start,
+            Err(_) => model.of_block(self.photos.iter().position(|photo| photo.camera == camera)?).start + 6,
+        })
     }
 
     /// The observations that take part.

@@ -80,7 +80,7 @@ impl System {
         let matrix = rows * if functions.columns.is_some() { columns } else { rows };
         let others = match functions.few() {
             Some((few, _, _)) => few.len().min(TOGETHER) * self.symbolic.unknowns(),
-            None => Products::new(&self.symbolic, functions.all()).numbers(),
+            None => Products::new(&self.symbolic, &functions.rights()).numbers(),
         };
         size_of::<f64>() * (matrix + others)
     }
@@ -104,7 +104,7 @@ impl System {
                 }
                 None => {
                     let split = functions.columns.is_some().then_some(rows.len());
-                    let products = Products::new(&self.symbolic, functions.all());
+                    let products = Products::new(&self.symbolic, &functions.rights());
                     products.add(factor, split, &mut matrix, control)?;
                 }
             }
@@ -155,8 +155,8 @@ impl Functions {
         }
     }
 
-    fn all(&self) -> Vec<&Reduced> {
-        self.rows.iter().chain(self.columns.iter().flatten()).collect()
+    fn rights(&self) -> Vec<&[(usize, f64)]> {
+        self.rows.iter().chain(self.columns.iter().flatten()).map(|function| &function.entries[..]).collect()
     }
 }
 

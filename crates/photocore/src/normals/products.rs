@@ -9,7 +9,6 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 use super::factor::Factor;
-use super::functions::Reduced;
 use super::symbolic::Symbolic;
 use super::watch::Control;
 use super::workspace::zeros;
@@ -32,21 +31,22 @@ struct Update {
 const TOGETHER: usize = 32;
 
 impl<'a> Products<'a> {
-    pub fn new(symbolic: &'a Symbolic, functions: Vec<&Reduced>) -> Self {
+    /// Of right-hand sides: places in the order of elimination, ascending, with their values.
+    pub fn new(symbolic: &'a Symbolic, rights: &[&[(usize, f64)]]) -> Self {
         let mut supernode_of = vec![0; symbolic.unknowns()];
         for index in 0..symbolic.supernode_count() {
             let (first, width) = (symbolic.first_unknown(index), symbolic.supernodes()[index].width);
             supernode_of[first..first + width].fill(index);
         }
         let mut entries: Vec<(usize, usize, usize, f64)> = Vec::new();
-        for (column, function) in functions.iter().enumerate() {
-            entries.extend(function.entries.iter().map(|&(place, value)| {
+        for (column, right) in rights.iter().enumerate() {
+            entries.extend(right.iter().map(|&(place, value)| {
                 let index = supernode_of[place];
                 (index, column, place - symbolic.first_unknown(index), value)
             }));
         }
         entries.sort_by_key(|&(index, column, row, _)| (index, column, row));
-        Self { symbolic, count: functions.len(), entries }
+        Self { symbolic, count: rights.len(), entries }
     }
 
     /// Numbers that fronts and what they leave take at the most.

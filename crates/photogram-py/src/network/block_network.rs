@@ -3,11 +3,11 @@
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::adjustment::DatumError;
 use photocore::network::{
-    Covariances, InnerConstraints, Network, NetworkDatum, NetworkError as Failure, Of, Options, State,
+    Covariances, InnerConstraints, Network, NetworkDatum, NetworkError as Failure, Of, Options,
 };
 use pyo3::prelude::*;
 
-use super::solution::BlockSolution;
+use super::solution::{BlockSolution, BlockState};
 use super::{BlockError, failure};
 use crate::options::unknown;
 use crate::work::{Workers, watched};
@@ -15,7 +15,6 @@ use crate::work::{Workers, watched};
 /// Adds the classes to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<BlockNetwork>()?;
-    module.add_class::<BlockState>()?;
     module.add_class::<BlockCovariances>()
 }
 
@@ -24,12 +23,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 pub struct BlockNetwork {
     pub network: Network,
     pub options: Options,
-}
-
-/// Where an adjustment has ended.
-#[pyclass(frozen, module = "photogram._photocore")]
-pub struct BlockState {
-    pub state: State,
 }
 
 /// Covariances of an adjusted block, from one factor.
