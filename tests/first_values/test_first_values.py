@@ -150,6 +150,14 @@ def test_control_that_does_not_fit_is_said():
     assert "images of control points do not fit: look at the control" in said
 
 
+def test_wrong_control_does_not_stop_the_rest():
+    """A photo resected from four points of which one is wrong gives way to the model of all others."""
+    positions, angles, points = networks.ring(109, photos=7, points=57)
+    block, truth, _ = networks.network(positions, angles, points, seed=9, control=range(4), wrong=0.3)
+    started = whole(first_values(block))
+    agree(started.usable(), pairs_without(started, truth))
+
+
 def test_given_poses_stay():
     positions, angles, points = networks.strips(61)
     block, truth, _ = networks.network(positions, angles, points, seed=62)
