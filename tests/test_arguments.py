@@ -129,6 +129,8 @@ def good(tmp_path_factory):
                 "name": "A",
                 "unit": "mm",
             },
+            "InnerConstraints": {"points": ["A"], "photos": ["1"], "scale": True},
+            "MinimumConstraints": {"photo": "1", "coordinate": ("2", "X")},
             "Refraction": {"air": "giant", "water": None, "water_level": 0.0, "refractive_index": 1.34},
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},

@@ -114,14 +114,14 @@ def test_a_system_that_does_not_tell(tmp_path):
 def test_a_block_that_does_not_fit_is_refused(monkeypatch):
     # More photos than fit anywhere.
     block = simulate(strips=3, photos_per_strip=40, seed=2).block
-    monkeypatch.setattr("photogram.adjustment.adjustment.available_memory", lambda: 1 << 20)
+    monkeypatch.setattr("photogram.network.core.available_memory", lambda: 1 << 20)
     with pytest.raises(
         OutOfMemoryError, match=r"takes \d+\.\d MiB of memory, and 1\.0 MiB are free"
     ) as raised:
         adjust(block)
     assert isinstance(raised.value, MemoryError)
     assert isinstance(raised.value, AdjustmentError)
-    monkeypatch.setattr("photogram.adjustment.adjustment.available_memory", lambda: 1 << 30)
+    monkeypatch.setattr("photogram.network.core.available_memory", lambda: 1 << 30)
     assert adjust(block).converged
 
 

@@ -1,5 +1,7 @@
 //! First values of a ring of photos about an object: wrong images, wrong control, nothing but images.
 
+#![allow(clippy::unwrap_used)]
+
 use std::ops::ControlFlow;
 
 use photocore::geometry::{Matrix3, Pose, Vector3};

@@ -76,8 +76,10 @@ class MinimumConstraints:
         if self.coordinate is not None:
             if self.photo is None:
                 raise InputError("a coordinate is held beside the pose of a photo: name this, too")
-            if isinstance(self.coordinate, str) or len(tuple(self.coordinate)) != 2:
+            pair = names("coordinate", self.coordinate)
+            if len(pair) != 2:
                 raise InputError(f"coordinate is no photo with an axis: {shown(self.coordinate)}")
+            object.__setattr__(self, "coordinate", (pair[0], pair[1]))
 
 
 def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:

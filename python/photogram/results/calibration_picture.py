@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.io.writing import write_whole
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.lens_field import LensField, lens_field
@@ -33,7 +34,7 @@ def draw_distortion(result: Result, camera: AdjustedCamera, path: Path) -> None:
     curve = distortion_curve(result, camera)
     if curve is None:
         raise ValueError(f"{camera.name} has no radial distortion to draw")
-    path.write_bytes(drawn(figure_of_distortion(camera, curve), path))
+    write_whole({path: drawn(figure_of_distortion(camera, curve), path)})
 
 
 def draw_lens_field(result: Result, camera: AdjustedCamera, path: Path) -> None:
@@ -49,7 +50,7 @@ def draw_lens_field(result: Result, camera: AdjustedCamera, path: Path) -> None:
     field = lens_field(result, camera)
     if field is None:
         raise ValueError(f"{camera.name} has no terms beside the radial ones to draw")
-    path.write_bytes(drawn(figure_of_lens_field(camera, field), path))
+    write_whole({path: drawn(figure_of_lens_field(camera, field), path)})
 
 
 def figure_of_lens_field(camera: AdjustedCamera, field: LensField) -> Figure:

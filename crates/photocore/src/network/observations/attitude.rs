@@ -83,8 +83,8 @@ pub(in super::super) fn misalignment(computed: &Matrix3, observed: &Matrix3) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::agrees;
     use super::super::tests::BORESIGHT;
+    use super::super::tests::agrees;
     use super::{Attitude, Precision, Quantity};
     use crate::geometry::rotation;
 

@@ -49,6 +49,9 @@ mod tests {
 
     #[test]
     fn partials_agree_with_differences() {
-        agrees(&OnPlumbLine { point: 1, line: PLUMB_LINE, precision: Precision::Deviations(vec![0.01, 0.02]) }.into());
+        agrees(
+            &OnPlumbLine { point: 1, line: PLUMB_LINE, precision: Precision::Deviations(vec![0.01, 0.02]) }
+                .into(),
+        );
     }
 }
