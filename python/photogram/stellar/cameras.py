@@ -16,6 +16,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
+from photogram.network.cameras import Camera
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.sky import TAU
 from photogram.stellar.transformation import transformed_angles
@@ -277,6 +278,24 @@ class BrownCamera:
     def known(self) -> NDArray[np.bool_]:
         """(9,) which parameters have a mean error."""
         return np.diag(self.covariance) > 0
+
+    def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
+        """Return the camera as blocks take it: columns and rows, y down, the model `full_opencv`.
+
+        Parameters
+        ----------
+        name
+            For reports.
+        weighted
+            Whether its parameters are observations with their full covariance; otherwise they are known. What
+            was held here is held there.
+        """
+        values = dict(zip(_BROWN, self.values.tolist(), strict=True))
+        if not (weighted and self.known.any()):
+            return Camera("full_opencv", values, name=name)
+        known = np.flatnonzero(self.known)
+        covariance = [_BROWN[i] for i in known], self.covariance[np.ix_(known, known)]
+        return Camera("full_opencv", values, covariance=covariance, name=name)
 
     def to_json(self) -> bytes:
         """Return the camera as a JSON document: a weighted prior of later adjustments."""
