@@ -40,4 +40,5 @@ def test_it_is_an_observation_with_its_covariance():
     assert result.converged
     found, places = result.cameras[0], [camera.names.index(name) for name in names]
     assert (found.sd[places] <= SD[:8] * max(1.0, np.sqrt(result.covariance_scale)) * (1 + 1e-9)).all()
-    assert (found.redundancy[places].sum() > 0) and (found.redundancy[places] < 1).all()
+    assert found.redundancy[places].sum() > 0
+    assert (found.redundancy[places] < 1).all()
