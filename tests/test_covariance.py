@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -155,3 +157,14 @@ def test_the_example_knows_distances_and_areas(capsys):
     assert printed.count("+-") == len(found) == 4
     assert 0 < found["distance"].standard_deviation < 1.0
     assert abs(found["angle"].bias) < found["angle"].standard_deviation
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda result: pickle.loads(pickle.dumps(result))])
+def test_results_that_are_copied_or_come_from_another_process_still_answer(small_block, again):
+    free = adjust(small_block.replace(point_sd=np.inf))
+    photo, point = small_block.photo_ids[1], small_block.point_ids[0]
+    for result in (free, free.in_datum(InnerConstraints()), free.relative_to(photo=photo)):
+        same = again(result)
+        np.testing.assert_array_equal(same.point_cofactors, result.point_cofactors)
+        selection = [("photo", photo), ("point", point)]
+        np.testing.assert_array_equal(same.covariance(selection), result.covariance(selection))

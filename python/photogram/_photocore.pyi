@@ -642,7 +642,36 @@ class BlockNetwork:
 
 @final
 class BlockState:
-    """Where the adjustment of a block has ended, and the datum that it was taken to."""
+    """Where the adjustment of a block has ended, and the datum that it was taken to.
+
+    Parameters
+    ----------
+    unknowns
+        Adjusted, in the order of the core.
+    held, collapsed
+        Unknowns held for a datum; points left out because they ran into a station.
+    ordering
+        The name of the ordering in force.
+    datum
+        Its name, points, photos, and whether scale counts; None for that of what was held.
+
+    Raises
+    ------
+    ValueError
+        An ordering or a datum that there is not.
+    """
+
+    def __new__(
+        cls,
+        unknowns: list[float],
+        held: list[int],
+        collapsed: list[int],
+        ordering: str,
+        datum: tuple[str, list[int], list[int], bool] | None,
+    ) -> BlockState: ...
+    def __getnewargs__(
+        self,
+    ) -> tuple[list[float], list[int], list[int], str, tuple[str, list[int], list[int], bool] | None]: ...
 
 @final
 class BlockCovariances:

@@ -2,12 +2,11 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::adjustment::DatumError;
-use photocore::network::{
-    Covariances, InnerConstraints, Network, NetworkDatum, NetworkError as Failure, Of, Options,
-};
+use photocore::network::{Covariances, Network, NetworkDatum, NetworkError as Failure, Of, Options};
 use pyo3::prelude::*;
 
-use super::solution::{BlockSolution, BlockState};
+use super::solution::BlockSolution;
+use super::state::{BlockState, DatumRow, datum_of};
 use super::{BlockError, failure};
 use crate::options::unknown;
 use crate::work::{Workers, watched};
@@ -30,18 +29,6 @@ pub struct BlockNetwork {
 pub struct BlockCovariances {
     covariances: Covariances,
     images: usize,
-}
-
-/// What a datum is: its name, points, photos, and whether scale counts.
-type DatumRow = (String, Vec<usize>, Vec<usize>, bool);
-
-fn datum_of((name, points, photos, scale): DatumRow) -> PyResult<NetworkDatum> {
-    Ok(match (name.as_str(), photos.first()) {
-        ("inner", _) => NetworkDatum::Inner(InnerConstraints { points, photos, scale }),
-        ("relative", Some(&photo)) => NetworkDatum::RelativeToPhoto(photo),
-        ("relative", None) => NetworkDatum::RelativeToPoints(points),
-        (other, _) => return Err(unknown("datum", other)),
-    })
 }
 
 /// Something that has cofactors: its kind and its index.

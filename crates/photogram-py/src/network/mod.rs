@@ -5,6 +5,7 @@ mod block_network;
 mod collection;
 mod first_values;
 mod solution;
+mod state;
 
 use numpy::PyReadonlyArrayDyn;
 use photocore::network::{

@@ -1,10 +1,11 @@
 //! What an adjustment of a network has found, as arrays.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use photocore::network::{AdjustedCamera, AdjustedPhoto, Solution, State};
+use photocore::network::{AdjustedCamera, AdjustedPhoto, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::state::BlockState;
 use super::{FailureRow, failure};
 use crate::arrays::{squares, table};
 use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
@@ -18,12 +19,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<BlockState>()?;
     module.add_class::<BlockSolution>()?;
     module.add_class::<CollectionSolution>()
-}
-
-/// Where an adjustment has ended.
-#[pyclass(frozen, module = "photogram._photocore")]
-pub struct BlockState {
-    pub state: State,
 }
 
 /// Cofactors of so many unknowns of each photo, (n, N, N); those of held ones are zero.
