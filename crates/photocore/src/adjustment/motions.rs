@@ -230,7 +230,7 @@ impl<M: Model> Problem<M> {
         });
         let together = self.weighted(values);
         for own in &together {
-            for row in own.coefficients.row_iter() {
+            for row in own.rows() {
                 candidates.add_row(&mut sums, own.unknowns().zip(row.iter().copied()));
             }
         }

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
 use rayon::ThreadPool;
+use smallvec::SmallVec;
 
 use super::loss::Reweighting;
 use crate::normals::{Equations, GroupRows, Layout, Prior, System, TieRows};
@@ -87,16 +87,21 @@ pub struct Motions {
 pub struct Weighted {
     /// The first of the unknowns.
     pub first: usize,
-    /// Observed minus computed, as many as unknowns.
-    pub constant: DVector<f64>,
-    /// The partials of the computed by the step, square; zero where nothing is observed.
-    pub coefficients: DMatrix<f64>,
+    /// Observed minus computed, as many as unknowns. There are as many of these as photos, of three unknowns each: on the stack.
+    pub constant: SmallVec<[f64; 3]>,
+    /// The partials of the computed by the step, square, row by row; zero where nothing is observed.
+    pub coefficients: SmallVec<[f64; 9]>,
 }
 
 impl Weighted {
     /// Where the unknowns stand.
     pub(super) fn unknowns(&self) -> Range<usize> {
         self.first..self.first + self.constant.len()
+    }
+
+    /// The partials, row by row.
+    pub(super) fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.coefficients.chunks_exact(self.constant.len())
     }
 }
 
@@ -144,7 +149,7 @@ impl<M: Model> Problem<M> {
         let plain = |range: Range<usize>| range.map(|i| self.prior_square(i, values[i])).sum::<f64>();
         let (mut sum, mut from) = (0.0, of.start);
         for own in self.weighted(values).iter().filter(|own| of.contains(&own.first)) {
-            sum += plain(from..own.first) + own.constant.norm_squared();
+            sum += plain(from..own.first) + own.constant.iter().map(|value| value * value).sum::<f64>();
             from = own.unknowns().end;
         }
         sum + plain(from..of.end)
@@ -301,16 +306,12 @@ impl<M: Model> Linearized<'_, M> {
 
 /// Puts the equations of unknowns that are weighted together in the place of those of each; none is of a held one.
 fn add_weighted(prior: &mut Prior, own: &Weighted, is_held: &dyn Fn(usize) -> bool) {
-    let mut coefficients = own.coefficients.clone();
-    let is_held = own.unknowns().map(is_held).collect::<Vec<_>>();
-    for k in (0..is_held.len()).filter(|&k| is_held[k]) {
-        coefficients.column_mut(k).fill(0.0);
-    }
-    let (normal, right) = (coefficients.tr_mul(&coefficients), coefficients.tr_mul(&own.constant));
-    for i in (0..is_held.len()).filter(|&i| !is_held[i]) {
-        (prior.weight[own.first + i], prior.right[own.first + i]) = (normal[(i, i)], right[i]);
-        let others = (0..i).filter(|&j| !is_held[j]);
-        prior.between.extend(others.map(|j| (own.first + i, own.first + j, normal[(i, j)])));
+    for (i, unknown) in own.unknowns().enumerate().filter(|&(_, unknown)| !is_held(unknown)) {
+        let product = |j: usize| own.rows().map(|row| row[i] * row[j]).sum::<f64>();
+        prior.weight[unknown] = product(i);
+        prior.right[unknown] = own.rows().zip(&own.constant).map(|(row, constant)| row[i] * constant).sum();
+        let others = (0..i).filter(|&j| !is_held(own.first + j));
+        prior.between.extend(others.map(|j| (unknown, own.first + j, product(j))));
     }
 }
 

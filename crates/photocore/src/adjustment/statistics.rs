@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use nalgebra::DMatrix;
 use rayon::ThreadPool;
 
 use super::problem::{Model, Problem, Weighted};
@@ -92,11 +91,11 @@ impl<M> Problem<M> {
             let (range, width) = (layout.kept_range(kept), layout.kept_dim(kept));
             while let Some(own) = weighted.next_if(|own| own.first < range.end) {
                 let first = start + (own.first - range.start) * (width + 1);
-                let count = own.constant.len();
-                let q = DMatrix::from_fn(count, count, |i, j| cofactors.kept[first + i * width + j]);
-                let shares = (&own.coefficients * q * own.coefficients.transpose()).diagonal();
-                for (k, unknown) in own.unknowns().enumerate().filter(|&(_, i)| self.is_weighted(i)) {
-                    redundancy[unknown] = 1.0 - shares[k];
+                for (row, unknown) in own.rows().zip(own.unknowns()).filter(|&(_, i)| self.is_weighted(i)) {
+                    let q_row = |i: usize| &cofactors.kept[first + i * width..];
+                    let along = |i: usize| row.iter().zip(q_row(i)).map(|(a, q)| a * q).sum::<f64>();
+                    let share: f64 = row.iter().enumerate().map(|(i, a)| a * along(i)).sum();
+                    redundancy[unknown] = 1.0 - share;
                 }
             }
             start += width * width;

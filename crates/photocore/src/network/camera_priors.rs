@@ -1,6 +1,7 @@
 //! Cameras whose parameters were observed with their full covariance: by a calibration of their own.
 
 use nalgebra::{DMatrix, DVector};
+use smallvec::SmallVec;
 
 use super::Camera;
 use crate::adjustment::Weighted;
@@ -33,7 +34,11 @@ impl CameraPrior {
         let apart = DVector::from_fn(count, |k, _| {
             if weighted(k) { prior[self.first + k] - values[self.first + k] } else { 0.0 }
         });
-        Weighted { first: self.first, constant: &self.root * apart, coefficients: self.root.clone() }
+        Weighted {
+            first: self.first,
+            constant: SmallVec::from_slice((&self.root * apart).as_slice()),
+            coefficients: SmallVec::from_slice(self.root.transpose().as_slice()),
+        }
     }
 }
 

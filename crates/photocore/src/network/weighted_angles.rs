@@ -1,6 +1,6 @@
 //! Angles of photos that are weighted, while the attitude steps by a rotation vector.
 
-use nalgebra::{DMatrix, DVector};
+use smallvec::SmallVec;
 
 use super::model::Bundle;
 use super::observations::misalignment;
@@ -33,11 +33,10 @@ impl Bundle {
             } else {
                 angle_equations(sense, angles, observed, &sd)
             };
-            let constant = DVector::from_column_slice(constant.as_slice());
             Some(Weighted {
                 first,
-                constant,
-                coefficients: DMatrix::from_fn(3, 3, |i, j| coefficients[(i, j)]),
+                constant: SmallVec::from_buf(constant.into()),
+                coefficients: SmallVec::from_slice(coefficients.transpose().as_slice()),
             })
         };
         (0..self.cameras.len()).filter_map(of_photo).collect()
