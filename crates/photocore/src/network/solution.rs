@@ -194,30 +194,26 @@ impl Solution {
     fn find_behind(&mut self, Assembled { problem, points, .. }: &Assembled, unknowns: &[f64]) {
         let model = &problem.model;
         let photos = model.photos(&unknowns[model.of_stations()]);
+        let folds: Vec<f64> = photos.iter().map(|station| station.camera.fold()).collect();
         for ((&point, &at), images) in
             points.iter().zip(model.coordinates(unknowns)).zip(model.start.windows(2))
         {
             let position = model.space.cartesian(at);
-            let seen = |image: usize| {
-                let Station { orientation, camera } = &photos[model.images[image].photo];
-                (camera, orientation.pose().sight(&position))
-            };
-            let hidden = |&image: &usize| {
-                let (camera, u) = seen(image);
-                !camera.faces(&u)
-            };
-            let folded = |&image: &usize| {
-                let (camera, u) = seen(image);
-                camera.folds(&u, model.images[image].xy)
-            };
-            let beyond = (images[0]..images[1]).filter(folded).map(|image| model.order[image]);
-            self.folded.extend(beyond);
-            let found: Vec<usize> =
-                (images[0]..images[1]).filter(hidden).map(|image| model.order[image]).collect();
-            if let Some(point) = &mut self.points[point] {
-                point.behind = found.len();
+            let before = self.behind.len();
+            for image in images[0]..images[1] {
+                let super::Image { photo, xy, .. } = model.images[image];
+                let Station { orientation, camera } = &photos[photo];
+                let u = orientation.pose().sight(&position);
+                if !camera.faces(&u) {
+                    self.behind.push(model.order[image]);
+                }
+                if folds[photo].is_finite() && camera.radius(&u, xy) > folds[photo] {
+                    self.folded.push(model.order[image]);
+                }
             }
-            self.behind.extend(found);
+            if let Some(point) = &mut self.points[point] {
+                point.behind = self.behind.len() - before;
+            }
         }
         self.behind.sort_unstable();
         self.folded.sort_unstable();

@@ -50,8 +50,11 @@ pub trait BackwardModel: Copy {
     /// The measured position that g takes to the given one.
     fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]>;
 
-    /// See [`CameraModel::folds`]; of the measured position alone.
-    fn folds(&self, measured: [f64; 2]) -> bool;
+    /// See [`CameraModel::radius`]; of the measured position alone.
+    fn radius(&self, measured: [f64; 2]) -> f64;
+
+    /// See [`CameraModel::fold`].
+    fn fold(&self) -> f64;
 
     /// See [`CameraModel::radial_limit`].
     fn radial_limit(&self) -> Option<RadialLimit>;
@@ -109,8 +112,12 @@ impl<T: BackwardModel> CameraModel for T {
         if positive { self.perspective().direction(xy) } else { None }
     }
 
-    fn folds(&self, _: &Vector3, measured: [f64; 2]) -> bool {
-        BackwardModel::folds(self, measured)
+    fn radius(&self, _: &Vector3, measured: [f64; 2]) -> f64 {
+        BackwardModel::radius(self, measured)
+    }
+
+    fn fold(&self) -> f64 {
+        BackwardModel::fold(self)
     }
 
     fn correction(&self, measured: [f64; 2]) -> Option<[f64; 2]> {

@@ -88,8 +88,12 @@ impl CameraModel for Bal {
         Some(Vector3::new(ratio * distorted[0], ratio * distorted[1], -1.0).normalize())
     }
 
-    fn folds(&self, u: &Vector3, _: [f64; 2]) -> bool {
-        self.radial_part().folds((u.x / u.z).hypot(u.y / u.z))
+    fn radius(&self, u: &Vector3, _: [f64; 2]) -> f64 {
+        (u.x / u.z).hypot(u.y / u.z)
+    }
+
+    fn fold(&self) -> f64 {
+        self.radial_part().fold()
     }
 
     fn radial_limit(&self) -> Option<RadialLimit> {

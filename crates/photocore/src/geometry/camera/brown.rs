@@ -163,9 +163,13 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
         Some([self.principal_point[0] + dx, self.principal_point[1] + y])
     }
 
-    fn folds(&self, measured: [f64; 2]) -> bool {
+    fn radius(&self, measured: [f64; 2]) -> f64 {
         let (_, [x, y]) = self.place(measured);
-        self.terms.lens().radial.folds(x.hypot(y))
+        x.hypot(y)
+    }
+
+    fn fold(&self) -> f64 {
+        self.terms.lens().radial.fold()
     }
 
     fn radial_limit(&self) -> Option<RadialLimit> {

@@ -111,9 +111,13 @@ impl CameraModel for BrownForward {
         self.perspective().direction(ideal)
     }
 
-    fn folds(&self, u: &Vector3, _: [f64; 2]) -> bool {
+    fn radius(&self, u: &Vector3, _: [f64; 2]) -> f64 {
         let [x, y] = self.perspective().image(u);
-        self.terms.lens().radial.folds(x.hypot(y))
+        x.hypot(y)
+    }
+
+    fn fold(&self) -> f64 {
+        self.terms.lens().radial.fold()
     }
 
     fn radial_limit(&self) -> Option<RadialLimit> {

@@ -70,9 +70,9 @@ impl RadialFactor {
         Some(RadialLimit { radius: q.sqrt(), distorted: q.sqrt() * self.value(q).abs() })
     }
 
-    /// Whether r s has stopped to rise before a radius.
-    pub fn folds(&self, radius: f64) -> bool {
-        !self.surely_rises(&self.slope(), radius) && self.limit().is_some_and(|limit| radius > limit.radius)
+    /// The radius from which on r s no longer rises; infinite where it always does.
+    pub fn fold(&self) -> f64 {
+        self.limit().map_or(f64::INFINITY, |limit| limit.radius)
     }
 
     /// Whether r s rises up to a radius because what the negative terms take away by then leaves something: most lenses need no root.

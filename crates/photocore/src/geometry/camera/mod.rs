@@ -74,8 +74,18 @@ pub trait CameraModel: Copy {
 
     /// Whether u, or what was measured of it, lies beyond where the radial part of the lens is one-to-one: its image is that of another
     /// direction, too.
-    fn folds(&self, _u: &Vector3, _measured: [f64; 2]) -> bool {
-        false
+    fn folds(&self, u: &Vector3, measured: [f64; 2]) -> bool {
+        self.radius(u, measured) > self.fold()
+    }
+
+    /// The radius that the radial part of the lens is a function of.
+    fn radius(&self, _u: &Vector3, _measured: [f64; 2]) -> f64 {
+        0.0
+    }
+
+    /// The radius from which on it folds back: infinite where it is one-to-one everywhere. It is the same for all images.
+    fn fold(&self) -> f64 {
+        f64::INFINITY
     }
 
     /// What a measured position is corrected to; None of a forward camera.
@@ -315,6 +325,16 @@ impl Camera {
     /// See [`CameraModel::folds`].
     pub fn folds(&self, u: &Vector3, measured: [f64; 2]) -> bool {
         each_camera!(self, camera => camera.folds(u, measured))
+    }
+
+    /// See [`CameraModel::radius`].
+    pub fn radius(&self, u: &Vector3, measured: [f64; 2]) -> f64 {
+        each_camera!(self, camera => camera.radius(u, measured))
+    }
+
+    /// See [`CameraModel::fold`].
+    pub fn fold(&self) -> f64 {
+        each_camera!(self, camera => camera.fold())
     }
 
     /// See [`CameraModel::correction`].

@@ -289,11 +289,15 @@ where
         })
     }
 
-    fn folds(&self, _: [f64; 2]) -> bool {
-        false
+    /// They have no radial part.
+    fn radius(&self, _: [f64; 2]) -> f64 {
+        0.0
     }
 
-    /// They have no radial part.
+    fn fold(&self) -> f64 {
+        f64::INFINITY
+    }
+
     fn radial_limit(&self) -> Option<RadialLimit> {
         None
     }

@@ -64,8 +64,12 @@ impl CameraModel for Radial {
         self.lens.direction([x - cx, cy - y])
     }
 
-    fn folds(&self, u: &Vector3, measured: [f64; 2]) -> bool {
-        self.lens.folds(u, measured)
+    fn radius(&self, u: &Vector3, measured: [f64; 2]) -> f64 {
+        self.lens.radius(u, measured)
+    }
+
+    fn fold(&self) -> f64 {
+        self.lens.fold()
     }
 
     fn radial_limit(&self) -> Option<RadialLimit> {

@@ -210,10 +210,13 @@ trait Table<const N: usize>: Copy {
         Self::Projection::faces([u.x, -u.y, -u.z], self.parts().own)
     }
 
-    fn turns_over(&self, u: &Vector3) -> bool {
-        let parts = self.parts();
-        let [a, b] = Self::Projection::project([u.x, -u.y, -u.z], parts.own).ab;
-        parts.lens.radial.folds(a.hypot(b))
+    fn bent_at(&self, u: &Vector3) -> f64 {
+        let [a, b] = Self::Projection::project([u.x, -u.y, -u.z], self.parts().own).ab;
+        a.hypot(b)
+    }
+
+    fn bent_until(&self) -> f64 {
+        self.parts().lens.radial.fold()
     }
 
     fn limit(&self) -> Option<RadialLimit> {
@@ -282,8 +285,12 @@ macro_rules! cameras_of_vision {
                 self.looks_to(u)
             }
 
-            fn folds(&self, u: &Vector3, _: [f64; 2]) -> bool {
-                self.turns_over(u)
+            fn radius(&self, u: &Vector3, _: [f64; 2]) -> f64 {
+                self.bent_at(u)
+            }
+
+            fn fold(&self) -> f64 {
+                self.bent_until()
             }
 
             fn radial_limit(&self) -> Option<RadialLimit> {
