@@ -832,10 +832,20 @@ class BlockSolution(_NetworkSolution):
         """Indices of the images beyond where the lens of their camera is one-to-one, ascending."""
 
     @property
+    def weak_points(self) -> list[tuple[int, float, float]]:
+        """Points on nearly parallel rays, or at a station's own place.
+
+        For each its index, the largest of its standard deviations over the smallest (in any directions;
+        infinite where rounding has taken the smallest, NaN without cofactors) and its distance from the
+        nearest station that sees it, in the median of these distances.
+        """
+
+    @property
     def weak(self) -> list[tuple[int, int]]:
         """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
 
-        The sum of squares stood still all the same. Empty where the adjustment ended otherwise.
+        The sum of squares stood still all the same, or the iterations ran out. Empty where the adjustment
+        ended otherwise.
         """
 
     @property
@@ -1730,6 +1740,10 @@ class CollectionSolution(_NetworkSolution):
     @property
     def collapsed(self) -> list[int]:
         """Indices of the points that ran into a station and were left out."""
+
+    @property
+    def not_determined(self) -> list[int]:
+        """Indices of the points that were left out because their rays do not determine them."""
 
     @property
     def sum_of_squares(self) -> float:

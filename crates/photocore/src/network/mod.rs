@@ -70,6 +70,7 @@ mod problem;
 mod screening;
 mod solution;
 mod start;
+mod weak_points;
 mod weighted_angles;
 
 use std::ops::ControlFlow;
@@ -92,6 +93,7 @@ pub use precision::Coarse;
 pub(crate) use precision::median;
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+pub use weak_points::WeakPoint;
 pub(crate) use start::meet;
 
 /// A photo as it is known beforehand.
@@ -296,6 +298,7 @@ impl Network {
     ) -> Result<Solution, NetworkError> {
         self.check()?;
         let mut left_out = vec![false; self.points.len()];
+        let mut harmful: Vec<Dropped> = Vec::new();
         let mut before: Option<(Adjustment, problem::Reached)> = None;
         loop {
             let screened = self.screen(&left_out);
@@ -310,6 +313,16 @@ impl Network {
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
             let adjusted = adjustment::adjust(problem, &own, pool, watch);
+            let lost = match &adjusted {
+                Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) => assembled.few_points(error),
+                Ok(_) => vec![],
+            };
+            if !lost.is_empty() {
+                // Where they were determined at first, they have led the others astray: these begin again.
+                lost.iter().for_each(|&point| left_out[point] = true);
+                harmful.extend(lost.into_iter().map(|point| Dropped { point, reason: Reason::NotDetermined }));
+                continue;
+            }
             let named = |error| self.name(NetworkError::new(error, &assembled), &assembled, pool);
             let mut adjusted = adjusted.map_err(named)?;
             let earlier = before.take();
@@ -324,9 +337,15 @@ impl Network {
                 let mut solution = Solution::new(self, options, &assembled, adjusted, collapsed);
                 solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
                 solution.lost_digits = lost;
+                solution.dropped.extend(harmful);
+                solution.dropped.sort_unstable_by_key(|dropped| dropped.point);
                 return Ok(solution);
             }
-            adjusted.collapsed.iter().for_each(|&point| left_out[assembled.points[point]] = true);
+            for &point in &adjusted.collapsed {
+                let point = assembled.points[point];
+                left_out[point] = true;
+                harmful.push(Dropped { point, reason: Reason::RanIntoStation });
+            }
             let reached = assembled.reached(&adjusted.unknowns, self.points.len());
             before = Some((adjusted, reached));
         }

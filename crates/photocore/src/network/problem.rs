@@ -10,7 +10,7 @@ use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
 use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start};
-use crate::adjustment::{Method, Model, Problem};
+use crate::adjustment::{AdjustError, Method, Model, Problem};
 use crate::geometry::{
     Matrix3, ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, local_vertical, nearest_turns,
 };
@@ -32,6 +32,9 @@ pub(super) struct Reached {
     stations: Vec<f64>,
 }
 
+/// Points that are not determined are few where there are so many times as many.
+const FEW: usize = 10;
+
 impl Assembled {
     /// Refuses what takes more memory than it may.
     pub fn check_memory(&self, options: &Options) -> Result<(), NetworkError> {
@@ -40,6 +43,15 @@ impl Assembled {
             Some(available) if needed > available => Err(NetworkError::Memory { needed, available }),
             _ => Ok(()),
         }
+    }
+
+    /// The points that an adjustment has ended with because their rays do not determine them, where they are so few that the others make
+    /// up a network without them: indices into it. None where observations beside images touch them.
+    pub fn few_points(&self, error: &AdjustError) -> Vec<usize> {
+        let AdjustError::UndeterminedLocals(locals) = error else { return vec![] };
+        let free = |&local: &usize| self.problem.model.points[local].held() == [false; 3];
+        let few = FEW * locals.len() <= self.problem.model.locals && locals.iter().all(free);
+        if few { locals.iter().map(|&local| self.points[local]).collect() } else { vec![] }
     }
 
     /// Takes over adjusted unknowns; `count` is the number of all points.

@@ -11,7 +11,7 @@ pub struct Dropped {
     pub reason: Reason,
 }
 
-/// Why a point was left out (GIANT guide, sections 6 and 11).
+/// Why a point was left out: the first three before the adjustment (GIANT guide, sections 6 and 11), the others because of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
     /// It has no image.
@@ -20,6 +20,10 @@ pub enum Reason {
     PassPointOnOnePhoto,
     /// A control point on one photo only, with more than one component not held.
     ControlPointOnOnePhoto,
+    /// The iterations have led it to the station of a photo that sees it, where it would harm all others.
+    RanIntoStation,
+    /// Its rays do not determine it: they are parallel, or one and the same.
+    NotDetermined,
 }
 
 impl Reason {
@@ -29,6 +33,8 @@ impl Reason {
             Reason::NotPhotographed => "not photographed",
             Reason::PassPointOnOnePhoto => "pass point on one photo",
             Reason::ControlPointOnOnePhoto => "control point on one photo",
+            Reason::RanIntoStation => "ran into the station of a photo",
+            Reason::NotDetermined => "its rays do not determine it",
         }
     }
 }

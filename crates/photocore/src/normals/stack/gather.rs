@@ -1,8 +1,9 @@
 //! The equations of a stack, gathered.
 
 use pulp::Simd;
+use smallvec::SmallVec;
 
-use super::{Part, Place, Segment, Slot, Stack};
+use super::{Part, Place, Run, Segment, Slot, Stack};
 use crate::normals::equations::{Equations, GroupRows};
 use crate::normals::layout::Layout;
 use crate::normals::symbolic::Symbolic;
@@ -112,7 +113,7 @@ impl Stack {
     /// Unites the parts that overlap or meet in one block; each segment takes `depth` rows of the coupling from `start` on.
     fn place_segments(&mut self, symbolic: &Symbolic, home: usize, depth: usize, start: usize) -> usize {
         self.segments.clear();
-        let mut parts: Vec<&Part> = self.parts.iter().collect();
+        let mut parts: SmallVec<[&Part; 16]> = self.parts.iter().collect();
         parts.sort_unstable_by_key(|part| (part.position, part.unknowns.start));
         for part in parts {
             match self.segments.last_mut() {
@@ -124,6 +125,8 @@ impl Stack {
                     unknowns: part.unknowns.clone(),
                     row: 0,
                     coupling: 0,
+                    runs: SmallVec::new(),
+                    plain: false,
                 }),
             }
         }
@@ -141,7 +144,34 @@ impl Stack {
             part.segment = after.saturating_sub(1);
             part.shift = part.unknowns.start - self.segments[part.segment].unknowns.start;
         }
+        self.find_runs();
         coupling
+    }
+
+    /// Finds the groups whose coefficients in a segment stand one below the other.
+    fn find_runs(&mut self) {
+        let single = self.slots.iter().filter(|slot| slot.groups.len() == 1).map(|slot| slot.groups.start);
+        for p in single {
+            let place = &self.places[p];
+            for &Part { segment, column, ref unknowns, .. } in &self.parts[place.parts.clone()] {
+                let Segment { unknowns: all, runs, .. } = &mut self.segments[segment];
+                if unknowns.len() < all.len() {
+                    continue;
+                }
+                let goes_on = |run: &&mut Run| {
+                    let width = self.places[run.places.start].width;
+                    run.places.end == p && run.column == column && width == place.width
+                };
+                match runs.last_mut().filter(goes_on) {
+                    Some(run) => run.places.end += 1,
+                    None => runs.push(Run { places: p..p + 1, column }),
+                }
+            }
+        }
+        for (index, segment) in self.segments.iter_mut().enumerate() {
+            let touching = self.parts.iter().filter(|part| part.segment == index).count();
+            segment.plain = segment.runs.iter().map(|run| run.places.len()).sum::<usize>() == touching;
+        }
     }
 }
 
