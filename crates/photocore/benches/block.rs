@@ -247,6 +247,7 @@ fn adjust(criterion: &mut Criterion) {
         unit_variance: UnitVariance::Constrained,
         start: Start::Intersected,
         hold_unused: false,
+        information: true,
         memory: None,
         minimum: None,
     };

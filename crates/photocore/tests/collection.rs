@@ -185,6 +185,7 @@ fn adjusted_from(
         unit_variance: UnitVariance::Constrained,
         start,
         hold_unused: true,
+        information: false,
         memory: None,
         minimum: None,
     };

@@ -122,6 +122,7 @@ fn block_network(
         },
         start: Start::Intersected,
         hold_unused: false,
+        information: true,
         memory,
         minimum: minimum.map(|(photo, coordinate)| Minimum { photo, coordinate }),
     };

@@ -120,6 +120,7 @@ fn adjust_collection(
         unit_variance: UnitVariance::Constrained,
         start: Start::Given,
         hold_unused: true,
+        information: false,
         memory,
         minimum: None,
     };
