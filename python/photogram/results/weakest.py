@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 __all__ = ["WeakestPhoto", "WeakestPoint", "weakest_lines", "weakest_photos", "weakest_points"]
 
 WORST = 10
+NEAR = 1e-3
+"""Distance from a station, in the median of such distances, below which a point stands first."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +95,6 @@ def weakest_points(result: Result, count: int = WORST) -> list[WeakestPoint]:
         )
         for row in list(dict.fromkeys(int(each) for each in chosen))[:count]
     ]
-
-
-NEAR = 1e-3
-"""Distance from a station, in the median of such distances, below which a point stands first."""
 
 
 @np.errstate(all="ignore")

@@ -206,9 +206,10 @@ impl Network {
         let places = [centres, cameras, commons, tied].concat();
         let of_images = model.images.iter().flat_map(|image| image.sd);
         let of_ties = model.observations.iter().flat_map(|tied| vec![1.0; tied.root.nrows()]);
+        let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
         let problem = Problem {
             observation_sd: of_images.chain(of_ties).collect(),
-            system: System::new(layout(&model, places)?, options.ordering),
+            system: System::new(layout(&model, places)?.with_held(&held), options.ordering),
             initial,
             prior,
             sd,

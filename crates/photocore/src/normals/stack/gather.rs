@@ -1,5 +1,7 @@
 //! The equations of a stack, gathered.
 
+use std::ops::Range;
+
 use pulp::Simd;
 use smallvec::SmallVec;
 
@@ -70,7 +72,8 @@ impl Stack {
             self.places.push(Place { parts: start..self.parts.len(), width, rows: common });
             common += depth * rows * width;
         }
-        let further = self.parts.iter().map(|part| part.position);
+        let further = groups.iter().flat_map(|&group| layout.further_of(group as usize));
+        let further = further.map(|&block| symbolic.position(block as usize));
         let home = further.chain(positions.first().map(|&main| main as usize)).min();
         let home = home.map_or(0, |first| symbolic.supernode_of(first));
         let (mut kept, mut coupling) = (0, 0);
@@ -96,18 +99,22 @@ impl Stack {
     /// Appends the parts of what a group has in common with others; returns how many unknowns they have.
     fn place_parts(&mut self, layout: &Layout, symbolic: &Symbolic, group: usize) -> usize {
         let mut width = 0;
-        let further = layout.further_of(group).iter().map(|&block| {
-            let position = symbolic.position(block as usize);
-            (position, 0..symbolic.dim(position))
-        });
-        // The border is the last block.
-        let border = std::iter::once((symbolic.blocks() - 1, layout.border_of(group)));
-        for (position, unknowns) in further.chain(border.filter(|(_, unknowns)| !unknowns.is_empty())) {
-            let column = width;
-            width += unknowns.len();
+        let mut add = |position: usize, unknowns: Range<usize>, column: usize| {
             self.parts.push(Part { position, unknowns, segment: 0, shift: 0, column });
+        };
+        for &block in layout.further_of(group) {
+            let (position, block) = (symbolic.position(block as usize), block as usize);
+            for free in layout.free_of(block) {
+                add(position, free.clone(), width + free.start);
+            }
+            width += layout.kept_dim(block);
         }
-        width
+        // The border is the last block.
+        let border = layout.border_of(group);
+        if !border.is_empty() {
+            add(symbolic.blocks() - 1, border.clone(), width);
+        }
+        width + border.len()
     }
 
     /// Unites the parts that overlap or meet in one block; each segment takes `depth` rows of the coupling from `start` on.
