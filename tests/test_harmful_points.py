@@ -1,6 +1,7 @@
-"""Points and photos that harm the whole: named, left out or kept with a warning; never why nothing is known."""
+"""Points that harm the whole: named, left out or kept with a warning; never why nothing is known."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -60,7 +61,7 @@ def test_a_point_on_nearly_parallel_rays_is_named_and_harms_nothing(made):
     assert worst[0].point == "X"
     assert worst[0].ratio > 1e4
     assert len(worst) == 10
-    assert all(a.ratio >= b.ratio for a, b in zip(worst, worst[1:], strict=False))
+    assert all(a.ratio >= b.ratio for a, b in pairwise(worst))
     # The same by hand, of an ordinary point.
     row = result.block.point_ids.index(worst[-1].point)
     values = np.linalg.eigvalsh(result.point_cofactors[row])
@@ -117,6 +118,8 @@ def test_the_report_and_the_document_have_the_worst(made):
     # A photo's condition by hand.
     row = result.block.photo_ids.index(photos[0].photo)
     sd = np.sqrt(np.diag(result.photo_cofactors[row]))
-    assert photos[0].condition == pytest.approx(np.linalg.cond(result.photo_cofactors[row] / np.outer(sd, sd)))
+    assert photos[0].condition == pytest.approx(
+        np.linalg.cond(result.photo_cofactors[row] / np.outer(sd, sd))
+    )
     assert weakest_points(adjust(made.block, covariance=False)) == []
     assert photogram.results.weakest.weakest_lines(adjust(made.block, covariance=False)) == []

@@ -1,4 +1,4 @@
-"""Blocks that hardly tell the principal distance from the flying height: few steps, or words for what is weak."""
+"""Blocks that hardly tell the principal distance from the flying height: few steps, or words."""
 
 import numpy as np
 import pytest

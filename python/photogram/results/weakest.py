@@ -104,9 +104,7 @@ def weakest_photos(result: Result, count: int = WORST) -> list[WeakestPhoto]:
     Fixed unknowns of a photo do not count; those of which all are fixed are left out.
     """
     cofactors = result.photo_cofactors[:, :6, :6]
-    images = np.bincount(
-        result.block.image_photos[result.used_images], minlength=len(result.block.photo_ids)
-    )
+    images = np.bincount(result.block.image_photos[result.used_images], minlength=len(result.block.photo_ids))
     found = []
     for row, matrix in enumerate(cofactors):
         free = np.diag(matrix) > 0
