@@ -1,6 +1,7 @@
 """Points that harm the whole: named, left out or kept with a warning; never why nothing is known."""
 
 import json
+import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -90,6 +91,37 @@ def test_a_point_that_its_rays_do_not_determine_is_left_out(made):
     assert result.dropped == {"X": "its rays do not determine it"}
     assert "left out, its rays do not determine it: X" in [str(each) for each in result.messages]
     assert np.isfinite(result.point_sd[:-1][result.point_rays[:-1] > 0]).all()
+
+
+def test_a_photo_that_its_images_do_not_determine_is_left_out():
+    """Two images are four equations for six unknowns."""
+    block = simulate(strips=2, photos_per_strip=6, seed=3).block
+    own = np.flatnonzero(block.image_photos == 3)
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    two = own[np.argsort(-rays[block.image_points[own]], kind="stable")[:2]]
+    kept = (block.image_photos != 3) | np.isin(np.arange(len(block.image_photos)), two)
+    few = block.replace(
+        image_photos=block.image_photos[kept],
+        image_points=block.image_points[kept],
+        image_xy=block.image_xy[kept],
+        image_sd=np.broadcast_to(np.asarray(block.image_sd, dtype=float), block.image_xy.shape)[kept],
+    )
+    result = adjust(few)
+    assert result.converged
+    [said] = [
+        str(each) for each in result.messages if "photos that their images do not determine" in str(each)
+    ]
+    assert block.photo_ids[3] in said
+    others = np.arange(len(block.photo_ids)) != 3
+    assert np.isfinite(result.photo_sd[others]).all()
+    assert np.isnan(result.photo_sd[3]).all()
+    np.testing.assert_array_equal(result.photo_positions[3], block.photo_positions[3])
+    assert not result.used_images[few.image_photos == 3].any()
+    # It is as if it had no images; its state goes to other processes.
+    again = pickle.loads(pickle.dumps(result))
+    photo = block.photo_ids[0]
+    joint = again.covariance([("photo", photo)])
+    np.testing.assert_allclose(np.diag(joint)[:3], result.photo_sd[0, :3] ** 2, rtol=1e-6)
 
 
 @pytest.mark.parametrize("metres", [1.0, 0.01])

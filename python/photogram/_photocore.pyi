@@ -648,8 +648,9 @@ class BlockState:
     ----------
     unknowns
         Adjusted, in the order of the core.
-    held, collapsed
-        Unknowns held for a datum; points left out because they ran into a station.
+    held, collapsed, loose
+        Unknowns held for a datum; points left out because they ran into a station or their rays do not
+        determine them; photos left out because their images do not.
     ordering
         The name of the ordering in force.
     datum
@@ -666,12 +667,20 @@ class BlockState:
         unknowns: list[float],
         held: list[int],
         collapsed: list[int],
+        loose: list[int],
         ordering: str,
         datum: tuple[str, list[int], list[int], bool] | None,
     ) -> BlockState: ...
     def __getnewargs__(
         self,
-    ) -> tuple[list[float], list[int], list[int], str, tuple[str, list[int], list[int], bool] | None]: ...
+    ) -> tuple[
+        list[float],
+        list[int],
+        list[int],
+        list[int],
+        str,
+        tuple[str, list[int], list[int], bool] | None,
+    ]: ...
 
 @final
 class BlockCovariances:
@@ -830,6 +839,10 @@ class BlockSolution(_NetworkSolution):
     @property
     def images_folded(self) -> _Indices:
         """Indices of the images beyond where the lens of their camera is one-to-one, ascending."""
+
+    @property
+    def loose_photos(self) -> list[int]:
+        """Indices of the photos that stay as they are because their images do not determine them."""
 
     @property
     def weak_points(self) -> list[tuple[int, float, float]]:

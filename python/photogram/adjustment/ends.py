@@ -45,10 +45,18 @@ def undetermined(
 
 
 def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Remark on points that hardly hold, and spoil what hangs on them."""
+    """Remark on points and photos that hardly hold, and spoil what hangs on them."""
     near = [(point, distance) for point, _, distance in solution.weak_points if distance < NEAR]
     flat = [(point, ratio) for point, ratio, distance in solution.weak_points if distance >= NEAR]
     messages = []
+    if solution.loose_photos:
+        names = listed([block.photo_ids[photo] for photo in solution.loose_photos])
+        messages.append(
+            Message(
+                f"left out, photos that their images do not determine: {names}; their points are too few, or"
+                " lie on a line: they stay where they were given, and their images do not take part"
+            )
+        )
     if near:
         names = listed([block.point_ids[point] for point, _ in near])
         messages.append(

@@ -30,14 +30,17 @@ const MOST_DAMPING: f64 = 1e9;
 /// so weakly determined that the others bend off the straight line on the way: it is followed along the curve (see
 /// [`Run::along_valley`]).
 const VALLEY: f64 = 30.0;
-/// Parts of such a step that are tried, each half of the one before.
-const PARTS: usize = 7;
+/// Parts of such a step that are tried, each half of the one before,
+const PARTS: usize = 4;
+/// and how many steps are taken so in one adjustment at the most: a valley that goes on and on is for the names of its unknowns.
+const MOST_ALONG: usize = 8;
 /// Damping of the steps that lead back to the floor of a valley: it holds what is weak, and lets all else go.
 const HOLDING: f64 = 1e-6;
 /// How many of these steps there are at the most, at each part.
 const BACK: usize = 3;
-/// A part of a step is good when it lowers the sum of squares by this fraction of what the linearized equations predict.
-const GAIN: f64 = 0.1;
+/// A part of a step is good when it lowers the sum of squares by this fraction of what the linearized equations predict: where they predict
+/// badly, the combination is determined so weakly that its standard deviation is no measure of a step.
+const GAIN: f64 = 0.5;
 
 /// What the control of the steps remembers from one to the next.
 struct Control {
@@ -46,6 +49,10 @@ struct Control {
     best: f64,
     /// What it was when a full step failed last, and the unknowns that this has moved most.
     refused: Option<(f64, Vec<usize>)>,
+    /// Whether that was a step along a valley.
+    in_valley: bool,
+    /// How many have been taken along one.
+    along: usize,
 }
 
 /// The damping after a step that failed.
@@ -72,7 +79,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         stop: Stop,
     ) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
-        let mut control = Control { stop, best: state.sum_of_squares, refused: None };
+        let mut control = Control { stop, best: state.sum_of_squares, refused: None, in_valley: false, along: 0 };
         while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
             match self.step_from(state, &mut control)? {
                 ControlFlow::Continue(next) => state = next,
@@ -80,7 +87,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
             }
         }
         let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
-        if let Some((_, moved)) = control.refused.filter(|_| status == Status::NotConverged) {
+        let creeps = control.in_valley && status == Status::NotConverged;
+        if let Some((_, moved)) = control.refused.filter(|_| creeps) {
             self.weak = moved;
         }
         self.stay(state, status)
@@ -125,11 +133,16 @@ impl<'a, M: Model> Run<'a, '_, M> {
         // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
         if !(next.sum_of_squares <= highest && next.factor.deficient_locals.is_empty()) {
             next.factor.recycle(&self.problem.system);
+            if damping == 0.0 {
+                control.in_valley = change <= VALLEY;
+            }
             if damping == 0.0
-                && change <= VALLEY
+                && control.in_valley
+                && control.along < MOST_ALONG
                 && let Some((values, sum)) = self.along_valley(&unknowns, &step, change, control.best)?
             {
                 control.best = sum;
+                control.along += 1;
                 self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &values)?;
                 return self.form(values, 0.0).map(ControlFlow::Continue);
             }

@@ -18,10 +18,9 @@ const ROUNDING: f64 = 1e-14;
 /// and so may be one by which no unknown changes by more than this multiple of its standard deviation.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// So many steps in a row that lower the sum of squares together by less than this fraction of it follow what nothing determines: the
-/// sum stands still, however much they are damped.
+/// So many steps in a row that lower the sum of squares together by less than one of them must, to go on, follow what nothing determines:
+/// the sum stands still, however much they are damped.
 const PATIENCE: usize = 50;
-const STILL: f64 = 1e-9;
 
 /// The damping, and by how much the next failure raises it.
 struct Damping {
@@ -73,7 +72,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             if damping.value > MOST_DAMPING {
                 return self.rest(state.unknowns, Status::Diverged);
             }
-            if mark - lowest > STILL * lowest {
+            if !stop.at_decrease(mark - lowest, lowest) {
                 (mark, steps) = (lowest, 0);
             }
             if steps == PATIENCE {

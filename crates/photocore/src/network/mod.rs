@@ -298,10 +298,11 @@ impl Network {
     ) -> Result<Solution, NetworkError> {
         self.check()?;
         let mut left_out = vec![false; self.points.len()];
+        let mut loose = vec![false; self.photos.len()];
         let mut harmful: Vec<Dropped> = Vec::new();
         let mut before: Option<(Adjustment, problem::Reached)> = None;
         loop {
-            let screened = self.screen(&left_out);
+            let screened = self.screen(&left_out, &loose);
             if screened.points.is_empty() {
                 return Err(NetworkError::Empty);
             }
@@ -313,15 +314,16 @@ impl Network {
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
             let adjusted = adjustment::adjust(problem, &own, pool, watch);
-            let lost = match &adjusted {
-                Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) => assembled.few_points(error),
-                Ok(_) => vec![],
-            };
-            if !lost.is_empty() {
-                // Where they were determined at first, they have led the others astray: these begin again.
-                lost.iter().for_each(|&point| left_out[point] = true);
-                harmful.extend(lost.into_iter().map(|point| Dropped { point, reason: Reason::NotDetermined }));
-                continue;
+            if let Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) = &adjusted {
+                let (points, photos) = (assembled.few_points(error), assembled.few_photos(error));
+                if !(points.is_empty() && photos.is_empty()) {
+                    // They have led the others astray: these begin again.
+                    points.iter().for_each(|&point| left_out[point] = true);
+                    photos.iter().for_each(|&photo| loose[photo] = true);
+                    let reason = Reason::NotDetermined;
+                    harmful.extend(points.into_iter().map(|point| Dropped { point, reason }));
+                    continue;
+                }
             }
             let named = |error| self.name(NetworkError::new(error, &assembled), &assembled, pool);
             let mut adjusted = adjusted.map_err(named)?;

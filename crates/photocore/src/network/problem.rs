@@ -24,6 +24,8 @@ pub(super) struct Assembled {
     pub points: Vec<usize>,
     /// Those that do not.
     pub dropped: Vec<Dropped>,
+    /// The photos that stay where they are because their images do not determine them.
+    pub loose: Vec<usize>,
 }
 
 /// Values from which an adjustment goes on: of all points, and of the unknowns of photos and shared cameras.
@@ -32,7 +34,7 @@ pub(super) struct Reached {
     stations: Vec<f64>,
 }
 
-/// Points that are not determined are few where there are so many times as many.
+/// Points and photos that are not determined are few where there are so many times as many.
 const FEW: usize = 10;
 
 impl Assembled {
@@ -52,6 +54,24 @@ impl Assembled {
         let free = |&local: &usize| self.problem.model.points[local].held() == [false; 3];
         let few = FEW * locals.len() <= self.problem.model.locals && locals.iter().all(free);
         if few { locals.iter().map(|&local| self.points[local]).collect() } else { vec![] }
+    }
+
+    /// The photos that an adjustment has ended with because their images do not determine them, each by itself, where they are few.
+    pub fn few_photos(&self, error: &AdjustError) -> Vec<usize> {
+        let AdjustError::Undetermined(combinations) = error else { return vec![] };
+        let model = &self.problem.model;
+        let alone = |blocks: &Vec<usize>| match blocks[..] {
+            [block] => (block < model.cameras.len() && model.images_on[block] > 0).then_some(block),
+            _ => None,
+        };
+        let Some(mut photos) = combinations.iter().map(alone).collect::<Option<Vec<usize>>>() else {
+            return vec![];
+        };
+        photos.sort_unstable();
+        photos.dedup();
+        let is_frame = |photo: usize| model.mounts.iter().flatten().any(|mount| mount.frame == photo);
+        let few = FEW * photos.len() <= model.cameras.len() && !photos.iter().any(|&photo| is_frame(photo));
+        if few { photos } else { vec![] }
     }
 
     /// Takes over adjusted unknowns; `count` is the number of all points.
@@ -158,7 +178,10 @@ impl Network {
         // A frame is used when a photo on it is.
         let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
         self.mounts.iter().for_each(|mount| used[mount.frame] |= images_on[mount.photo] > 0);
-        let unused = |photo: usize| options.hold_unused && !used[photo];
+        let loose = screened.loose.clone();
+        let unused = |photo: usize| {
+            !used[photo] && (options.hold_unused || loose.binary_search(&photo).is_ok())
+        };
         if reached.is_none() {
             self.check_rounding(&screened, |photo| !unused(photo))?;
         }
@@ -216,7 +239,7 @@ impl Network {
             model,
         };
         self.check_observations(&problem)?;
-        Ok(Assembled { problem, points: screened.points, dropped: screened.dropped })
+        Ok(Assembled { problem, points: screened.points, dropped: screened.dropped, loose: screened.loose })
     }
 
     /// Refuses observations that cannot be computed from the initial values.

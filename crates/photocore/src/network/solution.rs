@@ -176,6 +176,7 @@ impl Solution {
                 unknowns: vec![],
                 held: adjustment.datum.clone(),
                 collapsed: collapsed.clone(),
+                loose: assembled.loose.clone(),
                 ordering: adjustment.ordering,
                 datum: None,
             },

@@ -278,6 +278,11 @@ solution_class! {
         }
 
         #[getter]
+        fn loose_photos(&self) -> Vec<usize> {
+            self.solution.state.loose.clone()
+        }
+
+        #[getter]
         fn weak_points(&self) -> Vec<(usize, f64, f64)> {
             self.solution.weak_points.iter().map(|weak| (weak.point, weak.ratio, weak.distance)).collect()
         }
