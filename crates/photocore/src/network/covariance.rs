@@ -60,8 +60,10 @@ pub enum Of {
 /// An adjusted network whose normal equations are factored: cofactors of anything with anything.
 #[derive(Debug)]
 pub struct Covariances {
-    assembled: Assembled,
-    factored: Factored,
+    pub(super) assembled: Assembled,
+    pub(super) factored: Factored,
+    /// How many images the network has.
+    pub(super) images: usize,
     /// The place of each point among those that took part.
     point: Vec<Option<usize>>,
     /// A photo of each camera.
@@ -114,7 +116,8 @@ impl Network {
         assembled.points.iter().enumerate().for_each(|(place, &index)| point[index] = Some(place));
         let mut photo_of_camera = vec![None; self.cameras.len()];
         self.photos.iter().enumerate().for_each(|(index, photo)| photo_of_camera[photo.camera] = Some(index));
-        Ok(Covariances { assembled, factored, point, photo_of_camera, memory: options.memory })
+        let (images, memory) = (self.images.len(), options.memory);
+        Ok(Covariances { assembled, factored, images, point, photo_of_camera, memory })
     }
 
     /// Takes an adjusted network to another datum without adjusting again: values, cofactors, redundancy numbers.
