@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 
 use super::covariance::Covariances;
 use super::model::Owner;
-use super::{Network, NetworkError};
+use super::NetworkError;
 use crate::adjustment::{AdjustError, EquationGroups, Event, GroupSquares, Phase, Probing};
 
 /// Groups of the observations of a network: a number for each, in the order of the network; that many groups or more for none.
@@ -28,16 +28,6 @@ pub struct Groups {
     pub observations: Vec<usize>,
 }
 
-impl Groups {
-    /// Whether they are of such a network.
-    fn fit(&self, network: &Network) -> bool {
-        let own = [self.images.len(), self.points.len(), self.photos.len(), self.cameras.len()];
-        let given = [network.images.len(), network.points.len(), network.photos.len(), network.cameras.len()];
-        let others = [self.commons.len(), self.observations.len()];
-        own == given && others == [network.commons.len(), network.observations.len()]
-    }
-}
-
 impl Covariances {
     /// Sums of `R_ij^2` over every two groups of observations, R being what takes their errors, in standard deviations, to residuals.
     ///
@@ -45,13 +35,12 @@ impl Covariances {
     /// Groups that are not of the network, an interruption.
     pub fn group_squares(
         &self,
-        network: &Network,
         groups: &Groups,
         probing: &Probing,
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<GroupSquares, NetworkError> {
-        let groups = self.equation_groups(network, groups)?;
+        let groups = self.equation_groups(groups)?;
         let problem = &self.assembled.problem;
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
@@ -65,14 +54,13 @@ impl Covariances {
     /// Those of [`Covariances::group_squares`].
     pub fn own_squares(
         &self,
-        network: &Network,
         groups: &Groups,
         classes: usize,
         probing: &Probing,
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Vec<f64>, NetworkError> {
-        let groups = self.equation_groups(network, groups)?;
+        let groups = self.equation_groups(groups)?;
         let problem = &self.assembled.problem;
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
@@ -120,10 +108,13 @@ impl Covariances {
     }
 
     /// The groups of the equations of the adjustment.
-    fn equation_groups(&self, network: &Network, groups: &Groups) -> Result<EquationGroups, NetworkError> {
+    fn equation_groups(&self, groups: &Groups) -> Result<EquationGroups, NetworkError> {
         let problem = &self.assembled.problem;
         let model = &problem.model;
-        if !groups.fit(network) || self.images != network.images.len() {
+        let given = [groups.images.len(), groups.points.len(), groups.photos.len(), groups.cameras.len()];
+        let own = [self.images, self.point.len(), self.camera_of_photo.len(), self.photo_of_camera.len()];
+        let others = [groups.commons.len(), groups.observations.len()];
+        if given != own || others != [model.commons.len(), self.observations] {
             return Err(NetworkError::State);
         }
         let mut of = Vec::with_capacity(problem.equations());
@@ -143,7 +134,7 @@ impl Covariances {
             match model.owner(block) {
                 Owner::Photo(photo) => {
                     let own = groups.photos[photo].into_iter();
-                    let camera = groups.cameras[network.photos[photo].camera];
+                    let camera = groups.cameras[self.camera_of_photo[photo]];
                     unknowns
                         .zip(own.chain(std::iter::repeat(camera)))
                         .for_each(|(row, group)| of[row] = group);

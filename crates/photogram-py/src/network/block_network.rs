@@ -47,6 +47,21 @@ fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
     rows.into_iter().map(of).collect()
 }
 
+/// Factors the normal equations of a network where its adjustment has ended.
+pub fn factored(
+    py: Python<'_>,
+    (network, options): (&Network, &Options),
+    state: &BlockState,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Result<BlockCovariances, Failure>> {
+    let images = network.images.len();
+    let found = watched(py, Workers::of(threads, images), progress, |pool, watch| {
+        network.covariances(options, &state.state, None, pool, watch)
+    })?;
+    Ok(found.map(|covariances| BlockCovariances { covariances, images }))
+}
+
 fn refused(error: &Failure) -> PyErr {
     BlockError::new_err(failure(error, "block"))
 }
@@ -100,39 +115,8 @@ impl BlockNetwork {
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<BlockCovariances> {
-        let images = self.network.images.len();
-        let found = watched(py, Workers::of(threads, images), progress, |pool, watch| {
-            self.network.covariances(&self.options, &state.state, None, pool, watch)
-        })?;
-        found.map(|covariances| BlockCovariances { covariances, images }).map_err(|error| refused(&error))
-    }
-
-    #[pyo3(signature = (covariances, groups, *, classes, exact, vectors, seed, threads, progress))]
-    fn group_squares<'py>(
-        &self,
-        py: Python<'py>,
-        covariances: &BlockCovariances,
-        groups: GroupsRow<'py>,
-        classes: Option<usize>,
-        exact: usize,
-        vectors: usize,
-        seed: u64,
-        threads: usize,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<SquaresRow<'py>> {
-        let groups = groups_of(groups)?;
-        let probing = Probing { exact, vectors, seed };
-        let (network, covariances) = (&self.network, &covariances.covariances);
-        let workers = Workers::of(threads, network.images.len());
-        let found = watched(py, workers, progress, |pool, watch| match classes {
-            None => covariances.group_squares(network, &groups, &probing, pool, watch),
-            Some(classes) => {
-                let squares = covariances.own_squares(network, &groups, classes, &probing, pool, watch)?;
-                Ok(GroupSquares { equations: vec![], squares, exact: vec![] })
-            }
-        })?;
-        let GroupSquares { equations, squares, exact } = found.map_err(|error| refused(&error))?;
-        Ok((equations, PyArray1::from_vec(py, squares), exact))
+        let found = factored(py, (&self.network, &self.options), state, threads, progress)?;
+        found.map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (state, *, threads))]
@@ -185,6 +169,32 @@ impl BlockCovariances {
             self.covariances.propagate(&partials, &of, pool, watch)
         })?;
         PyArray1::from_vec(py, found.map_err(|error| refused(&error))?).reshape([count, count])
+    }
+
+    #[pyo3(signature = (groups, *, classes, exact, vectors, seed, threads, progress))]
+    fn group_squares<'py>(
+        &self,
+        py: Python<'py>,
+        groups: GroupsRow<'py>,
+        classes: Option<usize>,
+        exact: usize,
+        vectors: usize,
+        seed: u64,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<SquaresRow<'py>> {
+        let groups = groups_of(groups)?;
+        let probing = Probing { exact, vectors, seed };
+        let workers = Workers::of(threads, self.images);
+        let found = watched(py, workers, progress, |pool, watch| match classes {
+            None => self.covariances.group_squares(&groups, &probing, pool, watch),
+            Some(classes) => {
+                let squares = self.covariances.own_squares(&groups, classes, &probing, pool, watch)?;
+                Ok(GroupSquares { equations: vec![], squares, exact: vec![] })
+            }
+        })?;
+        let GroupSquares { equations, squares, exact } = found.map_err(|error| refused(&error))?;
+        Ok((equations, PyArray1::from_vec(py, squares), exact))
     }
 
     #[pyo3(signature = (columns, *, threads, progress))]
