@@ -15,7 +15,6 @@ from photogram.checks.heights import neighbours
 from photogram.checks.orientation import MIRRORS
 from photogram.checks.predictions import exchange
 from photogram.checks.robust import critical, fit, mad_sd
-from photogram.checks.stations import strips_of
 from photogram.checks.structure import parts_of
 from photogram.cli import app
 from photogram.giant import Limits, Project, check, write_project
