@@ -1,4 +1,4 @@
-"""Variance components: published problems, the six-photo block, simulated weights, and what cannot be estimated."""
+"""Variance components: published problems, the six-photo block, weights that are wrong."""
 
 import json
 from pathlib import Path
@@ -38,6 +38,7 @@ class OneWay:
         self.redundancy = np.bincount(self.group, np.diag(self.r))
 
     def matrix(self):
+        """Return the Helmert matrix."""
         of = np.eye(2)[self.group]
         return of.T @ self.r**2 @ of
 
@@ -98,7 +99,10 @@ def test_a_negative_component_is_said_so_and_held(one_way):
     batch, residual = found.components
     assert batch.factor == 0.01
     assert batch.held
-    assert "residuals of batch are smaller than any positive variance explains (component -0.0" in found.messages[0]
+    assert (
+        "residuals of batch are smaller than any positive variance explains (component -0.0"
+        in found.messages[0]
+    )
     # Near the boundary, where all is residual.
     assert computed["components"][0] * residual.factor == pytest.approx(13.8063, rel=2e-3)
 

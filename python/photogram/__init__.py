@@ -56,6 +56,7 @@ __all__ = [
     "Result",
     "Simulation",
     "Spheroid",
+    "VarianceComponents",
     "__version__",
     "adjust",
     "first_values",

@@ -20,6 +20,7 @@ from photogram.cli import app
 from photogram.giant import Limits, Project, check, write_project
 from photogram.network.geometry import Spheroid
 from photogram.network.rays import Rays
+from photogram.network.strips import strips_of
 
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
 

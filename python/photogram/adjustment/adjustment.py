@@ -245,7 +245,7 @@ def _freedom(
     solution: _photocore.BlockSolution,
     options: CoreOptions,
 ) -> float:
-    """Return the degrees of freedom of the unit variance: counted, or r^2 / s (Satterthwaite) of all but photos.
+    """Return the degrees of freedom of the unit variance: counted, or r^2 / s (Satterthwaite).
 
     s is the sum of R_ij^2 among what is measured; all of R sums to r there, so that only what is between it
     and the weighted unknowns of photos and cameras is to be found.

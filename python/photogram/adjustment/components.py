@@ -13,6 +13,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import adjust, adjusted_again
+from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -56,6 +57,8 @@ class Weighing(ABC):
 
 
 class _Block(Weighing):
+    result: Result
+
     def __init__(self, block: Block, threads: int | None, tolerance: float) -> None:
         self.given = self.network = block
         self.threads = threads
@@ -168,6 +171,10 @@ def variance_components(
     AdjustmentError, RankError
         As of the adjustment.
     """
+    if not 0 < tolerance < 1:
+        raise InputError(f"the tolerance of components is between 0 and 1, not {tolerance:g}")
+    if max_steps < 1:
+        raise InputError("there must be one step at least")
     probing = probing or Probing()
     grouping = grouped(observables(network), groups)
     names = grouping.groups.names
@@ -214,3 +221,6 @@ def _without_nothing(found: Estimate) -> Estimate:
     messages = [each for each in found.messages if keep[-1] or not each.startswith(OTHERS)]
     matrix = found.matrix[np.ix_(keep, keep)]
     return replace(found, components=components, messages=messages, matrix=matrix, factors=found.factors[:-1])
+
+
+check_arguments(globals(), ["variance_components"])

@@ -109,9 +109,7 @@ class CollectionOptions:
     ordering: str
 
 
-def collection_network(
-    collection: Collection, options: CollectionOptions
-) -> _photocore.CollectionNetwork:
+def collection_network(collection: Collection, options: CollectionOptions) -> _photocore.CollectionNetwork:
     """Return a collection as the core adjusts it."""
     return _photocore.collection_network(
         collection.camera,

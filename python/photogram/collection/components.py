@@ -14,7 +14,6 @@ from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
 from photogram.results.group_sums import factored, observables
 from photogram.results.grouping import Grouping, Observables
-from photogram.results.network import AdjustedNetwork
 
 __all__: list[str] = []
 
@@ -60,12 +59,14 @@ def _(result: AdjustedCollection) -> _photocore.BlockCovariances:
 
 
 class _Collection(Weighing):
+    result: AdjustedCollection
+
     def __init__(self, collection: Collection, threads: int | None) -> None:
         self.given = self.network = collection
         self.threads = threads
         self.result = self.first = adjusted(collection, _OPTIONS, threads=threads)
 
-    def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedNetwork:
+    def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedCollection:
         roots = np.sqrt(factors)
         given = self.given
         self.network = given.replace(

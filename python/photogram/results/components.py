@@ -98,9 +98,7 @@ def _document(found: VarianceComponents) -> bytes:
             "program": f"photogram {_photocore.__version__}",
             "converged": estimate.converged,
             "level": estimate.level,
-            "components": [
-                dict(zip(names, row, strict=True)) for row in zip(*columns.values(), strict=True)
-            ],
+            "components": [dict(zip(names, row, strict=True)) for row in zip(*columns.values(), strict=True)],
             "helmert_matrix": estimate.matrix.tolist(),
             "all_equal": None
             if equality is None

@@ -1,9 +1,10 @@
 """Sums of squares and redundancy numbers over groups of observations, and their tests.
 
-q_g, the weighted sum of squares of a group, is a mixture of chi-square variables with the expectation r_g, the
-sum of its redundancy numbers, and the variance 2 s_g, s_g the sum of R_ij^2 within the group. With
-c = s_g / r_g, q_g / c has nearly the chi-square distribution with r_g^2 / s_g degrees of freedom (Satterthwaite
-1946). Taking q_g itself for chi-square with r_g is conservative where there is little redundancy.
+q_g, the weighted sum of squares of a group, is a mixture of chi-square variables with the expectation r_g,
+the sum of its redundancy numbers, and the variance 2 s_g, s_g the sum of R_ij^2 within the group. With
+c = s_g / r_g, q_g / c has nearly the chi-square distribution with r_g^2 / s_g degrees of freedom
+(Satterthwaite 1946). Taking q_g itself for chi-square with r_g is conservative where there is little
+redundancy.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -35,7 +37,16 @@ from photogram.statistics.limits import GlobalTest, global_test
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["GroupSum", "GroupSums", "Left", "Probing", "block_observables", "factored", "group_sums", "observables"]
+__all__ = [
+    "GroupSum",
+    "GroupSums",
+    "Left",
+    "Probing",
+    "block_observables",
+    "factored",
+    "group_sums",
+    "observables",
+]
 
 TESTABLE = 0.5
 """A group with less redundancy is not tested: the mixture is nearly singular."""
@@ -96,7 +107,7 @@ class GroupSum:
 
     @property
     def scale(self) -> float:
-        """c = s / r."""
+        """What q is divided by to be tested: c = s / r."""
         return self.spread / self.redundancy if self.redundancy > 0 else math.nan
 
     @property
@@ -167,8 +178,8 @@ def _columns(sums: GroupSums, what: str) -> dict[str, Any]:
 @report_of.register(GroupSums)
 def _report(sums: GroupSums) -> str:
     """Return the groups as lines of text."""
-    head = f"{'group':<34}{'number':>8}{'redundancy':>12}{'v P v':>12}{'factor of sd':>14}{'p low':>10}{'p high':>10}"
-    lines = [head]
+    columns = (("redundancy", 12), ("v P v", 12), ("factor of sd", 14), ("p low", 10), ("p high", 10))
+    lines = [f"{'group':<34}{'number':>8}" + "".join(f"{column:>{width}}" for column, width in columns)]
     for each in sums.groups:
         test = each.test
         tests = (
@@ -230,8 +241,7 @@ def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Float
     """Return (G,) numbers of observations, weighted sums of squares and sums of redundancy numbers."""
     with np.errstate(invalid="ignore", divide="ignore"):
         squares = {
-            "images": (result.residuals / result.image_given_sd) ** 2
-            * result.image_weights[:, np.newaxis],
+            "images": (result.residuals / result.image_given_sd) ** 2 * result.image_weights[:, np.newaxis],
             "points": _weighted_squares(result.point_residuals, result.point_given_sd),
             "photos": _weighted_squares(result.photo_residuals, result.photo_given_sd),
         }
@@ -365,3 +375,6 @@ def _spread(result: AdjustedNetwork, grouping: Grouping, counts: Indices, probin
         return squares
     _, squares, _ = factored(result).group_squares(grouping.core(), classes=None, **options)
     return np.asarray(np.diag(squares.reshape(g + 1, g)))
+
+
+check_arguments(globals(), ["group_sums"])

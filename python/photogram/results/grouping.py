@@ -1,4 +1,4 @@
-"""Groups of the observations of an adjusted network: by kind, camera, strip, photo ..., or by the user's labels."""
+"""Groups of the observations of a network: by kind, camera, strip, photo ..., or by the user's labels."""
 
 from __future__ import annotations
 
@@ -154,9 +154,11 @@ def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
     if isinstance(groups, Mapping):
         labels = _own(of, groups)
     else:
+        if not isinstance(groups, str | list | tuple):
+            raise InputError(f"groups are by {', '.join(BASES)}, or labels, not {shown(groups)}")
         bases = (groups,) if isinstance(groups, str) else tuple(groups)
         for basis in bases:
-            if basis not in BASES:
+            if not isinstance(basis, str) or basis not in BASES:
                 raise InputError(f"groups are by {', '.join(BASES)}, or labels, not {shown(basis)}")
         if not bases:
             raise InputError("groups are by one basis at least")
@@ -177,10 +179,8 @@ class _Labelled:
 
 def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
     """Label by named bases."""
-    of_images, components = [], "component" in bases
-    for basis in bases:
-        if basis not in ("kind", "component"):
-            of_images.append(_images_by(of, basis))
+    components = "component" in bases
+    of_images = [_images_by(of, basis) for basis in bases if basis not in ("kind", "component")]
     head = [", ".join(parts) for parts in zip(*of_images, strict=True)] if of_images else None
     plain = np.array(head if head is not None else [""] * len(of.image_photos), dtype=object)
     named = np.array([f"images, {each}" if each else "images" for each in plain.tolist()], dtype=object)
@@ -251,7 +251,7 @@ def _text(label: object) -> str:
 
 
 def _numbered(of: Observables, labels: _Labelled) -> Grouping:
-    """Number the groups: those of images first, as they come."""
+    """Give the groups numbers: those of images first."""
     numbers: dict[str, int] = {"": -1}
 
     def number(part: _Labels, used: Bools | None = None) -> Indices:
@@ -259,6 +259,8 @@ def _numbered(of: Observables, labels: _Labelled) -> Grouping:
         found = [numbers.setdefault(label, len(numbers) - 1) for label in flat.tolist()]
         return np.array(found, dtype=np.int64).reshape(part.shape)
 
+    # In the order of the photos, whatever that of the images is.
+    number(labels.images[np.argsort(of.image_photos, kind="stable")])
     images = number(labels.images)
     of_images = len(numbers) - 1
     points, photos = number(labels.points, of.point_observed), number(labels.photos, of.photo_observed)

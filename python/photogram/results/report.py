@@ -114,9 +114,12 @@ def _adjustment(result: Result) -> list[str]:
     held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
     counts = zip(_axes(result), held.sum(axis=0), strict=True)
     components = ", ".join(f"{axis} {count}" for axis, count in counts)
-    basis = {"free": "cameras free", "constrained": "cameras constrained", "unity": "set to 1", "redundancy": "redundancy numbers"}[
-        result.unit_variance
-    ]
+    basis = {
+        "free": "cameras free",
+        "constrained": "cameras constrained",
+        "unity": "set to 1",
+        "redundancy": "redundancy numbers",
+    }[result.unit_variance]
     rows = [
         ("status", result.status),
         ("iterations", f"{len(result.iterations)}"),

@@ -26,6 +26,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.messages import listed
 from photogram.statistics.distributions import bonferroni, critical_normal
 
 __all__ = ["Component", "Estimate", "GroupsOf", "Weighted", "balanced", "estimate", "helmert_step"]
@@ -189,7 +190,7 @@ class Estimate:
         return float(np.average([each.factor for each in own], weights=weights)) if own else 1.0
 
 
-def helmert_step(matrix: Floats, squares: Floats, free: Sequence[int]) -> Floats:
+def helmert_step(matrix: Floats, squares: Floats, free: list[int]) -> Floats:
     """Return the factors that Helmert's equations give for the free components, others staying as they are.
 
     Parameters
@@ -199,13 +200,14 @@ def helmert_step(matrix: Floats, squares: Floats, free: Sequence[int]) -> Floats
     free
         The components that are estimated.
     """
-    held = np.setdiff1d(np.arange(len(squares)), free)
-    right = squares[free] - matrix[np.ix_(free, held)].sum(axis=1)
-    return np.asarray(np.linalg.solve(matrix[np.ix_(free, free)], right))
+    rows = np.array(free, dtype=np.int64)
+    held = np.setdiff1d(np.arange(len(squares)), rows)
+    right = squares[rows] - matrix[np.ix_(rows, held)].sum(axis=1)
+    return np.asarray(np.linalg.solve(matrix[np.ix_(rows, rows)], right))
 
 
 def balanced(matrix: Floats, redundancy: Floats, exact: Sequence[bool]) -> Floats:
-    """Return a Helmert matrix that is symmetric, with rows that sum to the redundancy, from estimated columns.
+    """Return a Helmert matrix that is symmetric, with rows that sum to the redundancy.
 
     Parameters
     ----------
@@ -291,34 +293,42 @@ class _Run:
     def judge(self, least: float) -> None:
         """Merge groups whose component cannot be estimated, and hold what still cannot be."""
         parents = self.groups.parents or ("",) * len(self.groups.names)
-        weak = {
-            parents[g]
-            for g, (_, members) in enumerate(self.units)
-            if parents[g] and g not in self.held and self._why(members, least)
-        }
-        merged = {parent: [g for g, own in enumerate(parents) if own == parent] for parent in sorted(weak)}
-        for parent, members in merged.items():
-            if len(members) > 1:
-                names = ", ".join(self.groups.names[g] for g in members)
-                self.messages.append(f"{names}: merged into {parent}, the redundancy of one is too small")
+        pools: dict[int, tuple[str, list[int]]] = {}
+        for parent in dict.fromkeys(filter(None, parents)):
+            siblings = [g for g, own in enumerate(parents) if own == parent and g not in self.held]
+            if pool := self._pool(siblings, least):
+                names = [self.groups.names[g] for g in pool]
+                name = parent if len(pool) == len(siblings) or "other" in parent else f"others of {parent}"
+                self.messages.append(
+                    f"{listed(names)}: merged, each has too little redundancy for itself: {name}"
+                )
+                pools |= dict.fromkeys(pool, (name, pool))
         units: list[tuple[str, list[int]]] = []
         held = {}
-        for g, (name, members) in enumerate(self.units):
-            own = merged.get(parents[g], members)
-            if own[0] != g:
+        for g, own_name in enumerate(self.groups.names):
+            name, members = pools.get(g, (own_name, [g]))
+            if members[0] != g:
                 continue
             if g in self.held:
                 held[len(units)] = self.held[g]
-            elif why := self._why(own, least):
+            elif why := self._why(members, least):
                 held[len(units)] = why
-            units.append((parents[g] if len(own) > 1 else name, own))
+            units.append((name, members))
         self.units, self.held = units, held
+
+    def _pool(self, siblings: list[int], least: float) -> list[int]:
+        """Return those of some groups that are weak, with as many others as they need; none where none is."""
+        pool = [g for g in siblings if self._why([g], least)]
+        others = sorted(set(siblings) - set(pool), key=lambda g: float(self.state.redundancy[g]))
+        while pool and others and self._why(pool, least):
+            pool.append(others.pop(0))
+        return sorted(pool) if len(pool) > 1 else []
 
     def _why(self, members: list[int], least: float) -> str:
         """Say why a component of some groups cannot be estimated; nothing where it can."""
         r, n = float(self.state.redundancy[members].sum()), int(self.state.counts[members].sum())
         if r < min(REFUSED, least):
-            return f"refused: its redundancy is {r:.2g}, nothing checks it"
+            return f"its redundancy is {r:.2g}: nothing checks it"
         if r < least:
             return f"its redundancy is {r:.2g}, less than {least:g}"
         if r < LEAST_SHARE * n:
@@ -410,7 +420,8 @@ class _Run:
         if values[-1] < MOST_CONDITION * values[0] or len(free) < 2:
             return None
         concerned = np.argsort(-np.abs(vectors[:, 0]))[:2]
-        return min((free[k] for k in concerned), key=lambda unit: self.matrix[unit].sum())
+        rows: list[int] = concerned.tolist()
+        return min((free[k] for k in rows), key=lambda unit: float(self.matrix[unit].sum()))
 
     def _back(self, unit: int) -> None:
         """Give a unit its own variance again."""
@@ -420,8 +431,8 @@ class _Run:
     def equality(self) -> tuple[float, int, float] | None:
         """Test whether all free components are equal.
 
-        The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2: twice its difference
-        between the equal components and the estimated ones is the integral of q_g - r_g along the line.
+        The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2: twice its
+        difference between the equal components and the estimated ones is the integral of q_g - r_g along the line.
         """
         free = self.free
         if len(free) < 2 or not self.converged:
@@ -487,7 +498,7 @@ class _Run:
             )
         for unit, why in self.held.items():
             if not why.startswith("at the lower"):
-                self.messages.append(f"{self.units[unit][0]}: held, {why}")
+                self.messages.append(f"{self.units[unit][0]}: held: {why}")
         return Estimate(
             tuple(components),
             self.factors,

@@ -94,5 +94,5 @@ pub use resistance::Classes;
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
 pub use run::{Watch, adjust, on_all_processors};
-pub use traces::{EquationGroups, GroupSquares, Probing};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
+pub use traces::{EquationGroups, GroupSquares, Probing};

@@ -138,7 +138,10 @@ impl<'a, M: Model> Rows<'a, M> {
         let parts: Vec<Vec<f64>> = (0..PARTS).into_par_iter().map(part).collect();
         let count = solutions.len() / unknowns;
         for (row, products) in parts.iter().flat_map(|part| part.chunks_exact(count.max(1))).enumerate() {
-            products.iter().enumerate().for_each(|(column, product)| columns[column * height + row] -= product);
+            products
+                .iter()
+                .enumerate()
+                .for_each(|(column, product)| columns[column * height + row] -= product);
         }
         self.each_other_row(|row, taken| {
             for (column, x) in columns.chunks_exact_mut(height).zip(solutions.chunks_exact(unknowns)) {
@@ -192,7 +195,8 @@ impl<'a, M: Model> Rows<'a, M> {
             tell(first + unknown, &vec![(unknown, self.problem.sd[unknown].recip())]);
         }
         for own in &self.together {
-            for (row, unknown) in own.rows().zip(own.unknowns()).filter(|&(_, i)| self.problem.is_weighted(i)) {
+            for (row, unknown) in own.rows().zip(own.unknowns()).filter(|&(_, i)| self.problem.is_weighted(i))
+            {
                 let taken = own.unknowns().zip(row.iter().copied()).filter(|&(other, _)| !self.fixed[other]);
                 tell(first + unknown, &taken.collect());
             }

@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 
 use rayon::ThreadPool;
 
+use super::NetworkError;
 use super::covariance::Covariances;
 use super::model::Owner;
-use super::NetworkError;
 use crate::adjustment::{AdjustError, EquationGroups, Event, GroupSquares, Phase, Probing};
 
 /// Groups of the observations of a network: a number for each, in the order of the network; that many groups or more for none.

@@ -8,9 +8,7 @@ mod solution;
 mod state;
 
 use numpy::PyReadonlyArrayDyn;
-use photocore::network::{
-    Coarse, Combination, Image, NetworkError as Failure, Point, PosePart,
-};
+use photocore::network::{Coarse, Combination, Image, NetworkError as Failure, Point, PosePart};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
