@@ -12,7 +12,7 @@ from photogram.collection.collection import Collection
 from photogram.results.network import AdjustedNetwork
 
 if TYPE_CHECKING:
-    pass
+    from photogram import _photocore
 
 __all__ = ["AdjustedCollection"]
 
@@ -38,6 +38,8 @@ class AdjustedCollection(AdjustedNetwork):
         (n,) how many image points have the point behind the camera.
     datum
         Photos and parameters that were held to give the cofactors a datum.
+    state
+        Where the adjustment has ended.
     """
 
     collection: Collection
@@ -46,6 +48,7 @@ class AdjustedCollection(AdjustedNetwork):
     photo_images: Indices
     point_rays_behind: Indices
     datum: list[tuple[int, str]]
+    state: _photocore.BlockState
 
     @property
     def cost(self) -> float:
@@ -57,6 +60,11 @@ class AdjustedCollection(AdjustedNetwork):
     def image_points(self) -> Indices:
         """(m,) the point of each image."""
         return self.collection.image_points
+
+    @property
+    def image_given_sd(self) -> Floats:
+        """(m, 2) standard deviations a priori of the image coordinates."""
+        return self.collection.image_sd
 
     @property
     def photo_given_sd(self) -> Floats:

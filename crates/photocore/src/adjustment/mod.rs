@@ -61,25 +61,32 @@ mod factored;
 mod loss;
 mod method;
 mod motions;
+mod noncentral;
 mod normal_equations;
 mod options;
 mod problem;
+mod projection;
 mod published;
 mod resistance;
 mod result;
 mod run;
 mod statistics;
+mod traces;
 mod transformation;
 mod trust_region;
 mod walk;
 
 pub use datum::{Adjusted, Datum, DatumError, InDatum, in_datum};
 pub use distributions::{
-    Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
+    Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, student,
+    student_limit,
 };
 pub use factored::{CofactorError, Factored};
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
+pub use noncentral::{
+    detectable_noncentrality, level_of_equal_power, noncentral_chi_square, noncentral_fisher,
+};
 pub use normal_equations::NormalEquations;
 pub use options::{Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Motions, Problem, Weighted};
@@ -88,3 +95,4 @@ pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
 pub use run::{Watch, adjust, on_all_processors};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
+pub use traces::{EquationGroups, GroupSquares, Probing};
