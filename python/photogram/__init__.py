@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
+    from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
@@ -54,6 +55,7 @@ __all__ = [
     "Spheroid",
     "__version__",
     "adjust",
+    "check",
     "first_values",
     "hints",
     "orient",
@@ -89,6 +91,7 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "check": "checks.checking",
     "first_values": "adjustment.first_values",
     "hints": "adjustment.hints",
     "orient": "absolute_orientation",

@@ -13,7 +13,16 @@ from photogram.arguments.types import Floats
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 
-__all__ = ["FOOT", "TURNS", "Change", "Hypothesis", "attitude_readings", "hypotheses", "image_hypothesis", "read_as"]
+__all__ = [
+    "FOOT",
+    "TURNS",
+    "Change",
+    "Hypothesis",
+    "attitude_readings",
+    "hypotheses",
+    "image_hypothesis",
+    "read_as",
+]
 
 FOOT = 0.3048
 """Metres; the survey foot differs by two millionths."""
@@ -225,6 +234,8 @@ def _scaled(block: Block, photos: Floats | None = None, points: Floats | None = 
     if points is not None:
         return block.replace(point_positions=block.point_positions * points)
     observed = block.photo_positions_observed
+    if photos is None:
+        return block
     return block.replace(
         photo_positions=block.photo_positions * photos,
         photo_positions_observed=None if observed is None else observed * photos,
@@ -235,7 +246,9 @@ def _exchanged(block: Block, *, points: bool) -> Block:
     """Return a block with the first two coordinates of photos or of points exchanged."""
     order = [1, 0, 2]
     if points:
-        return block.replace(point_positions=block.point_positions[:, order], point_sd=block.point_sd[:, order])
+        return block.replace(
+            point_positions=block.point_positions[:, order], point_sd=block.point_sd[:, order]
+        )
     observed = block.photo_positions_observed
     return block.replace(
         photo_positions=block.photo_positions[:, order],
@@ -256,7 +269,6 @@ def _positions(block: Block) -> Iterator[Hypothesis]:
     for what, own in (("photos", True), ("points", False)):
         if not (own or known):
             continue
-        key = "photos" if own else "points"
         others = "points" if own else "photos"
         # Several at once, then single axes.
         for name, axes, text in (
@@ -271,22 +283,27 @@ def _positions(block: Block) -> Iterator[Hypothesis]:
             (f"feet in Y of {what}", (1,), f"Y of the {what} are in feet, all else in metres"),
         ):
             if not geographic or axes == (2,):
-                factor = np.where(np.isin(np.arange(3), axes), FOOT, 1.0)
-                yield Hypothesis(name, text, partial(_scaled, **{key: factor}))
+                factor: Floats = np.where(np.isin(np.arange(3), axes), FOOT, 1.0)
+                change = partial(_scaled, photos=factor) if own else partial(_scaled, points=factor)
+                yield Hypothesis(name, text, change)
     if geographic:
         yield from _geographic(block)
         return
-    yield Hypothesis("X and Y of photos", "X and Y of the photos are exchanged", partial(_exchanged, points=False))
+    yield Hypothesis(
+        "X and Y of photos", "X and Y of the photos are exchanged", partial(_exchanged, points=False)
+    )
     # R = F A' in the axes of computer vision, A' in those of the photo
-    for said, axes in (("x right, y down, z forward", _TO_VISION), ("x right, y up, z back", np.eye(3))):
+    for said, of_axes in (("x right, y down, z forward", _TO_VISION), ("x right, y up, z back", np.eye(3))):
         yield Hypothesis(
             "t for C",
             f"positions of the photos are translations t of x = R X + t ({said}), not projection centres"
             " C = -R't",
-            partial(_centres, axes=axes),
+            partial(_centres, axes=of_axes),
         )
     if known:
-        yield Hypothesis("X and Y of points", "X and Y of the points are exchanged", partial(_exchanged, points=True))
+        yield Hypothesis(
+            "X and Y of points", "X and Y of the points are exchanged", partial(_exchanged, points=True)
+        )
 
 
 def _to_photo(block: Block) -> Floats:
