@@ -59,7 +59,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def outcome(plant: Plant, seed: int, verbose: bool) -> tuple[bool, int]:
-    """Return whether all that was planted is named, and the number of grave findings about nothing planted."""
+    """Return whether all that was planted is named, and the number of grave findings that are false."""
     case = plant(seed, np.random.default_rng([seed, 2]))
     found = check(case.block, threads=1)
     said = getattr(case, "said", "")

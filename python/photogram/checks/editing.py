@@ -21,6 +21,7 @@ from photogram.checks.predictions import (
     freed,
     tests_of_predictions,
 )
+from photogram.checks.rivals import rival_images
 from photogram.checks.robust import critical, mad_sd
 from photogram.checks.views import kept_images
 from photogram.checks.words import small_unit
@@ -296,7 +297,7 @@ def _snoop(
         if not suspects or not result.converged or step == ROUNDS - 1:
             break
         for suspect in suspects:
-            finding = _finding(result, suspect)
+            finding = _finding(result, suspect, spread)
             if suspect.kind == "control":
                 control.setdefault(finding.points[0], []).append(finding)
             else:
@@ -392,9 +393,9 @@ def _kind(result: Result, suspect: _Suspect) -> ObservedKind:
     return result.kinds[suspect.kind.removeprefix(BESIDE)]
 
 
-def _finding(result: Result, suspect: _Suspect) -> Finding:
+def _finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     if suspect.kind == "image":
-        return _image_finding(result, suspect)
+        return _image_finding(result, suspect, spread)
     if suspect.kind == "control":
         row, axis = suspect.row, suspect.axis
         error = -float(result.point_differences[row, axis] / result.point_redundancy[row, axis])
@@ -439,15 +440,17 @@ def _control_finding(block: Block, row: int, axis: int, error: float, test: floa
     return Finding("control-misfit", "grave" if grave else "look", text, [], [name], values)
 
 
-def _image_finding(result: Result, suspect: _Suspect) -> Finding:
+def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     block, row, axis = result.block, suspect.row, suspect.axis
     photo, point = int(block.image_photos[row]), int(block.image_points[row])
     redundancy = float(result.redundancy[row, axis])
     error = float(result.residuals[row, axis]) / redundancy
-    others = block.image_photos[(block.image_points == point) & (block.image_photos != photo)].tolist()
-    doubt = ""
-    if len(others) == 1:
-        doubt = f"; with two rays it may as well be the image on photo {block.photo_ids[others[0]]}"
+    others = [
+        block.photo_ids[each] for each in block.image_photos[rival_images(result, row, spread)].tolist()
+    ]
+    doubt = f"; it may as well be the image on photo {' or '.join(others)}" if others else ""
+    if doubt and np.count_nonzero(block.image_points == point) == 2:
+        doubt = f"; with two rays it may as well be the image on photo {others[0]}"
     unit, factor = small_unit(block.image_unit)
     text = (
         f"point {block.point_ids[point]} on photo {block.photo_ids[photo]}: error of {'xy'[axis]} about"
@@ -458,7 +461,7 @@ def _image_finding(result: Result, suspect: _Suspect) -> Finding:
         "blunder",
         "grave" if suspect.grave else "look",
         text,
-        [block.photo_ids[photo], *([block.photo_ids[others[0]]] if doubt else [])],
+        [block.photo_ids[photo], *others],
         [block.point_ids[point]],
         {
             f"error_{unit}": error * factor,
