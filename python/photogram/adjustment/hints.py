@@ -67,6 +67,8 @@ class Verdict:
         The hint.
     change
         Makes of a block what the first hypothesis says was meant.
+    exact
+        Whether that is exactly what was meant.
     photos
         Photos that it is about; none for all.
     """
@@ -80,7 +82,7 @@ class Verdict:
         # One mistake may be right in several forms.
         best = list({each.text: each for each in reversed(best)}.values())[::-1]
         self.names = [each.name for each in best]
-        self.change = best[0].change
+        self.change, self.exact = best[0].change, best[0].exact
         self.photos = photos
         where = f" (on photo{'s' if len(photos) > 1 else ''} {listed(list(photos))})" if photos else ""
         fall = f"images would miss their places by {least:.2g} of their spread and not by {given:.2g}"

@@ -84,11 +84,14 @@ class Hypothesis:
         In a sentence, without its full stop.
     change
         Makes of a block, or of a part of its photos, what was meant.
+    exact
+        Whether that is exactly what was meant: a size of pixels and an origin are only known about.
     """
 
     name: str
     text: str
     change: Change
+    exact: bool = True
 
 
 def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
@@ -152,7 +155,9 @@ def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
         if np.array_equal(turn, matrix):
             names.append(name)
             parts.append(text)
-    return Hypothesis(", ".join(names), "; ".join(parts), partial(_of_images, shift=back, linear=linear))
+    return Hypothesis(
+        ", ".join(names), "; ".join(parts), partial(_of_images, shift=back, linear=linear), exact=False
+    )
 
 
 def _of_format(block: Block) -> Iterator[Hypothesis]:
@@ -175,7 +180,8 @@ def _of_format(block: Block) -> Iterator[Hypothesis]:
             counted = f"{', ' if pixels else ' '}counted from {where}" if corner else ""
             text = unit + counted + sense
             linear = np.diag(turn) / scale
-            yield Hypothesis(", ".join(names), text, partial(_of_images, shift=shift, linear=linear))
+            change = partial(_of_images, shift=shift, linear=linear)
+            yield Hypothesis(", ".join(names), text, change, exact=False)
 
 
 def attitude_readings(block: Block) -> dict[str, tuple[str, Floats]]:

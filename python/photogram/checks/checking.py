@@ -139,7 +139,7 @@ def _started(block: Block) -> tuple[Block | None, Section]:
 
 def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     words, adjusted = manner.words, Adjuster(manner.options)
-    sets, view = conventions(View.of(block))
+    sets, view, exact = conventions(View.of(block))
     upright, seen = orientation(view.seen, words, view.unit)
     oriented = view.of_seen(seen)
     if oriented is view and not sets.findings:
@@ -170,6 +170,10 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     ]
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
     sections += _after_adjustment(oriented, edited, misleading, words)
+    if not exact:
+        for section in sections:
+            if section is not sets:
+                section.findings = [replace(each, level="look") for each in section.findings]
     return sections, edited.last
 
 

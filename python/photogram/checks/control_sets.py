@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -30,7 +30,7 @@ from photogram.network.block import Block
 from photogram.network.observations import Control
 from photogram.network.rays import LocalAxes, local_axes
 from photogram.results.result import Result
-from photogram.statistics.likelihood import RIVAL, Judged, judged
+from photogram.statistics.likelihood import Judged, judged
 
 __all__ = ["Explained", "FreeModel", "doubtful", "explain", "free_model"]
 
@@ -39,6 +39,10 @@ MOST = 60
 FEWEST = 3
 TRIPLES = 400
 """Threes of them that are tried."""
+CLEARLY = 2 * math.log(20)
+"""What explaining it by single points must cost more: odds of 20."""
+PAIRS = 15
+"""Pairs that are exchanged on trial."""
 GROWTHS = 5
 NEAR = 6.0
 """Standard deviations within which a point agrees with a similarity."""
@@ -86,7 +90,6 @@ SETS = (
         "X and Y of the control are exchanged (or it is a mirror image otherwise)",
         lambda positions: positions[:, [1, 0, 2]],
     ),
-    _Set("sign of heights", "heights of the control have the wrong sign", _scaled(1, 1, -1)),
 )
 """Hypotheses about all control; in geographic space only those on heights, and the exchange."""
 
@@ -131,49 +134,108 @@ class FreeModel:
 
     def omega(self, change: Change | None = None) -> float:
         """Return what is left of the control under a hypothesis; infinite where it cannot be fitted."""
-        target = self._target(change)
+        return self._omega(self._target(change))
+
+    def _omega(self, target: Floats) -> float:
         if not np.isfinite(target).all():
             return math.inf
-        starts = [_Similarity(1.0, np.eye(3), target.mean(axis=0) - self.model.mean(axis=0))]
+        starts = [_Similarity.start(self.model, target)]
         full = self.held.all(axis=1)
         if full.sum() >= FEWEST:
-            starts.append(_closest(self.model[full], target[full]))
+            starts.append(_closest(self.model[full], target[full]).about(self.model[full], self.model))
         rows = np.flatnonzero(self.held.ravel())
         return min(self._fitted(each, target, rows)[0] for each in starts)
+
+    def two_exchanged(self) -> float:
+        """Return what is left of the control when the best two points are exchanged."""
+        target, (_, similarity) = self._target(None), self._nearest()
+        placed = similarity.of(self.model)
+        pairs = [
+            pair
+            for pair in combinations(range(len(target)), 2)
+            if (self.held[pair[0]] == self.held[pair[1]]).all()
+        ]
+
+        def apart(pair: tuple[int, int]) -> float:
+            own, swapped = target[list(pair)], target[list(pair[::-1])]
+            at = placed[list(pair)]
+            return float(((at - swapped) ** 2).sum() - ((at - own) ** 2).sum())
+
+        left = math.inf
+        for pair in sorted(pairs, key=apart)[:PAIRS]:
+            swapped = target.copy()
+            swapped[list(pair)] = target[list(pair[::-1])]
+            left = min(left, self._omega(swapped))
+        return left
 
     def some_wrong(self) -> float:
         """Return what explaining the misfit by wrong points costs.
 
-        That is Omega of the others and, for each error of a wrong one, which may be anything,
-        2 ln(error / standard deviation). The points that are right are those of the similarity of three
-        points to which most others are nearest.
+        That is Omega of the others and, for each wrong one, 2 ln(3 k) for its being one of k, and for each of
+        its errors, which may be anything, 2 ln(error / standard deviation). The points that are right are
+        those of the similarity of three points to which most others are nearest.
         """
-        target = self._target(None)
-        full = np.flatnonzero(self.held.all(axis=1))
-        deviations = np.sqrt(np.maximum(np.diag(self.covariance), 0)).reshape(-1, 3)
-        deviations = np.hypot(deviations, self.per_unit * self.block.point_sd[self.points])
-        best, nearest = math.inf, None
-        for three in _triples(full):
-            similarity = _closest(self.model[three], target[three])
-            misses = np.where(self.held, (target - similarity.of(self.model, three)) / deviations, 0.0)
-            cost = float(np.log1p(misses**2).sum())
-            if cost < best:
-                best, nearest = cost, misses
-        if nearest is None:
+        target, full = self._target(None), np.flatnonzero(self.held.all(axis=1))
+        deviations = self._deviations
+        if len(full) < FEWEST:
             return math.inf
+        nearest, _ = self._nearest()
         sizes = np.abs(nearest).max(axis=1)
-        right = sizes <= np.sort(sizes)[len(sizes) // 2]
+        right = sizes <= np.sort(sizes[full])[max(len(full) // 2, FEWEST - 1)]
         for _ in range(GROWTHS):
             rows = np.flatnonzero((self.held & right[:, np.newaxis]).ravel())
-            start = _closest(self.model[full[right[full]]], target[full[right[full]]])
+            some = full[right[full]]
+            start = _closest(self.model[some], target[some]).about(self.model[some], self.model)
             omega, similarity = self._fitted(start, target, rows)
             misses = np.where(self.held, (target - similarity.of(self.model)) / deviations, 0.0)
             now = np.abs(misses).max(axis=1) < NEAR
             if right[full].sum() < FEWEST or now[full].sum() < FEWEST or (now == right).all():
                 break
             right = now
-        wrong = np.abs(misses[~right][self.held[~right]])
-        return omega + 2 * float(np.log(np.maximum(wrong, 1.0)).sum())
+        gone = np.flatnonzero((self.held & ~right[:, np.newaxis]).ravel())
+        tests = self._left_out(similarity, target, gone)
+        count = int((~right).sum()) * math.log(3 * len(right))
+        return omega + 2 * (count + float(np.log(np.maximum(np.abs(tests), 1.0)).sum()))
+
+    @property
+    def _deviations(self) -> Floats:
+        """(k, 3) of the differences of control and model, without what a similarity takes."""
+        own = np.sqrt(np.maximum(np.diag(self.covariance), 0)).reshape(-1, 3)
+        return np.asarray(np.hypot(own, self.per_unit * self.block.point_sd[self.points]))
+
+    def _nearest(self) -> tuple[Floats, _Similarity]:
+        """Return (k, 3) misses of the similarity of three points to which most are nearest, and this one."""
+        target, deviations = self._target(None), self._deviations
+        best, nearest = math.inf, (np.zeros(target.shape), _Similarity.start(self.model, target))
+        for three in _triples(np.flatnonzero(self.held.all(axis=1))):
+            similarity = _closest(self.model[three], target[three]).about(self.model[three], self.model)
+            misses = np.where(self.held, (target - similarity.of(self.model)) / deviations, 0.0)
+            cost = float(np.log1p(misses**2).sum())
+            if cost < best:
+                best, nearest = cost, (misses, similarity)
+        return nearest
+
+    def _left_out(self, similarity: _Similarity, target: Floats, gone: Indices) -> Floats:
+        """Return the errors of some components in their standard deviations, as the others predict them."""
+        rows = np.flatnonzero(self.held.ravel())
+        error, design, own = self._equations(similarity, target, rows)
+        weighted = np.linalg.solve(own, design)
+        projector = np.linalg.inv(own) - weighted @ np.linalg.pinv(design.T @ weighted) @ weighted.T
+        place = np.searchsorted(rows, gone)
+        cofactor = np.linalg.pinv(projector[np.ix_(place, place)])
+        errors = cofactor @ (projector @ error)[place]
+        tests: Floats = errors / np.sqrt(np.maximum(np.diag(cofactor), np.finfo(np.float64).tiny))
+        return tests
+
+    def _equations(
+        self, similarity: _Similarity, target: Floats, rows: Indices
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return misclosures, partials (shift, scale, rotation) and covariance matrix of some rows."""
+        turned = similarity.scale * (self.model - self.model.mean(axis=0)) @ similarity.rotation.T
+        whole = np.kron(np.eye(len(turned)), similarity.scale * similarity.rotation)
+        variances = ((self.per_unit * self.block.point_sd[self.points]).ravel()[rows]) ** 2
+        own = (whole @ self.covariance @ whole.T)[np.ix_(rows, rows)] + np.diag(variances)
+        return (target - similarity.of(self.model)).ravel()[rows], _similarity_partials(turned)[rows], own
 
     def _target(self, change: Change | None) -> Floats:
         """(k, 3) control as it was meant, in the axes."""
@@ -184,24 +246,14 @@ class FreeModel:
 
     def _fitted(self, similarity: _Similarity, target: Floats, rows: Indices) -> tuple[float, _Similarity]:
         """Return Omega of some rows, and the similarity, after Gauss-Newton steps."""
-        centred = self.model - self.model.mean(axis=0)
-        variances = ((self.per_unit * self.block.point_sd[self.points]).ravel()[rows]) ** 2
         before = math.inf
         for _ in range(STEPS):
-            turned = similarity.scale * centred @ similarity.rotation.T
-            error = (target - similarity.of(self.model)).ravel()[rows]
-            whole = np.kron(np.eye(len(turned)), similarity.scale * similarity.rotation)
-            own = (whole @ self.covariance @ whole.T)[np.ix_(rows, rows)] + np.diag(variances)
+            error, design, own = self._equations(similarity, target, rows)
             try:
                 root = np.linalg.cholesky(own)
             except np.linalg.LinAlgError:
                 return math.inf, similarity
-            design = np.zeros((len(turned), 3, 7))
-            design[:, :, :3] = np.eye(3)
-            design[:, :, 3] = turned
-            for axis in range(3):
-                design[:, :, 4 + axis] = np.cross(np.eye(3)[axis], turned)
-            whitened = np.linalg.solve(root, design.reshape(-1, 7)[rows])
+            whitened = np.linalg.solve(root, design)
             right = np.linalg.solve(root, error)
             step = np.linalg.lstsq(whitened, right, rcond=None)[0]
             left = right - whitened @ step
@@ -227,11 +279,22 @@ class _Similarity:
     rotation: Floats
     shift: Floats
 
-    def of(self, model: Floats, about: Indices | None = None) -> Floats:
-        """(k, 3) where points of the model come; about the mean of all, or of some."""
-        centre = (model if about is None else model[about]).mean(axis=0)
+    @classmethod
+    def start(cls, model: Floats, target: Floats) -> _Similarity:
+        """Return the shift that brings points onto others in the mean."""
+        return cls(1.0, np.eye(3), target.mean(axis=0) - model.mean(axis=0))
+
+    def of(self, model: Floats) -> Floats:
+        """(k, 3) where points of the model come; turned and scaled about their mean."""
+        centre = model.mean(axis=0)
         placed: Floats = self.scale * (model - centre) @ self.rotation.T + centre + self.shift
         return placed
+
+    def about(self, some: Floats, model: Floats) -> _Similarity:
+        """Return the same similarity, as one about the mean of all points that was one about that of some."""
+        from_some, to_all = some.mean(axis=0), model.mean(axis=0)
+        moved = self.scale * (to_all - from_some) @ self.rotation.T + from_some + self.shift - to_all
+        return _Similarity(self.scale, self.rotation, moved)
 
     def moved(self, step: Floats) -> _Similarity:
         """Return it after a step of translation, scale and rotation, about the mean of all points."""
@@ -300,8 +363,31 @@ def free_model(block: Block, adjusted: Adjuster) -> FreeModel | None:
     scale = np.tile(per_unit, len(points))
     names = [block.point_ids[point] for point in points.tolist()]
     covariance = result.covariance(("point", names)) * scale * scale[:, np.newaxis]
-    size = max(mad_sd(result.standardized), 1.0)
-    return FreeModel(block, axes, points, held, axes.positions(given), given, size**2 * covariance, per_unit)
+    model = axes.positions(given)
+    shape = max(mad_sd(result.standardized), 1.0) ** 2 * _of_shape(covariance, model)
+    return FreeModel(block, axes, points, held, model, given, shape, per_unit)
+
+
+def _of_shape(covariance: Floats, model: Floats) -> Floats:
+    """Return a covariance matrix with that of shape, and as much of what a similarity changes.
+
+    A similarity is found anyhow; what the datum of the model says of it would only cost digits.
+    """
+    basis, _ = np.linalg.qr(_similarity_partials(model - model.mean(axis=0)))
+    across = np.eye(len(covariance)) - basis @ basis.T
+    shape = across @ covariance @ across
+    found: Floats = shape + np.trace(shape) / len(shape) * basis @ basis.T
+    return found
+
+
+def _similarity_partials(turned: Floats) -> Floats:
+    """(3k, 7) partials of points, counted from their mean, by shift, scale and rotation."""
+    design = np.zeros((len(turned), 3, 7))
+    design[:, :, :3] = np.eye(3)
+    design[:, :, 3] = turned
+    for axis in range(3):
+        design[:, :, 4 + axis] = np.cross(np.eye(3)[axis], turned)
+    return design.reshape(-1, 7)
 
 
 @dataclass(frozen=True)
@@ -335,9 +421,12 @@ def explain(model: FreeModel) -> Explained | None:
     ]
     changed = [model.omega(each.change) for each in sets]
     verdict = judged(model.omega(), changed, model.degrees_of_freedom)
-    if verdict is None or min(changed) + RIVAL > model.some_wrong():
+    if verdict is None or min(changed) + CLEARLY > min(model.some_wrong(), model.two_exchanged()):
         return None
     best = [sets[place] for place in verdict.best]
+    if model.held.all(axis=1).sum() < FEWEST:
+        # Nothing tells a mistake in all from one in some.
+        verdict = replace(verdict, accepted=False)
     word = "probably" if verdict.accepted else "it cannot be told which" if len(best) > 1 else "possibly"
     text = f"{word}{':' if len(best) > 1 else ''} {'; or '.join(each.text for each in best)}"
     text += f": the control would miss the model of the photos by {verdict.fall:.3g} times less"

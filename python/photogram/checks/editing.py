@@ -6,7 +6,7 @@ before the block is adjusted anew, and the others are judged again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -120,6 +120,25 @@ def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
     adjusted
         Adjusts.
     """
+    found = _edited(block, suspects, adjusted)
+    if not suspects.control.any() or not found.control:
+        return found
+    # What is left out together takes the redundancy that tells it from other control.
+    none = np.zeros_like(suspects.control)
+    plain = _edited(block, replace(suspects, control=none), adjusted)
+    usable = plain.last is not None and plain.last.converged and plain.spread < HOPELESS
+    if not usable or _named(plain) >= _named(found):
+        return found
+    left = [block.point_ids[point] for point in np.flatnonzero(suspects.control).tolist()]
+    return replace(plain, cleared=[name for name in left if name not in plain.control])
+
+
+def _named(edited: Edited) -> int:
+    """Return how many observations an adjustment did without."""
+    return len(edited.section.findings) + sum(len(each) for each in edited.control.values())
+
+
+def _edited(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
     section = blunder_section()
     current = kept_images(block, ~suspects.images)
     left = np.flatnonzero(suspects.control)
