@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
+    from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
@@ -59,6 +60,7 @@ __all__ = [
     "VarianceComponents",
     "__version__",
     "adjust",
+    "check",
     "first_values",
     "group_sums",
     "hints",
@@ -98,6 +100,7 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "check": "checks.checking",
     "first_values": "adjustment.first_values",
     "group_sums": "results.group_sums",
     "hints": "adjustment.hints",
