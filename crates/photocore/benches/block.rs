@@ -247,7 +247,6 @@ fn adjust(criterion: &mut Criterion) {
         unit_variance: UnitVariance::Constrained,
         start: Start::Intersected,
         hold_unused: false,
-        information: true,
         memory: None,
         minimum: None,
     };

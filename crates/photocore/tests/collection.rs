@@ -185,7 +185,6 @@ fn adjusted_from(
         unit_variance: UnitVariance::Constrained,
         start,
         hold_unused: true,
-        information: false,
         memory: None,
         minimum: None,
     };

@@ -3,7 +3,7 @@
 use super::model::{Bundle, Station};
 use super::precision::median;
 use super::problem::Assembled;
-use super::{AdjustedPhoto, Image, Network, Options};
+use super::{AdjustedPhoto, Image, Network};
 use crate::adjustment::{Adjustment, Model};
 use crate::geometry::camera::each_camera;
 use crate::geometry::{CameraModel, Vector3};
@@ -18,7 +18,7 @@ pub struct AdjustedCamera {
     /// Redundancy numbers of the parameters as observations of themselves; zero unless weighted, NaN where there are no cofactors.
     pub redundancy: Vec<f64>,
     /// Their diagonal of the normal equations, weights counted: the reciprocal cofactor that each would have if all other unknowns were
-    /// known; zero for those that are held, NaN where there are no cofactors or none is asked for.
+    /// known; zero for those that are held, NaN where there are no cofactors.
     pub information: Vec<f64>,
     /// How many photos it has.
     pub photos: usize,
@@ -39,7 +39,6 @@ impl Network {
     /// The adjusted cameras, in the order of the network; `photos` are the adjusted photos.
     pub(super) fn adjusted_cameras(
         &self,
-        options: &Options,
         Assembled { problem, .. }: &Assembled,
         adjustment: &Adjustment,
         unknowns: &[f64],
@@ -61,8 +60,7 @@ impl Network {
             }
         };
         let mut cameras: Vec<AdjustedCamera> = self.cameras.iter().map(given).collect();
-        let asked = options.information && adjustment.cofactors.is_some();
-        if asked && self.cameras.iter().any(|camera| !camera.is_held()) {
+        if adjustment.cofactors.is_some() && self.cameras.iter().any(|camera| !camera.is_held()) {
             self.inform(&mut cameras, model, adjustment, unknowns);
         }
         for (index, (given, photo)) in self.photos.iter().zip(photos).enumerate() {

@@ -239,8 +239,6 @@ pub struct Options {
     pub start: Start,
     /// Whether photos without images stay as they are; otherwise their unknowns are unknowns, and determined only if they are weighted.
     pub hold_unused: bool,
-    /// Whether the [`AdjustedCamera::information`] of unknown cameras is asked for, which takes a pass over their images.
-    pub information: bool,
     /// Bytes that the adjustment may take (see [`crate::normals::System::memory`]); None for any number.
     pub memory: Option<usize>,
     /// What to hold where nothing else gives a datum; None for what is best held.
@@ -256,7 +254,6 @@ impl Default for Options {
             unit_variance: UnitVariance::default(),
             start: Start::default(),
             hold_unused: false,
-            information: true,
             memory: None,
             minimum: None,
         }

@@ -184,7 +184,7 @@ impl Solution {
         let of_photo = |&unknown: &usize| of_photo(problem, unknown);
         let photos = photos(network, assembled, &adjustment, &unknowns);
         let mut solution = Self {
-            cameras: network.adjusted_cameras(options, assembled, &adjustment, &unknowns, &photos),
+            cameras: network.adjusted_cameras(assembled, &adjustment, &unknowns, &photos),
             photos,
             commons: network.adjusted_commons(assembled, &adjustment, &unknowns),
             photo_corrections: adjustment.corrections().map(|all| all[..photos_end].to_vec()).collect(),

@@ -123,7 +123,6 @@ fn block_network(
         },
         start: Start::Intersected,
         hold_unused: false,
-        information: true,
         memory,
         minimum: minimum.map(|(photo, coordinate)| Minimum { photo, coordinate }),
     };

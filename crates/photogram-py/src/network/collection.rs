@@ -170,7 +170,6 @@ fn collection_network(
         unit_variance: UnitVariance::Constrained,
         start: Start::Given,
         hold_unused: true,
-        information: false,
         memory,
         minimum: None,
     };

@@ -126,7 +126,6 @@ impl Search<'_> {
             },
             start: Start::Given,
             hold_unused: true,
-            information: false,
             ..Options::default()
         };
         match network.adjust(&options, self.pool, self.watch) {
