@@ -142,7 +142,8 @@ class Additions:
 def read_project(job: Job, path: Path, added: Additions) -> Project:
     """Read what lies at a path, with what a user adds; its files are inputs of the job from now on."""
     from photogram.formats import Wishes, read
-    from photogram.formats.additions import deviations, with_control, with_images, with_names, with_sd
+    from photogram.formats.additions import deviations, with_control, with_images, with_sd
+    from photogram.formats.names import with_names
 
     if path.is_dir():
         job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.images import from_corner
+from photogram.formats.intersection import intersected
 from photogram.formats.plain.reading import read_control
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, indices_of
@@ -20,9 +21,8 @@ from photogram.formats.project import Frame, Options, Project
 from photogram.io.delimited import ColumnTable, read_columns
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
-from photogram.network.directions import image_directions
 
-__all__ = ["deviations", "self_calibrated", "with_control", "with_images", "with_names", "with_sd"]
+__all__ = ["deviations", "self_calibrated", "with_control", "with_images", "with_sd"]
 
 SIMILAR = 10.0
 """How much better control must fit a model after a similarity for the model to be carried over."""
@@ -119,27 +119,6 @@ def _named(name: str, wanted: set[str]) -> str:
     if own in wanted:
         return own
     return "f" if own in ("fx", "fy") and "f" in wanted else ""
-
-
-def with_names(project: Project, path: Path) -> Project:
-    """Return a project with points under other names: a table with the columns `point` and `name`.
-
-    Raises
-    ------
-    InputError
-        Points that are not there, two points of one name.
-    """
-    table = read_columns(path, known=("point", "name"))
-    table.require("point", "name")
-    places = {name: row for row, name in enumerate(project.block.point_ids)}
-    rows, names = indices_of(table, "point", places, "point").tolist(), table.texts("name")
-    table.names("name")
-    ids = list(project.block.point_ids)
-    for row, (place, name) in enumerate(zip(rows, names, strict=True)):
-        if name in places and places[name] != place:
-            raise table.error(row, f"the name {name} is that of another point already")
-        ids[place] = name
-    return project.replace(block=project.block.replace(point_ids=ids))
 
 
 def pixel_table(path: Path) -> ColumnTable:
@@ -285,7 +264,9 @@ def _carried(
 ) -> Project:
     """Carry a model onto control by a similarity, where it fits so much better than as it stands."""
     block = project.block
-    model = _intersected(project, points)
+    model = project.starts[points].copy()
+    unknown = np.flatnonzero(~np.isfinite(model).all(axis=1))
+    model[unknown] = intersected(project, points[unknown])
     known = np.isfinite(model).all(axis=1)
     same = replace(project, frame=frame) if frame != project.frame else project
     if np.count_nonzero(known) < 3 or block.observations or np.isfinite(block.photo_position_sd).any():
@@ -312,33 +293,6 @@ def _carried(
         frame=frame,
         messages=(*project.messages, message),
     )
-
-
-def _intersected(project: Project, points: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Floats:
-    """Return positions of points in the model: as the file has them, else where their rays come nearest."""
-    block = project.block
-    found = project.starts[points].copy()
-    matrices = attitude_matrices(block)
-    for k in np.flatnonzero(~np.isfinite(found).all(axis=1)).tolist():
-        rows = np.flatnonzero(block.image_points == points[k])
-        own = block.replace(
-            image_photos=block.image_photos[rows],
-            image_points=block.image_points[rows],
-            image_xy=block.image_xy[rows],
-            image_sd=block.image_sd[rows],
-        )
-        photos = own.image_photos
-        rays = np.einsum("nij,nj->ni", matrices[photos], image_directions(own))
-        good = np.isfinite(rays).all(axis=1) & np.isfinite(block.photo_positions[photos]).all(axis=1)
-        if np.count_nonzero(good) < 2:
-            continue
-        across = np.eye(3) - rays[good, :, np.newaxis] * rays[good, np.newaxis, :]
-        normal = across.sum(axis=0)
-        if np.linalg.cond(normal) < 1e12:
-            found[k] = np.linalg.solve(
-                normal, np.einsum("nij,nj->i", across, block.photo_positions[photos[good]])
-            )
-    return found
 
 
 def _similarity(model: Floats, targets: Floats) -> tuple[float, Floats, Floats, float]:

@@ -15,7 +15,14 @@ from photogram.messages import listed
 
 __all__ = ["FORMATS", "cannot_hold", "read", "recognised", "to_files"]
 
-FORMATS: dict[str, Format] = {name: import_module(f"photogram.formats.{name}").FORMAT for name in ("plain",)}
+FORMATS: dict[str, Format] = {
+    name: import_module(f"photogram.formats.{name}").FORMAT
+    for name in (
+        "plain",
+        "colmap",
+        "colmap_text",
+    )
+}
 """By name, in the order in which help lists them."""
 
 
