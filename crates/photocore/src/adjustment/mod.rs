@@ -58,10 +58,12 @@ mod damped;
 mod datum;
 mod distributions;
 mod factored;
+mod group_test;
 mod loss;
 mod method;
 mod motions;
 mod normal_equations;
+mod observation_rows;
 mod options;
 mod problem;
 mod published;
@@ -70,6 +72,7 @@ mod result;
 mod run;
 mod statistics;
 mod transformation;
+mod tried;
 mod trust_region;
 mod walk;
 
@@ -78,9 +81,11 @@ pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
 };
 pub use factored::{CofactorError, Factored};
+pub use group_test::{GroupTest, VISIBLE, canonical_correlation};
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
 pub use normal_equations::NormalEquations;
+pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Motions, Problem, Weighted};
 pub use resistance::Classes;
@@ -88,3 +93,4 @@ pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
 pub use run::{Watch, adjust, on_all_processors};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
+pub use tried::{TieCofactors, Tried};

@@ -70,6 +70,8 @@ mod problem;
 mod screening;
 mod solution;
 mod start;
+mod suspects;
+mod trial;
 mod weighted_angles;
 
 use std::ops::ControlFlow;
@@ -93,6 +95,8 @@ pub(crate) use precision::median;
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
 pub(crate) use start::meet;
+pub use suspects::Subject;
+pub use trial::{OnPoint, Out, Prediction, Standing, Tests, Trial};
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
