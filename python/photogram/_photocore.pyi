@@ -103,6 +103,71 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     NaN for arguments that cannot be.
     """
 
+def log_chi_square(x: _Floats, dof: _Floats) -> _Floats:
+    """Logarithms of the probabilities that chi-square variables exceed values.
+
+    Parameters
+    ----------
+    x
+        (n,) not negative.
+    dof
+        (n,) degrees of freedom, positive.
+
+    Returns
+    -------
+    (n,) natural logarithms, also where the probability is less than the smallest number; NaN for arguments
+    outside these ranges.
+    """
+
+def log_fisher(x: _Floats, first: _Floats, second: _Floats) -> _Floats:
+    """Logarithms of the probabilities that Fisher's variables exceed values.
+
+    Parameters
+    ----------
+    x
+        (n,) not negative.
+    first, second
+        (n,) degrees of freedom, positive.
+
+    Returns
+    -------
+    (n,) natural logarithms, also where the probability is less than the smallest number; NaN for arguments
+    outside these ranges.
+    """
+
+def noncentral_chi_square(x: float, dof: float, noncentrality: float) -> float:
+    """Probability that a noncentral chi-square variable exceeds `x`; NaN for arguments that cannot be."""
+
+def noncentral_fisher(x: float, first: float, second: float, noncentrality: float) -> float:
+    """Probability that a noncentral F variable exceeds `x`; NaN for arguments that cannot be.
+
+    With `second` infinite it is that of the noncentral chi-square variable over `first`.
+    """
+
+def detectable_noncentrality(level: float, power: float, first: float, second: float) -> float:
+    """Return the noncentrality (Baarda's lambda0) at which a test is significant with a given probability.
+
+    Parameters
+    ----------
+    level
+        Of the test: probability that it rejects where nothing is wrong.
+    power
+        Probability that it does where something is; more than the level.
+    first, second
+        Degrees of freedom of the F test; with `second` infinite of the chi-square test.
+
+    Returns
+    -------
+    NaN for arguments outside these ranges.
+    """
+
+def level_of_equal_power(noncentrality: float, power: float, dof: float) -> tuple[float, float]:
+    """Return level and critical value of the chi-square test that finds a noncentrality with a given power.
+
+    With the noncentrality of one test for all others it is Baarda's B-method. NaN for arguments that cannot
+    be.
+    """
+
 def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str, str]]]:
     """Return the models of cameras, `CAMERAS`, by their names.
 

@@ -1,5 +1,18 @@
-"""Statistics of an adjustment: tests, reliability, outliers."""
+"""Statistics of an adjustment: tests, critical values, reliability, outliers."""
 
+from photogram.statistics.distributions import (
+    b_method,
+    benjamini_hochberg,
+    bonferroni,
+    critical_chi_square,
+    critical_fisher,
+    critical_normal,
+    critical_student,
+    critical_tau,
+    lambda0,
+    log_chi_square,
+    log_fisher,
+)
 from photogram.statistics.limits import (
     NOTABLE_FACTOR,
     GlobalTest,
@@ -12,8 +25,19 @@ from photogram.statistics.limits import (
 __all__ = [
     "NOTABLE_FACTOR",
     "GlobalTest",
+    "b_method",
+    "benjamini_hochberg",
+    "bonferroni",
+    "critical_chi_square",
+    "critical_fisher",
+    "critical_normal",
+    "critical_student",
+    "critical_tau",
     "externally_studentized",
     "global_test",
+    "lambda0",
+    "log_chi_square",
+    "log_fisher",
     "normal_limit",
     "studentized_limit",
 ]

@@ -16,12 +16,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
+from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal, critical_student
 
 __all__ = ["GlobalTest", "externally_studentized", "global_test", "normal_limit", "studentized_limit"]
 
@@ -90,7 +90,7 @@ class GlobalTest:
 
 
 def global_test(
-    weighted_sum_of_squares: float, degrees_of_freedom: float, level: float = 0.05
+    weighted_sum_of_squares: float, degrees_of_freedom: float, level: float = LEVEL
 ) -> GlobalTest | None:
     """Test all residuals together against their standard deviations.
 
@@ -149,7 +149,7 @@ def externally_studentized(
     return np.asarray(w / np.sqrt(others / (f - 1)))
 
 
-def studentized_limit(degrees_of_freedom: float, tests: int, level: float = 0.05) -> float:
+def studentized_limit(degrees_of_freedom: float, tests: int, level: float = LEVEL) -> float:
     """Return the limit that externally studentized residuals of good observations rarely exceed.
 
     Parameters
@@ -167,10 +167,10 @@ def studentized_limit(degrees_of_freedom: float, tests: int, level: float = 0.05
     """
     if degrees_of_freedom < 2:
         return math.inf
-    return _photocore.student_limit(level / max(tests, 1), degrees_of_freedom - 1)
+    return critical_student(bonferroni(level, tests), degrees_of_freedom - 1)
 
 
-def normal_limit(tests: int, level: float = 0.05) -> float:
+def normal_limit(tests: int, level: float = LEVEL) -> float:
     """Return the limit that standardized residuals of good observations rarely exceed, unit weight known.
 
     Parameters
@@ -180,4 +180,4 @@ def normal_limit(tests: int, level: float = 0.05) -> float:
     level
         Probability that any of them exceeds it (Bonferroni: `level / tests` for each, both sides).
     """
-    return -NormalDist().inv_cdf(level / max(tests, 1) / 2)
+    return critical_normal(bonferroni(level, tests))

@@ -62,6 +62,7 @@ mod group_test;
 mod loss;
 mod method;
 mod motions;
+mod noncentral;
 mod normal_equations;
 mod observation_rows;
 mod options;
@@ -78,12 +79,16 @@ mod walk;
 
 pub use datum::{Adjusted, Datum, DatumError, InDatum, in_datum};
 pub use distributions::{
-    Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
+    Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, student,
+    student_limit,
 };
 pub use factored::{CofactorError, Factored};
 pub use group_test::{GroupTest, VISIBLE, canonical_correlation};
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
+pub use noncentral::{
+    detectable_noncentrality, level_of_equal_power, noncentral_chi_square, noncentral_fisher,
+};
 pub use normal_equations::NormalEquations;
 pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
