@@ -14,8 +14,8 @@ from photogram.adjustment.ends import hidden, rounded, too_coarse
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
+from photogram.collection.core import CollectionOptions, collection_network
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
-from photogram.memory import available_memory
 from photogram.messages import Message, listed
 
 __all__ = ["adjust"]
@@ -94,25 +94,11 @@ def adjust(
     if not tolerance > 0:
         raise InputError("the criterion of convergence must be positive")
     row = loss_row(loss, scale)
+    options = CollectionOptions(tolerance, max_iterations, covariance, row, ordering)
+    processors = core_threads(threads)
     try:
-        solution = _photocore.adjust_collection(
-            collection.camera,
-            collection.photo_parameters,
-            collection.photo_sd,
-            collection.point_positions,
-            collection.point_sd,
-            collection.image_photos,
-            collection.image_points,
-            collection.image_xy,
-            collection.image_sd,
-            decrease=tolerance,
-            max_iterations=max_iterations,
-            covariance=covariance,
-            loss=row,
-            ordering=ordering,
-            threads=core_threads(threads),
-            memory=available_memory(),
-            progress=None if progress is None else teller(progress),
+        solution = collection_network(collection, options).adjust(
+            threads=processors, progress=None if progress is None else teller(progress)
         )
     except _photocore.CollectionError as error:
         raise _named(*error.args) from None
@@ -123,6 +109,8 @@ def adjust(
         loss=row,
         weighted_sum_of_squares=solution.sum_of_squares,
         datum=[(photo, collection.parameters[parameter]) for photo, parameter in solution.datum],
+        options=options,
+        state=solution.state,
     )
 
 

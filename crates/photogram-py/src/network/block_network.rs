@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 
 use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
+use super::trial::NetworkTrial;
 use super::{BlockError, failure};
 use crate::options::unknown;
 use crate::work::{Workers, watched};
@@ -101,6 +102,15 @@ impl BlockNetwork {
             self.network.covariances(&self.options, &state.state, None, pool, watch)
         })?;
         found.map(|covariances| BlockCovariances { covariances, images }).map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn trial(&self, py: Python<'_>, state: &BlockState, threads: usize) -> PyResult<NetworkTrial> {
+        let images = self.network.images.len();
+        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
+            self.network.trial(&self.options, &state.state, pool)
+        })?;
+        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (state, *, threads))]

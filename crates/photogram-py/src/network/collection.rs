@@ -9,15 +9,19 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::solution::CollectionSolution;
-use super::{CollectionError, adjusted, failure, images, points, said};
+use super::state::BlockState;
+use super::trial::NetworkTrial;
+use super::{CollectionError, failure, images, points, said};
 use crate::arrays::{check_lengths, rows, slices, table};
 use crate::options::{named_loss, named_ordering, unknown};
+use crate::work::{Workers, watched};
 
 /// Adds the functions to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("CAMERAS", geometry::Camera::NAMES.to_vec())?;
     module.add_function(wrap_pyfunction!(collection_images, module)?)?;
-    module.add_function(wrap_pyfunction!(adjust_collection, module)?)
+    module.add_class::<CollectionNetwork>()?;
+    module.add_function(wrap_pyfunction!(collection_network, module)?)
 }
 
 /// Parameters of a pose in vectors.
@@ -63,10 +67,9 @@ fn collection_images<'py>(
 #[pyfunction]
 #[pyo3(signature = (
     camera, photo_parameters, photo_sd, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, decrease,
-    max_iterations, covariance, loss, ordering, threads, memory, progress
+    max_iterations, covariance, loss, ordering, memory
 ))]
-fn adjust_collection(
-    py: Python<'_>,
+fn collection_network(
     camera: &str,
     photo_parameters: PyReadonlyArrayDyn<'_, f64>,
     photo_sd: PyReadonlyArrayDyn<'_, f64>,
@@ -81,10 +84,8 @@ fn adjust_collection(
     covariance: bool,
     loss: Option<(&str, f64)>,
     ordering: &str,
-    threads: usize,
     memory: Option<usize>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<CollectionSolution> {
+) -> PyResult<CollectionNetwork> {
     let given = photos(camera, "photo_parameters", &photo_parameters)?.collect::<PyResult<Vec<_>>>()?;
     let unknowns = POSE + model(camera)?.parameters.len();
     let sd = slices("photo_sd", &photo_sd, unknowns)?;
@@ -123,9 +124,46 @@ fn adjust_collection(
         memory,
         minimum: None,
     };
-    let solution = adjusted(py, &network, &options, threads, progress)?;
-    solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| match error {
-        Failure::Index(_) => PyValueError::new_err(said(&error, "collection")),
-        error => CollectionError::new_err(failure(&error, "collection")),
-    })
+    Ok(CollectionNetwork { network, options, unknowns })
+}
+
+/// A collection with the options of its adjustment.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct CollectionNetwork {
+    network: Network,
+    options: Options,
+    unknowns: usize,
+}
+
+fn refused(error: &Failure) -> PyErr {
+    match error {
+        Failure::Index(_) => PyValueError::new_err(said(error, "collection")),
+        error => CollectionError::new_err(failure(error, "collection")),
+    }
+}
+
+#[pymethods]
+impl CollectionNetwork {
+    #[pyo3(signature = (*, threads, progress))]
+    fn adjust(
+        &self,
+        py: Python<'_>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<CollectionSolution> {
+        let workers = Workers::of(threads, self.network.images.len());
+        let solution =
+            watched(py, workers, progress, |pool, watch| self.network.adjust(&self.options, pool, watch))?;
+        let unknowns = self.unknowns;
+        solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn trial(&self, py: Python<'_>, state: &BlockState, threads: usize) -> PyResult<NetworkTrial> {
+        let images = self.network.images.len();
+        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
+            self.network.trial(&self.options, &state.state, pool)
+        })?;
+        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
+    }
 }

@@ -201,6 +201,11 @@ macro_rules! solution_class {
             }
 
             #[getter]
+            fn state(&self) -> BlockState {
+                BlockState { state: self.solution.state.clone() }
+            }
+
+            #[getter]
             fn datum(&self) -> Vec<(usize, usize)> {
                 self.solution.datum.clone()
             }
@@ -213,11 +218,6 @@ macro_rules! solution_class {
 solution_class! {
     /// An adjusted block.
     BlockSolution, "block", {
-        #[getter]
-        fn state(&self) -> BlockState {
-            BlockState { state: self.solution.state.clone() }
-        }
-
         #[getter]
         fn lost_digits(&self) -> f64 {
             self.solution.lost_digits
