@@ -75,7 +75,7 @@ def refraction_lines() -> list[str]:
 
 def night_lines() -> list[str]:
     """Show the figures and the camera of the packaged night."""
-    _, (_, figures), (_, camera) = night_summary(night())
+    *_, (_, figures), (_, camera) = night_summary(night())
     return [*figures, "", *camera]
 
 
