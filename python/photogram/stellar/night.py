@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import Message, listed
+from photogram.show.ways import Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
@@ -106,7 +107,7 @@ class Night:
 
 
 @dataclass(frozen=True, eq=False)
-class CalibratedNight:
+class CalibratedNight(Judged):
     """A calibrated camera, and what happened to the images.
 
     Attributes
