@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
+    from photogram.adjustment.snooping import snoop
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from photogram.planning import Plan, plan
     from photogram.results.iteration import Iteration
     from photogram.results.result import Result
+    from photogram.results.snooped import Snooped
 
 __all__ = [
     "AdjustmentError",
@@ -51,6 +53,7 @@ __all__ = [
     "Resection",
     "Result",
     "Simulation",
+    "Snooped",
     "Spheroid",
     "__version__",
     "adjust",
@@ -61,6 +64,7 @@ __all__ = [
     "predict",
     "resect",
     "simulate",
+    "snoop",
 ]
 
 _HOMES = {
@@ -86,6 +90,7 @@ _HOMES = {
     "Resection": "adjustment.resection",
     "Result": "results.result",
     "Simulation": "network.simulation",
+    "Snooped": "results.snooped",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
@@ -96,6 +101,7 @@ _HOMES = {
     "predict": "adjustment.prediction",
     "resect": "adjustment.resection",
     "simulate": "network.simulation",
+    "snoop": "adjustment.snooping",
 }
 """The module of each name, loaded when it is first asked for.
 
