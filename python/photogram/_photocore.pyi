@@ -640,7 +640,7 @@ def block_network(
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     unit_variance
-        `free`, `constrained` or `unity` (GIANT guide, Appendix E).
+        `free`, `constrained` or `unity` (GIANT guide, Appendix E), or `redundancy`.
     minimum
         Photo whose pose is held where nothing else gives a datum, and for the scale a photo and the number of
         its coordinate; None leaves either to the core.
@@ -677,8 +677,13 @@ class BlockNetwork:
         datum: tuple[str, list[int], list[int], bool] | None,
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        start: BlockState | None = None,
     ) -> BlockSolution:
-        """Adjust it; a free one may be taken to the datum of inner constraints."""
+        """Adjust it; a free one may be taken to the datum of inner constraints.
+
+        Or, without such a datum, adjust it from where an adjustment of it has ended, perhaps with other
+        weights: in the order of that, and without the points that had run into a station there.
+        """
 
     def in_datum(
         self,
@@ -921,6 +926,56 @@ class BlockCovariances:
     ) -> _Floats:
         """Return J Q J^T, for (m, k) partials J of m functions of the k unknowns of what is named."""
 
+    def group_squares(
+        self,
+        groups: tuple[int, _Indices, _Indices, _Indices, list[int], list[int], list[int]],
+        *,
+        classes: int | None,
+        exact: int,
+        vectors: int,
+        seed: int,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> tuple[list[int], _Floats, list[bool]]:
+        """Return sums of R_ij^2 over groups, R taking errors of observations to residuals, both in their sd.
+
+        Parameters
+        ----------
+        groups
+            Number g of groups; then the group of each observation, -1 for none: (m, 2) of x and y of images,
+            (n, 3) of components of points, (P, 6) of unknowns of poses, of every camera, common unknown, and
+            other observation.
+        classes
+            None: all of them. A number: only those within each group, whose columns groups share that leave
+            the same rest by it; what is between such groups is added.
+        exact, vectors, seed
+            Groups of so many observations at the most, and all that have no more than there are vectors, are
+            taken column by column; others with so many vectors of random signs (Hutchinson 1990). Same seed,
+            same bits, for any number of threads.
+
+        Returns
+        -------
+        equations
+            (g + 1,) observations of each group and of none; empty with classes.
+        squares
+            (g + 1) * g sums, row by row, of i in the group of the row (the last row: in none) and j in that
+            of the column; with classes (g,) sums of i and j in each group.
+        exact
+            (g,) which columns were taken column by column; empty with classes.
+        """
+
+    def project_images(
+        self,
+        columns: _Floats,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> _Floats:
+        """Return (k, m, 2) what k columns of errors of all images leave as their residuals, both in their sd.
+
+        That is R z for each column z; images that took no part have neither.
+        """
+
 class _NetworkSolution:
     """What adjusted blocks and collections have alike, in the order of photos (P), points (n), images (m).
 
@@ -1102,6 +1157,10 @@ class BlockSolution(_NetworkSolution):
     @property
     def sums_of_squares(self) -> tuple[float, float, float, float]:
         """Weighted sums of squares: camera, ground, plates, observations beside images."""
+
+    @property
+    def redundancies(self) -> tuple[float, float, float, float] | None:
+        """Sums of the redundancy numbers of the same; None without covariances."""
 
     @property
     def adjusted_observations(
@@ -1888,7 +1947,7 @@ def collection_network(
     ordering: str,
     memory: int | None,
 ) -> CollectionNetwork:
-    """Return a collection of photos as the core adjusts it, by Levenberg-Marquardt steps.
+    """Return a collection of photos as it is adjusted by Levenberg-Marquardt steps.
 
     Parameters
     ----------
@@ -1926,7 +1985,8 @@ def collection_network(
 class CollectionNetwork:
     """A collection with the options of its adjustment; arguments as of :class:`BlockNetwork`.
 
-    Its methods raise CollectionError for a collection that cannot be adjusted.
+    Its methods raise CollectionError for a collection that cannot be adjusted, and ValueError for images that
+    name photos or points that are not there.
     """
 
     def adjust(
@@ -1934,8 +1994,18 @@ class CollectionNetwork:
         *,
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        start: BlockState | None = None,
     ) -> CollectionSolution:
-        """Adjust it."""
+        """Adjust it, perhaps from where an adjustment of it with other weights has ended."""
+
+    def covariances(
+        self,
+        state: BlockState,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> BlockCovariances:
+        """Factor the normal equations where the adjustment has ended."""
 
     def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
         """Prepare for trials without some observations, from where the adjustment has ended."""

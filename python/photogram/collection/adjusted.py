@@ -64,6 +64,11 @@ class AdjustedCollection(AdjustedNetwork):
         return self.collection.image_points
 
     @property
+    def image_given_sd(self) -> Floats:
+        """(m, 2) standard deviations a priori of the image coordinates."""
+        return self.collection.image_sd
+
+    @property
     def photo_given_sd(self) -> Floats:
         """(P, k) standard deviations of given parameters as observations: infinite free, zero fixed."""
         return self.collection.photo_sd

@@ -54,6 +54,12 @@ pub trait Model: Sync {
         None
     }
 
+    /// Whether what is observed of groups is known to leave all motions open, where none of the unknowns is fixed. They are then tried on some
+    /// groups only.
+    fn groups_leave_open(&self) -> bool {
+        false
+    }
+
     /// Its motions whether or not observations and weights give a datum.
     fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
         self.motions(unknowns)

@@ -8,6 +8,7 @@ use photocore::network::{Camera, Network, NetworkError as Failure, Options, Phot
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::block_network::{BlockCovariances, factored};
 use super::solution::CollectionSolution;
 use super::state::BlockState;
 use super::trial::NetworkTrial;
@@ -22,6 +23,64 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(collection_images, module)?)?;
     module.add_class::<CollectionNetwork>()?;
     module.add_function(wrap_pyfunction!(collection_network, module)?)
+}
+
+/// A collection with the options of its adjustment.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct CollectionNetwork {
+    network: Network,
+    options: Options,
+    /// Of a photo: its pose and its camera.
+    unknowns: usize,
+}
+
+#[pymethods]
+impl CollectionNetwork {
+    #[pyo3(signature = (*, threads, progress, start = None))]
+    fn adjust(
+        &self,
+        py: Python<'_>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+        start: Option<PyRef<'_, BlockState>>,
+    ) -> PyResult<CollectionSolution> {
+        let workers = Workers::of(threads, self.network.images.len());
+        let start = start.map(|start| start.state.clone());
+        let solution = watched(py, workers, progress, |pool, watch| match &start {
+            None => self.network.adjust(&self.options, pool, watch),
+            Some(start) => self.network.adjust_again(&self.options, start, pool, watch),
+        })?;
+        let unknowns = self.unknowns;
+        solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads, progress))]
+    fn covariances(
+        &self,
+        py: Python<'_>,
+        state: &BlockState,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<BlockCovariances> {
+        let found = factored(py, (&self.network, &self.options), state, threads, progress)?;
+        found.map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn trial(&self, py: Python<'_>, state: &BlockState, threads: usize) -> PyResult<NetworkTrial> {
+        let images = self.network.images.len();
+        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
+            self.network.trial(&self.options, &state.state, pool)
+        })?;
+        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
+    }
+}
+
+fn refused(error: &Failure) -> PyErr {
+    match error {
+        Failure::Index(_) => PyValueError::new_err(said(error, "collection")),
+        error => CollectionError::new_err(failure(error, "collection")),
+    }
 }
 
 /// Parameters of a pose in vectors.
@@ -125,45 +184,4 @@ fn collection_network(
         minimum: None,
     };
     Ok(CollectionNetwork { network, options, unknowns })
-}
-
-/// A collection with the options of its adjustment.
-#[pyclass(frozen, module = "photogram._photocore")]
-pub struct CollectionNetwork {
-    network: Network,
-    options: Options,
-    unknowns: usize,
-}
-
-fn refused(error: &Failure) -> PyErr {
-    match error {
-        Failure::Index(_) => PyValueError::new_err(said(error, "collection")),
-        error => CollectionError::new_err(failure(error, "collection")),
-    }
-}
-
-#[pymethods]
-impl CollectionNetwork {
-    #[pyo3(signature = (*, threads, progress))]
-    fn adjust(
-        &self,
-        py: Python<'_>,
-        threads: usize,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<CollectionSolution> {
-        let workers = Workers::of(threads, self.network.images.len());
-        let solution =
-            watched(py, workers, progress, |pool, watch| self.network.adjust(&self.options, pool, watch))?;
-        let unknowns = self.unknowns;
-        solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| refused(&error))
-    }
-
-    #[pyo3(signature = (state, *, threads))]
-    fn trial(&self, py: Python<'_>, state: &BlockState, threads: usize) -> PyResult<NetworkTrial> {
-        let images = self.network.images.len();
-        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
-            self.network.trial(&self.options, &state.state, pool)
-        })?;
-        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
-    }
 }

@@ -303,6 +303,11 @@ solution_class! {
         }
 
         #[getter]
+        fn redundancies(&self) -> Option<(f64, f64, f64, f64)> {
+            self.solution.redundancies.map(|own| (own.camera, own.ground, own.plates, own.observations))
+        }
+
+        #[getter]
         fn adjusted_observations(&self) -> Vec<Option<AdjustedRow>> {
             self.solution.observations.iter().map(|own| own.as_ref().map(adjusted_row)).collect()
         }
