@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.identification import identify
 from photogram.stellar.matching import STRETCH
@@ -17,6 +16,7 @@ from photogram.stellar.places import Earth
 from photogram.stellar.pointing import attitude_of, axis_of, roll_of
 from photogram.stellar.skies import Exposure
 from photogram.stellar.sky import Site
+from photogram.stellar.sky_cameras import SkyCamera
 
 __all__ = ["Hint", "Setting", "find_hint"]
 
@@ -38,15 +38,19 @@ class Setting:
         As for `identify`.
     attitude_error, tolerance
         Radians; pixels.
+    field_error, roll_known
+        As for `photogram.stellar.night.Night`.
     """
 
     site: Site
     catalogue: Catalogue
     frame: tuple[float, float]
-    camera: BrownCamera
+    camera: SkyCamera
     attitude_error: float
     tolerance: float
     earth: Earth
+    field_error: float = STRETCH
+    roll_known: bool = True
 
     @property
     def radius(self) -> float:
@@ -106,10 +110,11 @@ def find_hint(exposures: Sequence[Exposure], names: Sequence[str], setting: Sett
                 mended.site,
                 mended.catalogue,
                 frame=mended.frame,
-                radius=mended.radius + mistake.stretch * max(mended.frame),
+                radius=mended.radius,
                 tolerance=mended.tolerance,
                 earth=mended.earth,
-                stretch=mistake.stretch,
+                stretch=max(mistake.stretch, mended.field_error),
+                roll_known=mended.roll_known,
             )
             if sighting.match.expected * len(mistakes) < ACCEPTED:
                 explained.append(names[index])

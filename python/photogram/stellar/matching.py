@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.neighbours import mutually_nearest
-from photogram.stellar.odds import ACCEPTED, CROWDED, expected_false
+from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
 
-__all__ = ["Match", "match"]
+__all__ = ["STRETCH", "Match", "Search", "match"]
 
 
 _SEEDS = 25
@@ -43,6 +43,8 @@ class Match:
         Whether there are so many stars in a tolerance area that counting cannot tell.
     scale
         Of the predicted images over the measured ones.
+    hypotheses
+        How many were counted.
     """
 
     found: Indices
@@ -51,11 +53,61 @@ class Match:
     images: int
     crowded: bool = False
     scale: float = 1.0
+    hypotheses: float = 0.0
 
     @property
     def accepted(self) -> bool:
         """Whether chance would not have found as much."""
         return self.expected < ACCEPTED
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Where the images of stars may be.
+
+    Attributes
+    ----------
+    frame
+        Width and height.
+    radius
+        Largest distance between an image and its prediction; where the roll is not known, of their distances
+        from the axis.
+    stretch
+        Share by which the scale may be wrong.
+    axis
+        (2,) the point about which the camera may be turned; None where its roll is known.
+    share
+        What of the frame shows the sky.
+    tried
+        Hypotheses that were counted before in the same exposure.
+    """
+
+    frame: tuple[float, float]
+    radius: float
+    stretch: float = STRETCH
+    axis: Floats | None = None
+    share: float = 1.0
+    tried: float = 0.0
+
+    def regions(self, predicted: Floats) -> tuple[Bools, float, float]:
+        """Return which predicted images are in the middle, the area of that, and the area of all."""
+        width, height = self.frame
+        if self.axis is None:
+            around = (width + 2 * self.radius) * (height + 2 * self.radius)
+            middle = np.asarray(((predicted >= 0) & (predicted <= self.frame)).all(axis=1), bool)
+            return middle, width * height * self.share, around * self.share
+        inner, outer = 0.5 * min(self.frame), 0.5 * math.hypot(width, height) + self.radius
+        middle = np.asarray(np.linalg.norm(predicted - self.axis, axis=1) <= inner, bool)
+        return middle, math.pi * inner**2, math.pi * outer**2 * self.share
+
+    def candidates(self, measured: Floats, predicted: Floats) -> Bools:
+        """Return (m, n) whether a star may be where an image is."""
+        if self.axis is None:
+            return np.asarray(
+                np.linalg.norm(measured[:, None] - predicted[None], axis=2) <= self.radius, bool
+            )
+        own, other = (np.linalg.norm(xy - self.axis, axis=1) for xy in (measured, predicted))
+        return np.asarray(np.abs(own[:, None] - other[None]) <= self.radius, bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +126,14 @@ class _Sky:
     density: float
 
     @classmethod
-    def as_deep(cls, predicted: Floats, images: int, frame: tuple[float, float], radius: float) -> _Sky:
+    def as_deep(cls, predicted: Floats, images: int, search: Search) -> _Sky:
         """Take the brightest predicted images, for so many measured ones in the frame."""
-        area = frame[0] * frame[1]
-        around = (frame[0] + 2 * radius) * (frame[1] + 2 * radius)
-        chosen = predicted[: math.ceil(_DEEPER * max(images, _SEEDS) * around / area)]
-        inside = int(((chosen >= 0) & (chosen <= frame)).all(axis=1).sum())
-        return cls(chosen, max(inside / area, len(chosen) / around))
+        width, height = search.frame
+        _, _, around = search.regions(predicted)
+        seen = width * height * search.share
+        chosen = predicted[: math.ceil(_DEEPER * max(images, _SEEDS) * around / seen)]
+        middle, area, around = search.regions(chosen)
+        return cls(chosen, max(int(middle.sum()) / area, len(chosen) / around))
 
     def mu(self, tolerance: float) -> float:
         """Return the mean number of stars in a tolerance area."""
@@ -90,11 +143,9 @@ class _Sky:
 def match(
     measured: Floats,
     predicted: Floats,
+    search: Search,
     *,
-    frame: tuple[float, float],
-    radius: float,
     tolerance: float,
-    stretch: float = STRETCH,
 ) -> Match:
     """Match measured star images to predicted ones.
 
@@ -110,53 +161,66 @@ def match(
     predicted
         (n, 2) images of catalogue stars under the approximate attitude, the brightest first. Of many, the
         brightest are taken, two for each image.
-    frame
-        Width and height.
-    radius
-        Largest distance between an image and its prediction.
+    search
+        Where the images may be.
     tolerance
         Largest distance that is left after the polynomials.
-    stretch
-        Share by which the scale may be wrong.
     """
     none = Match(np.full(len(measured), -1, np.int64), math.inf, 0, len(measured))
     if len(measured) < 3 or len(predicted) < 3:
         return none
     seeds = measured[: 3 * _SEEDS]
-    bright = _Sky.as_deep(predicted, len(seeds), frame, radius)
-    transforms = _hypotheses(measured[:_SEEDS], bright.predicted, radius, tolerance, stretch)
-    count = len(transforms)
+    bright = _Sky.as_deep(predicted, len(seeds), search)
+    transforms = _hypotheses(measured[:_SEEDS], bright.predicted, search, tolerance)
+    # Both counts take part, and what was tried before.
+    hypotheses = 2.0 * len(transforms) + search.tried
     best, most = None, 2
     for transform in _promising(transforms, seeds, bright.predicted, 3 * tolerance):
         found = mutually_nearest(_apply(transform, seeds), bright.predicted, 3 * tolerance)
         matched = int((found >= 0).sum())
         if matched > most:
             best, most = transform, matched
-    expected = expected_false(len(seeds), 2, bright.mu(3 * tolerance), most, 2 * count)
+    expected = expected_false(len(seeds), 2, bright.mu(3 * tolerance), most, hypotheses)
     if best is None:
-        return none
+        return replace(none, hypotheses=hypotheses)
     if bright.mu(3 * tolerance) > CROWDED:
         expected = math.inf
-    sky = _Sky.as_deep(predicted, len(measured), frame, radius)
+    sky = _Sky.as_deep(predicted, len(measured), search)
     halves = np.arange(len(measured)) % 2 == 0
     again = mutually_nearest(
         _refined(measured, sky.predicted, best, tolerance, halves), sky.predicted, tolerance
     )
     held_out = int((again[~halves] >= 0).sum())
     # Both images of a pair may be among those held out.
-    second = expected_false(int((~halves).sum()), 2, sky.mu(tolerance), held_out, 2 * count)
+    second = expected_false(int((~halves).sum()), 2, sky.mu(tolerance), held_out, hypotheses)
     crowded = sky.mu(tolerance) > CROWDED
     counted = (most, len(seeds))
     if not crowded and second < expected:
         expected, counted = second, (held_out, int((~halves).sum()))
     moved = _refined(measured, sky.predicted, best, tolerance, np.ones(len(measured), bool))
     return Match(
-        mutually_nearest(moved, sky.predicted, tolerance),
+        _certain(moved, sky, tolerance),
         expected,
         *counted,
         crowded=crowded and bright.mu(3 * tolerance) > CROWDED,
         scale=math.hypot(best[0, 0], best[0, 1]),
+        hypotheses=hypotheses,
     )
+
+
+def _certain(moved: Floats, sky: _Sky, tolerance: float) -> Indices:
+    """Match images to stars, but for those that show another one nearly as well.
+
+    These wait for the calibrated camera.
+    """
+    found = mutually_nearest(moved, sky.predicted, tolerance)
+    has = found >= 0
+    if not has.any():
+        return found
+    off = moved[has] - sky.predicted[found[has]]
+    sd = max(1.4826 * float(np.median(np.abs(off))), 1e-3 * tolerance)
+    probability = star_probabilities(moved, sky.predicted, found, sd, sky.density)
+    return np.where(has & ~(probability >= CERTAIN), -1, found)
 
 
 def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: float, fitted: Bools) -> Floats:
@@ -173,12 +237,9 @@ def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: floa
     return moved
 
 
-def _hypotheses(
-    measured: Floats, predicted: Floats, radius: float, tolerance: float, stretch: float
-) -> Floats:
+def _hypotheses(measured: Floats, predicted: Floats, search: Search, tolerance: float) -> Floats:
     """Return similarities (h, 3, 2) from pairs of candidates whose separations agree."""
-    distance = np.linalg.norm(measured[:, None] - predicted[None], axis=2)
-    i, k = np.nonzero(distance <= radius)
+    i, k = np.nonzero(search.candidates(measured, predicted))
     if len(i) > _CANDIDATES:
         # The brightest images and stars.
         order = np.argsort(i / len(measured) + k / len(predicted), kind="stable")[:_CANDIDATES]
@@ -188,14 +249,18 @@ def _hypotheses(
     a, b = a[keep], b[keep]
     first = (measured[i[b]] - measured[i[a]]) @ np.array([1, 1j])
     second = (predicted[k[b]] - predicted[k[a]]) @ np.array([1, 1j])
-    agree = (np.abs(np.abs(first) - np.abs(second)) < 3 * tolerance + stretch * np.abs(first)) & (
-        np.abs(first) > min(radius, 0.25 * np.ptp(measured, axis=0).max())
+    agree = (np.abs(np.abs(first) - np.abs(second)) < 3 * tolerance + search.stretch * np.abs(first)) & (
+        np.abs(first) > min(search.radius, 0.25 * np.ptp(measured, axis=0).max())
     )
     a, b, z, w = a[agree], b[agree], first[agree], second[agree]
     factor = w / z
     shift = predicted[k[a]] @ np.array([1, 1j]) - factor * (measured[i[a]] @ np.array([1, 1j]))
     rows = [[factor.real, factor.imag], [-factor.imag, factor.real], [shift.real, shift.imag]]
-    return np.moveaxis(np.array(rows), 2, 0)
+    made = np.moveaxis(np.array(rows), 2, 0)
+    if search.axis is None:
+        return made
+    shift = np.linalg.norm(search.axis @ made[:, :2] + made[:, 2] - search.axis, axis=1)
+    return np.asarray(made[shift <= search.radius], float)
 
 
 def _promising(transforms: Floats, seeds: Floats, predicted: Floats, limit: float) -> Floats:
