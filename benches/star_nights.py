@@ -5,14 +5,12 @@
 Every night has two to six exposures of stars to magnitude 6 of the Hipparcos catalogue; nights are made
 until there are so many exposures. The catalogue that is given is zero to three magnitudes deeper, every third
 field of view is up to 10 % wrong (half of these nights say so), 30 % of the images are of no star, a tenth of
-the stars is missing, attitudes are up to 1.5 degrees wrong or, in every fifth night, up to 8. The roll of every
-second night is unknown, and it says so, but for every tenth of them. Some exposures are of another part of the
-sky than is said. A night ends
+the stars is missing, attitudes are up to 1.5 degrees wrong or, in every fifth night, up to 8. The roll of
+every second night is unknown, and it says so, but for every tenth of them. Some exposures are of another part
+of the sky than is said. A night ends
 
     right       every exposure that takes part has its own stars, and the camera is that of the night
-    named       a camera that is not right, or stars that are not, with a message that it must not be used,
-    or an
-                error: nothing that could be taken for a camera
+    named       an error, or a message that the camera must not be used: nothing that could be taken for one
     wrong       anything else
 """
 
