@@ -81,6 +81,7 @@ class _Mistake:
     text: str
     mend: Callable[[Exposure, Setting], tuple[Exposure, Setting]]
     stretch: float = STRETCH
+    of_roll: bool = False
 
 
 def find_hint(exposures: Sequence[Exposure], names: Sequence[str], setting: Setting) -> Hint | None:
@@ -98,7 +99,7 @@ def find_hint(exposures: Sequence[Exposure], names: Sequence[str], setting: Sett
     The mistake that explains most of them, by the odds against chance; None where none does.
     """
     order = sorted(range(len(exposures)), key=lambda i: -len(exposures[i].xy))[:_TRIED]
-    mistakes = _mistakes()
+    mistakes = [mistake for mistake in _mistakes() if setting.roll_known or not mistake.of_roll]
     best: tuple[tuple[int, float], Hint] | None = None
     for mistake in mistakes:
         explained, odds, scales = [], 0.0, []
@@ -141,11 +142,12 @@ def _mistakes() -> list[_Mistake]:
             _pointed(lambda a, e, r: (math.pi - a, e, r)),
         ),
         _Mistake("elevation_deg is the zenith distance", _pointed(lambda a, e, r: (a, math.pi / 2 - e, r))),
-        _Mistake("roll_deg counts counterclockwise", _pointed(lambda a, e, r: (a, e, -r))),
+        _Mistake("roll_deg counts counterclockwise", _pointed(lambda a, e, r: (a, e, -r)), of_roll=True),
         _Mistake("the longitude counts to the east, not to the west", _other_longitude),
     ]
     found += [
-        _Mistake(f"roll_deg has to be changed by {turn:+d} degrees", _rolled(turn)) for turn in (90, 180, -90)
+        _Mistake(f"roll_deg has to be changed by {turn:+d} degrees", _rolled(turn), of_roll=True)
+        for turn in (90, 180, -90)
     ]
     found += [
         _Mistake("the horizontal field of view is about {field:.1f} degrees", _scaled(scale), _WIDE)

@@ -19,8 +19,12 @@ _SEEDS = 25
 """Brightest images that make hypotheses; three times as many vote for them."""
 _RASTER, _BATCH, _EXACT = 2000, 4096, 20
 """Cells of a raster a side, hypotheses that are counted in it at once, and those that are counted exactly."""
-_CANDIDATES = 1500
-"""Pairs of an image and a star that make hypotheses at most: they are compared two by two."""
+_CANDIDATES, _TURNED = 1500, 800
+"""Pairs of an image and a star that make hypotheses at most, and where the roll is not known: they are
+compared two by two."""
+_PLANE = np.array([1.0, 1.0j])
+Similarities = tuple[NDArray[np.complex128], NDArray[np.complex128]]
+"""(h,) factors f and shifts s of complex numbers: z goes to f z + s."""
 _DEEPER = 2
 """Stars in the frame for each image: where the catalogue has more, the faint ones only match by chance."""
 STRETCH = 0.01
@@ -173,7 +177,7 @@ def match(
     bright = _Sky.as_deep(predicted, len(seeds), search)
     transforms = _hypotheses(measured[:_SEEDS], bright.predicted, search, tolerance)
     # Both counts take part, and what was tried before.
-    hypotheses = 2.0 * len(transforms) + search.tried
+    hypotheses = 2.0 * len(transforms[0]) + search.tried
     best, most = None, 2
     for transform in _promising(transforms, seeds, bright.predicted, 3 * tolerance):
         found = mutually_nearest(_apply(transform, seeds), bright.predicted, 3 * tolerance)
@@ -237,34 +241,35 @@ def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: floa
     return moved
 
 
-def _hypotheses(measured: Floats, predicted: Floats, search: Search, tolerance: float) -> Floats:
-    """Return similarities (h, 3, 2) from pairs of candidates whose separations agree."""
+def _hypotheses(measured: Floats, predicted: Floats, search: Search, tolerance: float) -> Similarities:
+    """Return similarities from pairs of candidates whose separations agree."""
     i, k = np.nonzero(search.candidates(measured, predicted))
-    if len(i) > _CANDIDATES:
+    most = _CANDIDATES if search.axis is None else _TURNED
+    if len(i) > most:
         # The brightest images and stars.
-        order = np.argsort(i / len(measured) + k / len(predicted), kind="stable")[:_CANDIDATES]
+        order = np.argsort(i / len(measured) + k / len(predicted), kind="stable")[:most]
         i, k = i[order], k[order]
-    a, b = np.triu_indices(len(i), 1)
-    keep = (i[a] != i[b]) & (k[a] != k[b])
-    a, b = a[keep], b[keep]
-    first = (measured[i[b]] - measured[i[a]]) @ np.array([1, 1j])
-    second = (predicted[k[b]] - predicted[k[a]]) @ np.array([1, 1j])
-    agree = (np.abs(np.abs(first) - np.abs(second)) < 3 * tolerance + search.stretch * np.abs(first)) & (
-        np.abs(first) > min(search.radius, 0.25 * np.ptp(measured, axis=0).max())
-    )
-    a, b, z, w = a[agree], b[agree], first[agree], second[agree]
-    factor = w / z
-    shift = predicted[k[a]] @ np.array([1, 1j]) - factor * (measured[i[a]] @ np.array([1, 1j]))
-    rows = [[factor.real, factor.imag], [-factor.imag, factor.real], [shift.real, shift.imag]]
-    made = np.moveaxis(np.array(rows), 2, 0)
-    if search.axis is None:
-        return made
-    shift = np.linalg.norm(search.axis @ made[:, :2] + made[:, 2] - search.axis, axis=1)
-    return np.asarray(made[shift <= search.radius], float)
+    images, stars = (measured @ _PLANE)[i], (predicted @ _PLANE)[k]
+    least = min(search.radius, 0.25 * float(np.ptp(measured, axis=0).max()))
+    pairs = []
+    for a in range(len(i) - 1):
+        first, second = np.abs(images[a + 1 :] - images[a]), np.abs(stars[a + 1 :] - stars[a])
+        agree = (np.abs(first - second) < 3 * tolerance + search.stretch * first) & (first > least)
+        # The same image, or the same star, is no pair: the one has no length, the other does not agree.
+        pairs.append(a + 1 + np.flatnonzero(agree & (k[a + 1 :] != k[a])))
+    one = np.repeat(np.arange(len(pairs)), [len(each) for each in pairs])
+    other = np.concatenate(pairs) if pairs else np.zeros(0, np.int64)
+    factor = (stars[other] - stars[one]) / (images[other] - images[one])
+    shift = stars[one] - factor * images[one]
+    if search.axis is not None:
+        axis = complex(*search.axis)
+        near = np.abs(factor * axis + shift - axis) <= search.radius
+        factor, shift = factor[near], shift[near]
+    return factor, shift
 
 
-def _promising(transforms: Floats, seeds: Floats, predicted: Floats, limit: float) -> Floats:
-    """Return the similarities (h, 3, 2) under which the most images fall near a star, counted in a raster."""
+def _promising(transforms: Similarities, seeds: Floats, predicted: Floats, limit: float) -> list[Floats]:
+    """Return the similarities (3, 2) under which the most images fall near a star, counted in a raster."""
     corner = predicted.min(axis=0) - 3 * limit
     size = max(0.5 * limit, float(np.ptp(predicted, axis=0).max()) / _RASTER)
     shape = np.ceil((predicted.max(axis=0) + 3 * limit - corner) / size).astype(np.int64) + 1
@@ -278,13 +283,34 @@ def _promising(transforms: Floats, seeds: Floats, predicted: Floats, limit: floa
     # The rim is far from every star: what falls outside goes there.
     near[0] = near[-1] = False
     near[:, 0] = near[:, -1] = False
-    counts = np.empty(len(transforms), np.int64)
-    for first in range(0, len(transforms), _BATCH):
-        some = transforms[first : first + _BATCH]
-        cells = (seeds @ some[:, :2] + some[:, 2:] - corner) / size
-        column, row = np.clip(cells, 0, shape - 1).astype(np.int64).transpose(2, 0, 1)
-        counts[first : first + _BATCH] = near[column, row].sum(axis=1)
-    return transforms[np.argsort(-counts, kind="stable")[:_EXACT]]
+    # Of very many the brightest images choose those for which all are counted.
+    images = seeds @ _PLANE
+    if len(transforms[0]) > _BATCH:
+        counts = _counted(transforms, images[:_SEEDS], near, corner, size)
+        best = np.sort(np.argsort(-counts, kind="stable")[:_BATCH])
+        transforms = transforms[0][best], transforms[1][best]
+    counts = _counted(transforms, images, near, corner, size)
+    chosen = np.argsort(-counts, kind="stable")[:_EXACT]
+    return [
+        np.array([[f.real, f.imag], [-f.imag, f.real], [s.real, s.imag]])
+        for f, s in zip(transforms[0][chosen], transforms[1][chosen], strict=True)
+    ]
+
+
+def _counted(
+    transforms: Similarities, images: NDArray[np.complex128], near: Bools, corner: Floats, size: float
+) -> Indices:
+    """Count how many images each similarity brings near a star."""
+    factor, shift = transforms[0] / size, (transforms[1] - complex(*corner)) / size
+    counts = np.empty(len(factor), np.int64)
+    columns, rows = near.shape
+    for first in range(0, len(factor), _BATCH):
+        some = slice(first, first + _BATCH)
+        cells = factor[some, None] * images + shift[some, None]
+        column = np.clip(cells.real.astype(np.int32), 0, columns - 1)
+        row = np.clip(cells.imag.astype(np.int32), 0, rows - 1)
+        counts[some] = near[column, row].sum(axis=1)
+    return counts
 
 
 def _apply(transform: Floats, points: Floats) -> Floats:
