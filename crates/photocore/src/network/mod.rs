@@ -59,6 +59,7 @@ pub mod commons;
 mod covariance;
 mod datum;
 mod error;
+mod groups;
 mod model;
 mod mounts;
 mod naming;
@@ -67,9 +68,12 @@ pub mod observations;
 mod on_frames;
 mod precision;
 mod problem;
+mod responses;
 mod screening;
 mod solution;
 mod start;
+mod suspects;
+mod trial;
 mod weak_points;
 mod weighted_angles;
 
@@ -87,14 +91,18 @@ pub use commons::{AdjustedCommon, Common, CommonKind};
 pub use covariance::{Covariances, NetworkDatum, Of, State};
 pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError, PosePart};
+pub use groups::Groups;
 pub use mounts::Mount;
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub(crate) use precision::median;
+pub use responses::{Moved, UnknownOf};
 pub use screening::{Dropped, Reason};
-pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+pub use solution::{AdjustedPhoto, AdjustedPoint, Redundancies, Solution, SumsOfSquares};
 pub use weak_points::WeakPoint;
 pub(crate) use start::meet;
+pub use suspects::Subject;
+pub use trial::{OnPoint, Out, Prediction, Standing, Tests, Trial};
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
@@ -200,6 +208,9 @@ pub enum UnitVariance {
     /// Photos constrained: every weighted quantity counts.
     #[default]
     Constrained,
+    /// Image coordinates, ground control and what was observed beside these, over the sum of their redundancy numbers: right whatever the
+    /// weights of poses and cameras are.
+    Redundancy,
     /// Set to one.
     Unity,
 }
@@ -272,7 +283,23 @@ impl Network {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, None, pool, watch)
+        self.adjusted(options, None, None, pool, watch)
+    }
+
+    /// Adjusts the network from where an adjustment of it has ended, perhaps with other weights: in the order that was in force, and
+    /// without the points that had run into a station.
+    ///
+    /// # Errors
+    /// Those of [`Network::adjust`]; a state that is not of this network.
+    pub fn adjust_again(
+        &self,
+        options: &Options,
+        state: &State,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solution, NetworkError> {
+        let options = Options { ordering: state.ordering, ..*options };
+        self.adjusted(&options, None, Some(state), pool, watch)
     }
 
     /// Adjusts a network that is free, and takes it to the datum of inner constraints.
@@ -286,13 +313,14 @@ impl Network {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, Some(datum), pool, watch)
+        self.adjusted(options, Some(datum), None, pool, watch)
     }
 
     fn adjusted(
         &self,
         options: &Options,
         datum: Option<&InnerConstraints>,
+        start: Option<&State>,
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
@@ -300,6 +328,13 @@ impl Network {
         let mut left_out = vec![false; self.points.len()];
         let mut loose = vec![false; self.photos.len()];
         let mut harmful: Vec<Dropped> = Vec::new();
+        for &point in start.iter().flat_map(|state| &state.collapsed) {
+            *left_out.get_mut(point).ok_or(NetworkError::State)? = true;
+        }
+        for &photo in start.iter().flat_map(|state| &state.loose) {
+            *loose.get_mut(photo).ok_or(NetworkError::State)? = true;
+        }
+        let mut start = start;
         let mut before: Option<(Adjustment, problem::Reached)> = None;
         loop {
             let screened = self.screen(&left_out, &loose);
@@ -307,7 +342,10 @@ impl Network {
                 return Err(NetworkError::Empty);
             }
             let reached = before.as_ref().map(|(_, reached)| reached);
-            let assembled = pool.install(|| self.assemble(options, screened, reached))?;
+            let mut assembled = pool.install(|| self.assemble(options, screened, reached))?;
+            if let Some(state) = start.filter(|_| before.is_none()) {
+                assembled.go_on_from(state)?;
+            }
             let problem = &assembled.problem;
             assembled.check_memory(options)?;
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
@@ -322,6 +360,7 @@ impl Network {
                     photos.iter().for_each(|&photo| loose[photo] = true);
                     let reason = Reason::NotDetermined;
                     harmful.extend(points.into_iter().map(|point| Dropped { point, reason }));
+                    start = None;
                     continue;
                 }
             }

@@ -9,7 +9,7 @@ use super::model::{Bundle, Station};
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
-use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start};
+use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start, State};
 use crate::adjustment::{AdjustError, Method, Model, Problem};
 use crate::geometry::{
     Matrix3, ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, local_vertical, nearest_turns,
@@ -72,6 +72,15 @@ impl Assembled {
         let is_frame = |photo: usize| model.mounts.iter().flatten().any(|mount| mount.frame == photo);
         let few = FEW * photos.len() <= model.cameras.len() && !photos.iter().any(|&photo| is_frame(photo));
         if few { photos } else { vec![] }
+    }
+
+    /// Begins where an adjustment has ended.
+    pub fn go_on_from(&mut self, state: &State) -> Result<(), NetworkError> {
+        if state.unknowns.len() != self.problem.initial.len() {
+            return Err(NetworkError::State);
+        }
+        self.problem.initial.clone_from(&state.unknowns);
+        Ok(())
     }
 
     /// Takes over adjusted unknowns; `count` is the number of all points.
