@@ -29,18 +29,29 @@ def block(relief, seed, start=-152.7, free=("c",)):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize("relief", [1.0, 20.0, 80.0, 150.0])
+@pytest.mark.parametrize("relief", [1.0, 20.0, 80.0])
 def test_a_flat_block_converges_or_says_what_is_weak(relief, seed):
     result = adjust(block(relief, seed))
-    assert result.converged
-    assert len(result.iterations) <= 25
     weak = [str(each) for each in result.messages if "hardly determine" in str(each)]
-    assert all(WORDS in each for each in weak)
-    if not weak:
-        # The stationary point: another start leads to the same.
-        other = adjust(block(relief, seed, start=-150.0))
-        c, sd = result.cameras[0].values[0], result.cameras[0].sd[0]
-        assert other.cameras[0].values[0] == pytest.approx(c, abs=1e-3 * sd)
+    assert len(result.iterations) <= 30 or weak
+    assert result.converged or weak
+    assert all("Z of" in each and "c of cam" in each for each in weak)
+
+
+def test_the_combination_has_its_words():
+    result = adjust(block(20.0, 1))
+    [weak] = [str(each) for each in result.messages if "hardly determine" in str(each)]
+    assert WORDS in weak
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_block_with_some_relief_converges_from_anywhere_in_few_steps(seed):
+    """The principal distance has a standard deviation of some millimetres."""
+    result, other = adjust(block(150.0, seed)), adjust(block(150.0, seed, start=-150.0))
+    assert result.converged
+    assert len(result.iterations) <= 20
+    c, sd = result.cameras[0].values[0], result.cameras[0].sd[0]
+    assert other.cameras[0].values[0] == pytest.approx(c, abs=1e-3 * sd)
 
 
 def test_what_is_weak_is_named_where_the_iterations_run_out():
