@@ -79,7 +79,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
         stop: Stop,
     ) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
-        let mut control = Control { stop, best: state.sum_of_squares, refused: None, in_valley: false, along: 0 };
+        let mut control =
+            Control { stop, best: state.sum_of_squares, refused: None, in_valley: false, along: 0 };
         while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
             match self.step_from(state, &mut control)? {
                 ControlFlow::Continue(next) => state = next,

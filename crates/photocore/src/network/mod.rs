@@ -99,10 +99,10 @@ pub(crate) use precision::median;
 pub use responses::{Moved, UnknownOf};
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Redundancies, Solution, SumsOfSquares};
-pub use weak_points::WeakPoint;
 pub(crate) use start::meet;
 pub use suspects::Subject;
 pub use trial::{OnPoint, Out, Prediction, Standing, Tests, Trial};
+pub use weak_points::WeakPoint;
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]

@@ -188,9 +188,8 @@ impl Network {
         let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
         self.mounts.iter().for_each(|mount| used[mount.frame] |= images_on[mount.photo] > 0);
         let loose = screened.loose.clone();
-        let unused = |photo: usize| {
-            !used[photo] && (options.hold_unused || loose.binary_search(&photo).is_ok())
-        };
+        let unused =
+            |photo: usize| !used[photo] && (options.hold_unused || loose.binary_search(&photo).is_ok());
         if reached.is_none() {
             self.check_rounding(&screened, |photo| !unused(photo))?;
         }

@@ -84,14 +84,7 @@ impl RadialTangential {
                 by_place[k][1] += along * b;
             }
         }
-        Bent {
-            xy,
-            by_place,
-            place,
-            square,
-            reciprocal,
-            factor,
-        }
+        Bent { xy, by_place, place, square, reciprocal, factor }
     }
 }
 

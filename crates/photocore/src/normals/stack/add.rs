@@ -62,7 +62,10 @@ impl Stack {
             for (k, p) in slot.groups.clone().enumerate() {
                 let in_run = |part: &Part| self.segments[part.segment].run_of(p).is_some();
                 if self.parts(p).len() == 1
-                    && self.parts(p).iter().all(|part| in_run(part) && self.segments[part.segment].row > slot.row)
+                    && self
+                        .parts(p)
+                        .iter()
+                        .all(|part| in_run(part) && self.segments[part.segment].row > slot.row)
                 {
                     continue;
                 }
