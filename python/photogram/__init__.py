@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
     from photogram.network.block import Block
+    from photogram.network.camera_files import camera_from
     from photogram.network.cameras import Camera
     from photogram.network.datum import InnerConstraints, MinimumConstraints
     from photogram.network.geometry import Spheroid
@@ -54,6 +55,7 @@ __all__ = [
     "Spheroid",
     "__version__",
     "adjust",
+    "camera_from",
     "first_values",
     "hints",
     "orient",
@@ -89,6 +91,7 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "camera_from": "network.camera_files",
     "first_values": "adjustment.first_values",
     "hints": "adjustment.hints",
     "orient": "absolute_orientation",

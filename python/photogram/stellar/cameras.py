@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import orjson
 from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
-from photogram.io.files import read_bytes
+from photogram.network.camera_files import BROWN, PLATE, brown_camera, plate_camera, read_calibrated
 from photogram.network.cameras import Camera
-from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.parameters import GROUPS, INDEX, UNITS
 from photogram.stellar.sky import TAU
 from photogram.stellar.transformation import transformed_angles
 
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["BrownCamera", "PlateCamera", "camera_document"]
 
 
-_INTERIOR = NAMES[9:22]
-_BROWN = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
 BROWN_PLACE = (3, 4, 1, 2, 7, 8, 9, 11, 10)
 """Places of these among the common parameters of the core, whose P1 is the p2 of computer vision."""
 COMMON = 17
@@ -51,28 +48,6 @@ def weight_of(covariance: Floats) -> Floats:
         raise InputError("the covariance of the camera is not positive definite") from None
     root = np.linalg.solve(lower, np.diag(1.0 / sd))
     return np.asarray(root.T @ root, float)
-
-
-def _read(path: Path, kind: str, names: tuple[str, ...]) -> tuple[dict[str, Any], Floats, Floats]:
-    """Read a document, its parameters and their covariance: zero for what is not in its order."""
-    try:
-        document = orjson.loads(read_bytes(path))
-        if document["kind"] != kind:
-            raise InputError(f"is a {document['kind']}, not a {kind}", file=path)
-        values = [document["parameters"][name] for name in names]
-        order = [names.index(name) for name in document["covariance"]["order"]]
-        matrix = np.array(document["covariance"]["matrix"], float).reshape(len(order), len(order))
-        found = np.array([v["value"] if isinstance(v, dict) else v for v in values], float)
-        # A null becomes NaN.
-        if not (np.isfinite(found).all() and np.isfinite(matrix).all() and (np.diag(matrix) >= 0).all()):
-            raise InputError("is not a camera: what is not a number, or a negative variance", file=path)
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"is not a camera: {error}", file=path) from None
-    covariance = np.zeros((len(names), len(names)))
-    covariance[np.ix_(order, order)] = matrix
-    return document, found, covariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +100,7 @@ class PlateCamera:
         InputError
             The file cannot be read, or is another document.
         """
-        document, values, covariance = _read(path, "stellar camera", _INTERIOR)
+        document, values, covariance = read_calibrated(path, "stellar camera")
         try:
             return cls(
                 values,
@@ -140,7 +115,7 @@ class PlateCamera:
 
     def document(self) -> dict[str, Any]:
         """Return the camera as it is written."""
-        chosen = [i for i in range(len(_INTERIOR)) if self.covariance[i, i] > 0]
+        chosen = [i for i in range(len(PLATE)) if self.covariance[i, i] > 0]
         return {
             "program": f"photogram {_photocore.__version__}",
             "kind": "stellar camera",
@@ -149,10 +124,10 @@ class PlateCamera:
             "common_scale": self.common_scale,
             "parameters": {
                 name: {"value": value, "unit": UNITS[name]}
-                for name, value in zip(_INTERIOR, self.values.tolist(), strict=True)
+                for name, value in zip(PLATE, self.values.tolist(), strict=True)
             },
             "covariance": {
-                "order": [_INTERIOR[i] for i in chosen],
+                "order": [PLATE[i] for i in chosen],
                 "matrix": self.covariance[np.ix_(chosen, chosen)],
             },
             "m": self.mean_error,
@@ -162,6 +137,28 @@ class PlateCamera:
     def to_json(self) -> bytes:
         """Return the camera as a JSON document."""
         return json.to_json(self.document())
+
+    def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
+        """Return the camera as blocks take it: the model `plate`, in mm, with the parameters of this one.
+
+        Image coordinates are those of the plate: x, y and the axis towards what is seen are right-handed.
+
+        Parameters
+        ----------
+        name
+            For reports.
+        weighted
+            Whether its parameters are observations with their full covariance; otherwise they are known. What
+            was held here is held there.
+        """
+        return plate_camera(
+            self.values,
+            self.covariance,
+            name,
+            weighted=weighted,
+            common_scale=self.common_scale,
+            distortion_first=self.distortion_first,
+        )
 
     def as_prior(self, problem: Problem, unit: float | None = None) -> Problem:
         """Return a calibration that begins with this camera and gives it the weight of its covariance.
@@ -257,7 +254,7 @@ class BrownCamera:
     values: Floats
     covariance: Floats
 
-    NAMES = _BROWN
+    NAMES = BROWN
 
     @classmethod
     def of_field(cls, width: float, height: float, field_of_view: float) -> BrownCamera:
@@ -290,12 +287,7 @@ class BrownCamera:
             Whether its parameters are observations with their full covariance; otherwise they are known. What
             was held here is held there.
         """
-        values = dict(zip(_BROWN, self.values.tolist(), strict=True))
-        if not (weighted and self.known.any()):
-            return Camera("full_opencv", values, name=name)
-        known = np.flatnonzero(self.known)
-        covariance = [_BROWN[i] for i in known], self.covariance[np.ix_(known, known)]
-        return Camera("full_opencv", values, covariance=covariance, name=name)
+        return brown_camera(self.values, self.covariance, name, weighted=weighted)
 
     def to_json(self) -> bytes:
         """Return the camera as a JSON document: a weighted prior of later adjustments."""
@@ -303,8 +295,8 @@ class BrownCamera:
             "program": f"photogram {_photocore.__version__}",
             "kind": "brown camera",
             "unit": "pixel",
-            "parameters": dict(zip(_BROWN, self.values.tolist(), strict=True)),
-            "covariance": {"order": _BROWN, "matrix": self.covariance},
+            "parameters": dict(zip(BROWN, self.values.tolist(), strict=True)),
+            "covariance": {"order": BROWN, "matrix": self.covariance},
         }
         return json.to_json(document)
 
@@ -317,5 +309,5 @@ class BrownCamera:
         InputError
             The file cannot be read, or is another document.
         """
-        _, values, covariance = _read(path, "brown camera", _BROWN)
+        _, values, covariance = read_calibrated(path, "brown camera")
         return cls(values, covariance)

@@ -121,6 +121,8 @@ pub struct Solution {
     pub state: State,
     /// About how large a part of the variances rounding may be, in a datum that they were taken to; zero otherwise.
     pub lost_digits: f64,
+    /// Whether control and weights of poses are exactly what a datum takes: they check nothing, and another datum may be chosen.
+    pub minimal_control: bool,
     /// Status, iterations, counts, operations and times.
     pub adjustment: Adjustment,
 }
@@ -175,8 +177,10 @@ impl Solution {
                 collapsed: collapsed.clone(),
                 ordering: adjustment.ordering,
                 datum: None,
+                released: false,
             },
             lost_digits: 0.0,
+            minimal_control: false,
             collapsed,
             sums_of_squares,
             degrees_of_freedom,
