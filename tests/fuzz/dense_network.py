@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +57,8 @@ class Comparison:
     correlations: float = np.nan
     redundancy: float = np.nan
     said: str = ""
+    sums: dict[str, tuple[float, float]] = field(default_factory=dict, repr=False)
+    """Of each kind of observation: v' P v, and its redundancy numbers, whose sum is what to expect of it."""
 
 
 def compare(random: RandomNetwork) -> Comparison:
@@ -97,7 +99,16 @@ def compare(random: RandomNetwork) -> Comparison:
     fine = max(EXACT, ROUNDING * condition**2, ON_ELLIPSOID if geographic else 0.0)
     variances, correlations = float(np.diag(apart).max()), float(apart.max())
     same = moved < max(NEAR, fine) and max(correlations, redundancy) < fine
-    return Comparison("agree" if same else "differ", condition, moved, variances, correlations, redundancy)
+    ending = "agree" if same else "differ"
+    return Comparison(ending, condition, moved, variances, correlations, redundancy, sums=_sums(result))
+
+
+def _sums(result: Result) -> dict[str, tuple[float, float]]:
+    squares = (result.residuals / result.block.image_sd) ** 2
+    found = {"image": (float(squares.sum()), float(result.redundancy.sum()))}
+    for name, kind in result.kinds.items():
+        found[name] = kind.sum_of_squares, float(np.nansum(kind.redundancy))
+    return found
 
 
 def equations(dense: Dense) -> tuple[Floats, Floats]:
@@ -218,6 +229,7 @@ def main() -> int:
     counts: Counter[tuple[str, str]] = Counter()
     seen: Counter[str] = Counter()
     agreed: dict[str, list[Comparison]] = {datum: [] for datum in DATUMS}
+    sums: dict[str, list[tuple[float, float]]] = {}
     for number in range(asked.first, asked.first + asked.networks):
         random = random_network(asked.seed, number)
         found = compare(random)
@@ -225,6 +237,8 @@ def main() -> int:
         if found.ending == "agree":
             seen.update({*random.kinds, *random.models})
             agreed[random.datum_name].append(found)
+            for name, own in found.sums.items():
+                sums.setdefault(name, []).append(own)
         else:
             what = f"{random.models} {random.datum_name} {random.kinds}"
             print(f"{asked.seed}:{number} {what}: {found}", file=sys.stderr)
@@ -249,7 +263,18 @@ def main() -> int:
         f" {len(KINDS)} kinds the rarest among those that agree, {rarest}, is in {seen[rarest]:,}.",
         "",
         *rows,
+        "",
+        "Errors are drawn with the standard deviations that are given: v' P v of a kind, over the sum of its",
+        "redundancy numbers, is 1 but for chance (three standard deviations in the last column).",
+        "",
+        "| observations | networks | redundancy | v' P v over it | 1 within |",
+        "|---" + "|---:" * 4 + "|",
     ]
+    for name, own in sums.items():
+        square, freedom = (sum(column) for column in zip(*own, strict=True))
+        if freedom > 1:
+            figures = f"{freedom:,.0f} | {square / freedom:.4f} | {3 * np.sqrt(2 / freedom):.4f}"
+            lines.append(f"| {name} | {len(own):,} | {figures} |")
     print("\n".join(lines))
     if asked.page:
         write_section(asked.page, "networks", lines)

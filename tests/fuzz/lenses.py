@@ -16,6 +16,7 @@ __all__ = ["BACKWARD", "FORWARD", "arctan", "arctan2"]
 
 Numbers = NDArray[np.complex128]
 Values = Mapping[str, complex]
+Projection = Callable[[Numbers, Values], tuple[Numbers, Numbers]]
 
 
 def arctan(x: Numbers) -> Numbers:
@@ -38,11 +39,21 @@ def _central(u: Numbers, _: Values) -> tuple[Numbers, Numbers]:
     return x / z, y / z
 
 
-def _equidistant(u: Numbers, _: Values) -> tuple[Numbers, Numbers]:
-    x, y, z = _vision(u)
-    rho = np.sqrt(x * x + y * y)
-    ratio = arctan2(rho, z) / rho
-    return ratio * x, ratio * y
+def _by_angle(of: Callable[[Numbers], Numbers]) -> Projection:
+    """Return a fisheye whose radius is a function of the angle from the axis."""
+
+    def project(u: Numbers, _: Values) -> tuple[Numbers, Numbers]:
+        x, y, z = _vision(u)
+        rho = np.sqrt(x * x + y * y)
+        ratio = of(arctan2(rho, z)) / rho
+        return ratio * x, ratio * y
+
+    return project
+
+
+_equidistant = _by_angle(lambda theta: theta)
+_equisolid = _by_angle(lambda theta: 2 * np.sin(theta / 2))
+_stereographic = _by_angle(lambda theta: 2 * np.tan(theta / 2))
 
 
 def _fov(u: Numbers, p: Values) -> tuple[Numbers, Numbers]:
@@ -63,9 +74,6 @@ def _eucm(u: Numbers, p: Values) -> tuple[Numbers, Numbers]:
     x, y, z = _vision(u)
     depth = p["alpha"] * np.sqrt(p["beta"] * (x * x + y * y) + z * z) + (1 - p["alpha"]) * z
     return x / depth, y / depth
-
-
-Projection = Callable[[Numbers, Values], tuple[Numbers, Numbers]]
 
 
 def _pixels(p: Values, a: Numbers, b: Numbers) -> Numbers:
@@ -203,6 +211,8 @@ FORWARD: dict[str, Callable[[Numbers, Values], Numbers]] = {
     "opencv_fisheye_skew": _lens(_equidistant, "k1 k2 k3 k4"),
     "thin_prism_fisheye": _lens(_equidistant, "k1 k2 k3 k4"),
     "rad_tan_thin_prism_fisheye": _rad_tan_thin_prism,
+    "equisolid": _lens(_equisolid, "k1 k2"),
+    "stereographic": _lens(_stereographic, "k1 k2"),
     "simple_division": _lens(_division, ""),
     "division": _lens(_division, ""),
     "eucm": _lens(_eucm, ""),

@@ -8,46 +8,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
-from photogram.network.camera_files import BROWN, PLATE, brown_camera, plate_camera, read_calibrated
 from photogram.network.cameras import Camera
-from photogram.stellar.parameters import GROUPS, INDEX, UNITS
-from photogram.stellar.sky import TAU
+from photogram.stellar.camera_files import read_any, read_camera, read_document, weight_of
+from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.plate_model import plate_camera
+from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 from photogram.stellar.transformation import transformed_angles
 
 if TYPE_CHECKING:
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
 
-__all__ = ["BrownCamera", "PlateCamera", "camera_document"]
+__all__ = ["BrownCamera", "PlateCamera", "SkyCamera", "camera_document", "camera_from"]
 
 
-BROWN_PLACE = (3, 4, 1, 2, 7, 8, 9, 11, 10)
-"""Places of these among the common parameters of the core, whose P1 is the p2 of computer vision."""
-COMMON = 17
-"""Parameters of the core that all images share."""
-
-
-def weight_of(covariance: Floats) -> Floats:
-    """Return the weight matrix of a covariance whose rows differ by orders of magnitude.
-
-    Raises
-    ------
-    InputError
-        The covariance is not positive definite.
-    """
-    sd = np.sqrt(np.diag(covariance))
-    try:
-        lower = np.linalg.cholesky(covariance / np.outer(sd, sd))
-    except np.linalg.LinAlgError:
-        raise InputError("the covariance of the camera is not positive definite") from None
-    root = np.linalg.solve(lower, np.diag(1.0 / sd))
-    return np.asarray(root.T @ root, float)
+_INTERIOR = NAMES[9:22]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +81,8 @@ class PlateCamera:
         InputError
             The file cannot be read, or is another document.
         """
-        document, values, covariance = read_calibrated(path, "stellar camera")
+        document = read_document(path, ("stellar camera",))
+        values, covariance = read_camera(path, document, _INTERIOR)
         try:
             return cls(
                 values,
@@ -115,7 +97,7 @@ class PlateCamera:
 
     def document(self) -> dict[str, Any]:
         """Return the camera as it is written."""
-        chosen = [i for i in range(len(PLATE)) if self.covariance[i, i] > 0]
+        chosen = [i for i in range(len(_INTERIOR)) if self.covariance[i, i] > 0]
         return {
             "program": f"photogram {_photocore.__version__}",
             "kind": "stellar camera",
@@ -124,10 +106,10 @@ class PlateCamera:
             "common_scale": self.common_scale,
             "parameters": {
                 name: {"value": value, "unit": UNITS[name]}
-                for name, value in zip(PLATE, self.values.tolist(), strict=True)
+                for name, value in zip(_INTERIOR, self.values.tolist(), strict=True)
             },
             "covariance": {
-                "order": [PLATE[i] for i in chosen],
+                "order": [_INTERIOR[i] for i in chosen],
                 "matrix": self.covariance[np.ix_(chosen, chosen)],
             },
             "m": self.mean_error,
@@ -194,6 +176,39 @@ class PlateCamera:
         return replace(problem, parameter_weights=weights, initial=initial, fixed=fixed)
 
 
+def camera_from(path: Path | str, name: str = "", *, weighted: bool = True) -> Camera:
+    """Return the camera of a file that `photogram stellar-camera` has written, as blocks take it.
+
+    Parameters
+    ----------
+    path
+        `camera.json`, of plates or of digital exposures.
+    name
+        For reports.
+    weighted
+        Whether what was calibrated is observed, with its full covariance; otherwise it is known.
+
+    Returns
+    -------
+    `plate` (mm), or the model of a lens in pixels: columns and rows.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no camera.
+    """
+    file = Path(path)
+    document = read_any(file)
+    if {"nonorthogonality_rad", "correction"} & document.keys():
+        raise InputError(
+            "holds the correction of a comparator: comparator.Correction.read(path).as_camera(camera) lays a"
+            " camera on it",
+            file=file,
+        )
+    reader = PlateCamera if document.get("kind") == "stellar camera" else SkyCamera
+    return reader.read(file).as_camera(name, weighted=weighted)
+
+
 def camera_document(result: Result) -> bytes:
     """Return the camera of a calibration as JSON, with what programs for directions need besides.
 
@@ -235,79 +250,4 @@ def camera_document(result: Result) -> bytes:
     return json.to_json(document)
 
 
-@dataclass(frozen=True, eq=False)
-class BrownCamera:
-    """A pinhole camera with Brown's distortion, in pixels, and its covariance.
-
-    With (u, v) = (X, Y) / Z and r^2 = u^2 + v^2,
-    x = fx (u (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 u v + p2 (r^2 + 2 u^2)) + cx,
-    and y likewise with fy, cy, and p1, p2 exchanged.
-
-    Attributes
-    ----------
-    values
-        (9,) fx, fy, cx, cy, k1, k2, k3, p1, p2.
-    covariance
-        (9, 9); zero for what was held.
-    """
-
-    values: Floats
-    covariance: Floats
-
-    NAMES = BROWN
-
-    @classmethod
-    def of_field(cls, width: float, height: float, field_of_view: float) -> BrownCamera:
-        """Return an ideal camera of a frame in pixels and a horizontal field of view in radians."""
-        f = 0.5 * width / math.tan(0.5 * field_of_view)
-        values = np.array([f, f, 0.5 * width, 0.5 * height, 0, 0, 0, 0, 0], float)
-        return cls(values, np.zeros((9, 9)))
-
-    @property
-    def common(self) -> Floats:
-        """(17,) as the core takes it."""
-        common = np.zeros(COMMON)
-        common[list(BROWN_PLACE)] = self.values
-        common[13:] = TAU
-        return common
-
-    @property
-    def known(self) -> NDArray[np.bool_]:
-        """(9,) which parameters have a mean error."""
-        return np.diag(self.covariance) > 0
-
-    def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
-        """Return the camera as blocks take it: columns and rows, y down, the model `full_opencv`.
-
-        Parameters
-        ----------
-        name
-            For reports.
-        weighted
-            Whether its parameters are observations with their full covariance; otherwise they are known. What
-            was held here is held there.
-        """
-        return brown_camera(self.values, self.covariance, name, weighted=weighted)
-
-    def to_json(self) -> bytes:
-        """Return the camera as a JSON document: a weighted prior of later adjustments."""
-        document = {
-            "program": f"photogram {_photocore.__version__}",
-            "kind": "brown camera",
-            "unit": "pixel",
-            "parameters": dict(zip(BROWN, self.values.tolist(), strict=True)),
-            "covariance": {"order": BROWN, "matrix": self.covariance},
-        }
-        return json.to_json(document)
-
-    @classmethod
-    def read(cls, path: Path) -> BrownCamera:
-        """Read what `to_json` wrote.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read, or is another document.
-        """
-        _, values, covariance = read_calibrated(path, "brown camera")
-        return cls(values, covariance)
+check_arguments(globals(), ["camera_from"])

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-from photogram.network.camera_files import PLATE
-
 __all__ = ["COMMON", "GRAD", "GROUPS", "INDEX", "NAMES", "TAU", "UNITS"]
 
 GRAD = math.pi / 200.0
@@ -14,8 +12,9 @@ GRAD = math.pi / 200.0
 GROUPS = ("pre", "post", "event")
 """The groups of images of one plate, each with an attitude of its own."""
 
+_INTERIOR = ("epsilon", "xp", "yp", "cx", "cy", "dx", "dy", "K1", "K2", "K3", "K4", "K5", "phi_T")
 TAU = ("tau1", "tau2", "tau3", "tau4")
-COMMON = (*PLATE, *TAU)
+COMMON = (*_INTERIOR, *TAU)
 """What all images share, in the order of the numerical core."""
 
 NAMES = (*(f"{angle}_{group}" for group in GROUPS for angle in ("alpha", "omega", "kappa")), *COMMON)

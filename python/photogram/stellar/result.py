@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.messages import Message
-from photogram.network.camera_files import plate_camera
 from photogram.network.cameras import Camera
+from photogram.show.ways import Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.counts import Counts
 from photogram.stellar.moved import Movement
 from photogram.stellar.parameters import INDEX, NAMES
+from photogram.stellar.plate_model import plate_camera
 from photogram.stellar.problem import Problem
 from photogram.stellar.state import Level, Solved
 
@@ -142,7 +143,7 @@ class PreRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(Judged):
     """A calibration.
 
     Residuals are computed minus measured (the report's v), for stars adjusted minus catalogue: what has to be

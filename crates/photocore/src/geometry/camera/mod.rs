@@ -256,6 +256,8 @@ cameras! { $
         RadTanThinPrismFisheye;
         SimpleDivision;
         Division;
+        Equisolid;
+        Stereographic;
         Eucm;
         AgisoftFrame;
         AgisoftFisheye;
