@@ -8,10 +8,9 @@ import pytest
 import star_plates
 
 from photogram import InputError, adjust, camera_from, simulate
-from photogram.network.camera_files import PLATE
 from photogram.stellar import calibrate
 from photogram.stellar.cameras import BrownCamera, camera_document
-from photogram.stellar.parameters import INDEX, UNITS
+from photogram.stellar.parameters import INDEX, NAMES, UNITS
 
 VALUES = np.array([8000.0, 8010.0, 6010.0, 5990.0, -0.02, 0.004, -3e-4, 1e-4, -2e-4])
 SD = np.array([0.5, 0.5, 0.8, 0.8, 2e-4, 2e-4, 1e-5, 1e-5, 0.0])
@@ -79,7 +78,7 @@ def test_a_plate_has_the_images_of_its_calibration_and_its_covariance(plate, for
     )
     # Every variance and covariance, in mm.
     names, found = camera.covariance
-    known = [name for name in PLATE if own.covariance[INDEX[name], INDEX[name]] > 0]
+    known = [name for name in NAMES[9:22] if own.covariance[INDEX[name], INDEX[name]] > 0]
     assert [{"c": "cx", "c_y": "cy"}.get(name, name) for name in names] == known
     powers = [
         {"rad": 0, "m": 1}[unit] if unit in ("rad", "m") else int(unit[2:]) for unit in map(UNITS.get, known)
@@ -100,10 +99,10 @@ def test_cameras_are_read_from_the_files_of_calibrations(plate, tmp_path):
     file.write_bytes(CALIBRATED.to_json())
     assert camera_from(file).model == "full_opencv"
     for content, message in (
-        (b'{"kind": "report"}', "its kind is report, not brown camera or stellar camera"),
+        (b'{"kind": "report"}', "is a report, not a brown camera or a sky camera"),
         (b'{"nonorthogonality_rad": 0.0}', "comparator.Correction.read"),
         (b"[1", "is not a camera"),
-        (b"[1]", "is no camera"),
+        (b"[1]", "is not a camera: no JSON object"),
         (b'{"kind": "brown camera"}', "is not a camera: 'parameters'"),
     ):
         file.write_bytes(content)
