@@ -8,8 +8,8 @@ import pytest
 
 import photogram
 from photogram import Block
-from photogram.adjustment import network_trial
 from photogram.adjustment.snooping import block_trial
+from photogram.results import network_trial
 from photogram.statistics import lambda0
 from photogram.statistics.snooping.linear import LinearTrial
 from photogram.statistics.snooping.snooping import Settings, snooped
@@ -101,8 +101,8 @@ def test_groups_of_the_golden_block():
     data = golden()
     block = golden_block(data["input"])
     result = photogram.adjust(block, tolerance=1e-9)
-    trial = block_trial(result)
-    trial.core.stand([])
+    trial = block_trial(block, result.state, result.options)
+    trial.core.stand()
     tests = trial.core.tests()
     suspects = trial.suspects
     number = {suspects.name(group): group for group in range(len(suspects))}
@@ -140,8 +140,9 @@ def lambda0_of(dimension):
 def test_correlations_on_a_point():
     data = golden()
     block = golden_block(data["input"])
-    trial = block_trial(photogram.adjust(block, tolerance=1e-9))
-    trial.core.stand([])
+    result = photogram.adjust(block, tolerance=1e-9)
+    trial = block_trial(block, result.state, result.options)
+    trial.core.stand()
     for given in data["adjustment"]["test_correlations_on_a_point"]:
         point = block.point_ids.index(given["point"])
         groups, _, r = trial.core.on_points([point])[0]
