@@ -218,7 +218,7 @@ def _adjust(
     threads: int | None,
     snooping: dict[str, Any] | None,
 ) -> tuple[Result, Snooped | None]:
-    """Adjust the block as COMMON asks, with the progress on standard error; with a log where it is snooped."""
+    """Adjust the block as COMMON asks, or snoop it, with the progress on standard error."""
     from photogram import AsPublished, Result, adjust, snoop
 
     common = project.common

@@ -103,7 +103,7 @@ class NetworkTrial:
         """Return the largest canonical correlation of two groups; `between` has the rows of the first."""
         halves = []
         for group in (first, second):
-            values, vectors = np.linalg.eigh(self._alone(group)[2])
+            values, vectors = np.linalg.eigh(self.own_block(group))
             seen = values > INVISIBLE
             halves.append(vectors[:, seen] / np.sqrt(values[seen]))
         product = halves[0].T @ between @ halves[1]
@@ -161,9 +161,13 @@ class NetworkTrial:
 
     def _alone(self, group: int) -> tuple[list[int], Floats, Floats]:
         rows = self.suspects.rows(group)
+        return [group], np.nan_to_num(self._tests["residual"][rows]), self.own_block(group)
+
+    def own_block(self, group: int) -> Floats:
+        """Return R of a group."""
         start, end = self._block_starts[group : group + 2]
-        response = self._tests["cofactors"][start:end].reshape(len(rows), len(rows))
-        return [group], np.nan_to_num(self._tests["residual"][rows]), response
+        size = math.isqrt(int(end - start))
+        return np.asarray(self._tests["cofactors"][start:end].reshape(size, size))
 
     def response(self) -> tuple[Floats, Floats]:
         """Return residuals of unit weight and R of all rows; zero for those that are out."""

@@ -150,6 +150,10 @@ class Reliability:
             found[self.tests.rank == rank] = self.lambda0(rank)
         return found
 
+    def block(self, group: int) -> Floats:
+        """Return R of a group: (m, m), of unit weight; zero for what takes no part."""
+        return self._trial.own_block(group)
+
     @property
     def detectable(self) -> Floats:
         """(M,) minimal detectable error of each row alone; infinite where it shows in no residual."""
