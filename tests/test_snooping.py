@@ -258,7 +258,7 @@ def test_stations_and_observations_beside_images():
     names = [block.point_ids[point] for point in points]
     wrong = block.replace(
         photo_positions_observed=observed,
-        observations=[Distance(*names, length + 9.0, sd=0.02)],
+        observations=[Distance(*names, length + 9.0, sd=0.3)],
     )
     found = photogram.snoop(wrong)
     removed = [entry.name for entry in found.removed]

@@ -214,6 +214,9 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
     position_sd[subject[gone[POSITION]], components[gone[POSITION]]] = np.inf
     attitude_sd[subject[gone[ATTITUDE]], components[gone[ATTITUDE]]] = np.inf
+    # Nothing is left that determines them: they stay where they are.
+    alone = sorted(out.photos)
+    position_sd[alone], attitude_sd[alone] = 0.0, 0.0
     rows = [
         row
         for own, _ in observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)

@@ -144,6 +144,7 @@ class _Named:
             name=self.name,
             row_name=self.row_name,
             unit=self.unit,
+            photo_name=lambda photo: f"photo {photo}",
         )
 
     def loads(self, group: int) -> Indices:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -32,6 +33,9 @@ SUPPORT = 3
 HUBER, CAUCHY = 1.50, 2.55
 """Scales of the losses of a robust start, in standard deviations of an image point."""
 ROBUST_ITERATIONS = 20
+
+
+T = TypeVar("T")
 
 
 class NetworkTrial:
@@ -76,23 +80,32 @@ class NetworkTrial:
     def adjust(self, out: Out) -> Standing:
         """Adjust without what is out, from where the last adjustment has ended."""
         tolerance = self.exact if self.whole else self.rough
+        standing = self._asked(
+            self.core.adjust,
+            out.rows,
+            sorted(out.points),
+            sorted(out.photos),
+            tolerance=tolerance,
+            progress=None,
+        )
+        status, _, omega, freedom, collapsed = standing
+        if collapsed:
+            raise LostSupportError(collapsed, [])
+        return Standing(status, omega, freedom)
+
+    @staticmethod
+    def _asked(ask: Callable[..., T], *arguments: Any, **options: Any) -> T:
+        """Ask the core; what is undetermined is a LostSupportError."""
         try:
-            standing = self.core.adjust(
-                out.rows, sorted(out.points), sorted(out.photos), tolerance=tolerance, progress=None
-            )
+            return ask(*arguments, **options)
         except (_photocore.BlockError, _photocore.CollectionError) as error:
             kind, _, combinations, points = error.args
             if kind == "undetermined points":
                 raise LostSupportError(points, []) from error
             if kind == "undetermined photos":
-                raise LostSupportError(
-                    [], sorted({photo for each in combinations for photo in each[0]})
-                ) from error
+                photos = {photo for combination in combinations for photo in combination[0]}
+                raise LostSupportError([], sorted(photos)) from error
             raise
-        status, _, omega, freedom, collapsed = standing
-        if collapsed:
-            raise LostSupportError(collapsed, [])
-        return Standing(status, omega, freedom)
 
     def stand(self) -> Standing:
         """Take the network as its adjustment has ended."""
@@ -179,9 +192,13 @@ class NetworkTrial:
         return np.where(out, 0.0, residuals), response
 
     def resist(self, scale: float) -> Floats:
-        """Adjust by Huber's loss, then by Cauchy's from there."""
-        self.core.resist("huber", HUBER * scale, iterations=ROBUST_ITERATIONS, progress=None)
-        return self.core.resist("cauchy", CAUCHY * scale, iterations=ROBUST_ITERATIONS, progress=None)
+        """Adjust by Huber's loss, then by Cauchy's from there: (G,) lengths of residuals of unit weight."""
+        self._asked(self.core.resist, "huber", HUBER * scale, iterations=ROBUST_ITERATIONS, progress=None)
+        weights = self._asked(
+            self.core.resist, "cauchy", CAUCHY * scale, iterations=ROBUST_ITERATIONS, progress=None
+        )
+        # Its weight is 1 / (1 + (size / scale)^2).
+        return np.asarray(CAUCHY * scale * np.sqrt(np.maximum(1.0 / np.maximum(weights, 1e-12) - 1.0, 0.0)))
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
         """Return points left with too few rays, and photos left without support, when a group is out."""

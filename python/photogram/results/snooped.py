@@ -258,7 +258,8 @@ def _lines(entry: Removal) -> list[str]:
             f" {entry.dimension}, F {entry.fisher:.2f}, log10 p {entry.log_probability / _LN10:.1f}"
             f" (limit {math.log10(entry.limit):.1f})"
         )
-    lines.append(f"    estimated error {errors}; redundancy {entry.redundancy:.3f}")
+    if errors:
+        lines.append(f"    estimated error {errors}; redundancy {entry.redundancy:.3f}")
     lines += [
         f"    or {rival.name}: T {rival.statistic:.2f}, odds {rival.odds:.2g} : 1" for rival in entry.rivals
     ]

@@ -95,6 +95,7 @@ class _Named:
             name=self.name,
             row_name=self.row_name,
             unit=self.unit,
+            photo_name=lambda photo: f"photo {block.photo_ids[photo]}",
         )
 
     def loads(self, group: int) -> Indices:

@@ -38,6 +38,8 @@ class Suspects:
         the group goes as a whole.
     name, row_name, unit
         What a group is called, what one of its rows is, and the unit of that row (M).
+    photo_name
+        What a photo is called.
     """
 
     row_starts: Indices
@@ -51,6 +53,7 @@ class Suspects:
     name: Callable[[int], str]
     row_name: Callable[[int], str]
     unit: Callable[[int], str]
+    photo_name: Callable[[int], str]
 
     def __len__(self) -> int:
         return len(self.kinds)
@@ -229,7 +232,10 @@ class Trial(Protocol):
         ...
 
     def resist(self, scale: float) -> Floats:
-        """Adjust robustly, errors beyond `scale` standard deviations losing weight: (G,) what is left."""
+        """Adjust robustly, errors beyond some `scale` standard deviations losing weight.
+
+        Returns (G,) the lengths of the residuals of unit weight; zero for what no loss is applied to.
+        """
         ...
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
