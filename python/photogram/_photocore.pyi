@@ -1634,8 +1634,12 @@ def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
 
 _Station = tuple[float, float, float, float]
 """Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury)."""
-_CameraKind = tuple[float | None, bool, bool]
-"""Principal distance of the distorted image (None: scale first), Brown's decentering, common scale."""
+_CameraKind = tuple[float | None, bool, bool] | tuple[str, bool]
+"""Of plates: principal distance of the distorted image (None: scale first), Brown's decentering, common
+scale.
+
+Of another model (`camera_models`): its name, and whether fx is the principal distance of both axes.
+"""
 
 class StellarError(Exception):
     """The camera cannot be calibrated.
@@ -1690,7 +1694,8 @@ def plate_images(standard: _Floats, angles: _Floats, interior: _Floats, camera: 
     angles
         (3,) alpha, omega, kappa.
     interior
-        (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3.
+        (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3; of another model
+        its own parameters, then zeros: x counts right, y down.
     camera
         Its kind.
     """

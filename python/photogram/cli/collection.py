@@ -18,6 +18,7 @@ from photogram.cli.options import (
     Snoop,
     SnoopLevel,
     SnoopRate,
+    Strict,
     Threads,
     UnitWeight,
     out_option,
@@ -106,6 +107,7 @@ def collection(
         UnitWeight,
         typer.Option(help="With --snoop: whether --sd is right, or but for a common factor."),
     ] = UnitWeight.UNKNOWN,
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
     """Adjust photos of unknown cameras by Levenberg-Marquardt steps, however far the start."""
@@ -153,8 +155,11 @@ def collection(
             written[json] = told.to_json()
         sections = [
             ("File", [f"{problem}: {found.title}"]),
-            *(log.sections() if log else []),
-            *summary(result),
+            *([*log.sections(), *summary(result)[1:]] if log else summary(result)),
         ]
         whole = (section for section in sections if section[1])
-        job.finish(written, summary=lambda: print_sections(whole, "the report"), good=result.converged)
+        job.finish(
+            written,
+            summary=lambda: print_sections(whole, "the report"),
+            code=told.verdict.exit_code(strict=strict),
+        )

@@ -19,6 +19,7 @@ from photogram.cli.options import (
     Snoop,
     SnoopLevel,
     SnoopRate,
+    Strict,
     Threads,
     UnitWeight,
     default_out,
@@ -120,6 +121,7 @@ def giant(
             show_default=False,
         ),
     ] = None,
+    strict: Strict = False,
     quiet: Quiet = False,
     overwrite: Annotated[
         bool,
@@ -169,9 +171,9 @@ def giant(
             written,
             documents,
             summary=lambda: print_sections(
-                [*(log.sections() if log else []), *summary(result)], "report.txt"
+                [*log.sections(), *summary(result)[1:]] if log else summary(result), "report.txt"
             ),
-            good=result.converged,
+            code=(log or result).verdict.exit_code(strict=strict),
         )
 
 
