@@ -109,6 +109,11 @@ class Evidence:
         return bonferroni(self.found.level, self.number)
 
     @cached_property
+    def rejected(self) -> bool:
+        """Whether the global test rejects because residuals are too large."""
+        return self.test is not None and self.test.rejected_high
+
+    @cached_property
     def high(self) -> bool:
         """Whether residuals are too large by a factor that matters."""
         return self.test is not None and self.test.problem() is not None
@@ -148,7 +153,7 @@ class Evidence:
 
         Of few observations the factor is that of the others: the externally studentized test.
         """
-        if not self.high or not self.single:
+        if not self.rejected or not self.single:
             return self.single
         if self.robust is not None:
             return self.beyond(max(self.robust, 1.0))
@@ -204,6 +209,7 @@ class Evidence:
             lines.append(
                 f"the global test rejects, but residuals are only {self.factor:.3g} times as expected"
             )
+        lines += [each.sentence for each in self.found.systematic if each.significant and not each.large]
         f = self.found.degrees_of_freedom
         if 0 < f < FEW:
             lines.append(f"with {f:g} degrees of freedom only gross disagreement can be seen")

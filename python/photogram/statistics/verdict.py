@@ -138,7 +138,7 @@ def _identification(e: Evidence) -> _Line | None:
 def _gross_errors(e: Evidence) -> _Line | None:
     if e.found.spoiled:
         return _Line("gross-errors", f"Gross errors: {e.found.spoiled}", EXIT_NOT_USABLE)
-    if not e.high or e.found.snooped or not e.gross:
+    if not e.rejected or e.found.snooped or not e.gross:
         return None
     if e.pattern and e.robust is not None and e.robust > 1.5:
         return None
@@ -222,7 +222,7 @@ def _unexplained(e: Evidence) -> _Line | None:
 
 
 def _look_at(e: Evidence) -> _Line | None:
-    if e.high or not e.single:
+    if e.high or not e.single or _gross_errors(e) is not None:
         return None
     whole = "Accepted" if e.test is not None else f"Not tested as a whole ({e.found.untested})"
     return _Line("look-at", f"{whole}, but look at: {e.named(e.single)}", warning=True)
