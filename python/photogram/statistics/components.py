@@ -432,7 +432,8 @@ class _Run:
         """Test whether all free components are equal.
 
         The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2: twice its
-        difference between the equal components and the estimated ones is the integral of q_g - r_g along the line.
+        difference between the equal components and the estimated ones is the integral of q_g - r_g along
+        the line.
         """
         free = self.free
         if len(free) < 2 or not self.converged:
