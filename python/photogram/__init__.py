@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
+    from photogram.adjustment.variance_function import variance_function
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
     from photogram.results.result import Result
+    from photogram.results.variance_function import VarianceFunction
 
 __all__ = [
     "AdjustmentError",
@@ -57,6 +59,7 @@ __all__ = [
     "Simulation",
     "Spheroid",
     "VarianceComponents",
+    "VarianceFunction",
     "__version__",
     "adjust",
     "first_values",
@@ -68,6 +71,7 @@ __all__ = [
     "resect",
     "simulate",
     "variance_components",
+    "variance_function",
 ]
 
 _HOMES = {
@@ -77,6 +81,7 @@ _HOMES = {
     "Block": "network.block",
     "Camera": "network.cameras",
     "VarianceComponents": "results.components",
+    "VarianceFunction": "results.variance_function",
     "FirstValues": "adjustment.first_values",
     "GroupSums": "results.group_sums",
     "InnerConstraints": "network.datum",
@@ -107,6 +112,7 @@ _HOMES = {
     "resect": "adjustment.resection",
     "simulate": "network.simulation",
     "variance_components": "adjustment.components",
+    "variance_function": "adjustment.variance_function",
 }
 """The module of each name, loaded when it is first asked for.
 

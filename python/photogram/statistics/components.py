@@ -300,7 +300,7 @@ class _Run:
                 names = [self.groups.names[g] for g in pool]
                 name = parent if len(pool) == len(siblings) or "other" in parent else f"others of {parent}"
                 self.messages.append(
-                    f"{listed(names)}: merged, each has too little redundancy for itself: {name}"
+                    f"{listed(names)}: merged into {name}, each has too little redundancy for itself"
                 )
                 pools |= dict.fromkeys(pool, (name, pool))
         units: list[tuple[str, list[int]]] = []
