@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.adjustment.variance_function import variance_function
+    from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
@@ -62,6 +63,7 @@ __all__ = [
     "VarianceFunction",
     "__version__",
     "adjust",
+    "check",
     "first_values",
     "group_sums",
     "hints",
@@ -103,6 +105,7 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "check": "checks.checking",
     "first_values": "adjustment.first_values",
     "group_sums": "results.group_sums",
     "hints": "adjustment.hints",

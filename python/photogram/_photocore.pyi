@@ -704,11 +704,137 @@ class BlockNetwork:
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended, in the datum that it was taken to."""
 
+    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where the adjustment has ended."""
+
     def resistance(self, state: BlockState, *, threads: int) -> list[tuple[str, float]]:
         """Return what keeps the block from moving as a whole: kinds of observations.
 
         With each the greatest share of what a motion changes in them that remains when all unknowns move.
         """
+
+@final
+class NetworkTrial:
+    """A network tried without some of its observations; the symbolic analysis is done once.
+
+    Its *suspects* are the G groups of observations that may hold a gross error together: images in their
+    order, then the control of points, positions and attitudes of photos, observations beside images, and what
+    was observed of cameras and common unknowns. Each has rows, M in all, which stand one suspect after the
+    other; so do square blocks. What is out has weight zero.
+
+    Of all methods, errors are those of the adjustment: BlockError or CollectionError, of the kind
+    `undetermined points` or `undetermined photos` where what is out takes their last support.
+    """
+
+    @property
+    def subjects(self) -> tuple[NDArray[np.uint8], _Indices]:
+        """(G,) kinds, and which image, point, photo, observation, camera or common unknown.
+
+        Kinds are 0 image, 1 control, 2 position, 3 attitude, 4 observation, 5 camera, 6 common unknown.
+        """
+
+    @property
+    def row_starts(self) -> _Indices:
+        """(G + 1,) where the rows of each suspect start."""
+
+    @property
+    def components(self) -> _Indices:
+        """(M,) the component that each row is."""
+
+    @property
+    def deviations(self) -> _Floats:
+        """(M,) standard deviations a priori, in the units of the observations."""
+
+    def stand(self, held: list[int]) -> tuple[str, int, float, int, list[int]]:
+        """Take the network as it stands, with everything in it; return how it stands, as `adjust`.
+
+        Parameters
+        ----------
+        held
+            Unknowns that were held for a datum.
+        """
+
+    def adjust(
+        self,
+        rows: NDArray[np.bool_],
+        points: list[int],
+        photos: list[int],
+        *,
+        tolerance: float | None,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> tuple[str, int, float, int, list[int]]:
+        """Adjust without what is out, from where the last trial has ended.
+
+        Parameters
+        ----------
+        rows
+            (M,) which rows are out.
+        points, photos
+            Those that are out with all that was observed of them: they stay where they are.
+        tolerance
+            When to stop, as the options of the network count it; theirs when None.
+
+        Returns
+        -------
+        Status, iterations, weighted sum of squares, degrees of freedom, points that ran into a station.
+        """
+
+    def resist(
+        self,
+        loss: str,
+        scale: float,
+        *,
+        iterations: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> _Floats:
+        """Adjust with a robust loss from where the last trial has ended, and stay there.
+
+        Returns
+        -------
+        (G,) factors by which it has changed weights.
+        """
+
+    def tests(self) -> dict[str, NDArray[Any]]:
+        """Test every suspect that takes part.
+
+        Returns
+        -------
+        `active` (G,) whether any row of it takes part; `rank` (G,) directions in which an error shows;
+        `statistic` (G,) T, by which the sum of squares falls without it; `least` (G,) the smallest redundancy
+        of a direction that shows; `shared` (G,) h of the bound of correlations with others; `residual` (M,)
+        of unit weight; `cofactors` the square blocks of R; `error`, `error_sd` (M,) the estimated error and
+        its standard deviation (a priori unit weight), in the units of the observations. NaN for what is out.
+        """
+
+    def predictions(
+        self, suspects: list[int]
+    ) -> list[tuple[float, list[int], list[float], list[float]] | None]:
+        """Test what is out of some suspects against what the rest predicts.
+
+        Returns
+        -------
+        For each: the statistic, chi-square with as many degrees of freedom as rows are out; these rows;
+        observed minus predicted of each, and its standard deviation. None where nothing is out, or its point
+        or photo is.
+        """
+
+    def on_points(self, points: list[int]) -> list[tuple[list[int], _Floats, _Floats]]:
+        """Return all observations of points together: suspects, residuals of unit weight, and R.
+
+        Nothing for points that observations beside images touch.
+        """
+
+    def effects(self, suspects: list[int]) -> _Floats:
+        """Return what an error of one standard deviation in each row of some suspects moves.
+
+        Returns
+        -------
+        (., 9): the three coordinates of the own point, the six numbers of the own photo; NaN where there is
+        none.
+        """
+
+    def inseparable(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
+        """Return pairs of suspects of one point whose tests are correlated by more than `limit`."""
 
 @final
 class BlockState:
@@ -1851,6 +1977,9 @@ class CollectionNetwork:
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended."""
+
+    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where the adjustment has ended."""
 
 @final
 class CollectionSolution(_NetworkSolution):

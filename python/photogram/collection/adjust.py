@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
@@ -15,11 +14,11 @@ from photogram.adjustment.ends import hidden, rounded, too_coarse
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
+from photogram.collection.core import CollectionOptions, collection_network
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
-from photogram.memory import available_memory
 from photogram.messages import Message, listed
 
-__all__ = ["CollectionOptions", "adjust", "adjusted", "collection_network"]
+__all__ = ["adjust", "adjusted"]
 
 
 def adjust(
@@ -98,38 +97,6 @@ def adjust(
     return adjusted(collection, options, threads=threads, progress=progress)
 
 
-@dataclass(frozen=True)
-class CollectionOptions:
-    """How the core adjusts a collection: the options of :func:`adjust` as it knows them."""
-
-    decrease: float
-    max_iterations: int
-    covariance: bool
-    loss: tuple[str, float] | None
-    ordering: str
-
-
-def collection_network(collection: Collection, options: CollectionOptions) -> _photocore.CollectionNetwork:
-    """Return a collection as the core adjusts it."""
-    return _photocore.collection_network(
-        collection.camera,
-        collection.photo_parameters,
-        collection.photo_sd,
-        collection.point_positions,
-        collection.point_sd,
-        collection.image_photos,
-        collection.image_points,
-        collection.image_xy,
-        collection.image_sd,
-        decrease=options.decrease,
-        max_iterations=options.max_iterations,
-        covariance=options.covariance,
-        loss=options.loss,
-        ordering=options.ordering,
-        memory=available_memory(),
-    )
-
-
 def adjusted(
     collection: Collection,
     options: CollectionOptions,
@@ -152,6 +119,8 @@ def adjusted(
         loss=options.loss,
         weighted_sum_of_squares=solution.sum_of_squares,
         datum=[(photo, collection.parameters[parameter]) for photo, parameter in solution.datum],
+        options=options,
+        state=solution.state,
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
+from photogram.collection.core import CollectionOptions
 from photogram.results.network import AdjustedNetwork
 
 if TYPE_CHECKING:
@@ -38,8 +39,8 @@ class AdjustedCollection(AdjustedNetwork):
         (n,) how many image points have the point behind the camera.
     datum
         Photos and parameters that were held to give the cofactors a datum.
-    state
-        Where the adjustment has ended.
+    options, state
+        How the core adjusted the collection, and where that ended.
     """
 
     collection: Collection
@@ -48,6 +49,7 @@ class AdjustedCollection(AdjustedNetwork):
     photo_images: Indices
     point_rays_behind: Indices
     datum: list[tuple[int, str]]
+    options: CollectionOptions
     state: _photocore.BlockState
 
     @property

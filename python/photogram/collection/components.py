@@ -9,9 +9,10 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.components import Weighing, weighing
 from photogram.arguments.types import Floats
-from photogram.collection.adjust import CollectionOptions, adjusted, collection_network
+from photogram.collection.adjust import adjusted
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
+from photogram.collection.core import CollectionOptions, collection_network
 from photogram.results.group_sums import factored, observables
 from photogram.results.grouping import Grouping, Observables
 

@@ -13,6 +13,9 @@ from photogram.statistics.distributions import (
     log_chi_square,
     log_fisher,
 )
+from photogram.statistics.evidence import Test
+from photogram.statistics.findings import Findings, Snooped, Tested
+from photogram.statistics.groups import GroupTests, group_tests, parts_tests
 from photogram.statistics.limits import (
     NOTABLE_FACTOR,
     GlobalTest,
@@ -21,10 +24,17 @@ from photogram.statistics.limits import (
     normal_limit,
     studentized_limit,
 )
+from photogram.statistics.verdict import Verdict, verdict
 
 __all__ = [
     "NOTABLE_FACTOR",
+    "Findings",
     "GlobalTest",
+    "GroupTests",
+    "Snooped",
+    "Test",
+    "Tested",
+    "Verdict",
     "b_method",
     "benjamini_hochberg",
     "bonferroni",
@@ -35,9 +45,12 @@ __all__ = [
     "critical_tau",
     "externally_studentized",
     "global_test",
+    "group_tests",
     "lambda0",
     "log_chi_square",
     "log_fisher",
     "normal_limit",
+    "parts_tests",
     "studentized_limit",
+    "verdict",
 ]

@@ -58,11 +58,13 @@ mod damped;
 mod datum;
 mod distributions;
 mod factored;
+mod group_test;
 mod loss;
 mod method;
 mod motions;
 mod noncentral;
 mod normal_equations;
+mod observation_rows;
 mod options;
 mod problem;
 mod projection;
@@ -73,6 +75,7 @@ mod run;
 mod statistics;
 mod traces;
 mod transformation;
+mod tried;
 mod trust_region;
 mod walk;
 
@@ -82,12 +85,14 @@ pub use distributions::{
     student_limit,
 };
 pub use factored::{CofactorError, Factored};
+pub use group_test::{GroupTest, VISIBLE, canonical_correlation};
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
 pub use noncentral::{
     detectable_noncentrality, level_of_equal_power, noncentral_chi_square, noncentral_fisher,
 };
 pub use normal_equations::NormalEquations;
+pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Motions, Problem, Weighted};
 pub use resistance::Classes;
@@ -96,3 +101,4 @@ pub use result::{AdjustError, Adjustment, Seconds};
 pub use run::{Watch, adjust, on_all_processors};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub use traces::{EquationGroups, GroupSquares, Probing};
+pub use tried::{TieCofactors, Tried};

@@ -204,7 +204,7 @@ impl Network {
     }
 
     /// The problem whose solution a state is.
-    fn assembled_again(
+    pub(super) fn assembled_again(
         &self,
         options: &Options,
         state: &State,

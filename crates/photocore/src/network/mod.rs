@@ -71,6 +71,8 @@ mod problem;
 mod screening;
 mod solution;
 mod start;
+mod suspects;
+mod trial;
 mod weighted_angles;
 
 use std::ops::ControlFlow;
@@ -95,6 +97,8 @@ pub(crate) use precision::median;
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Redundancies, Solution, SumsOfSquares};
 pub(crate) use start::meet;
+pub use suspects::Subject;
+pub use trial::{OnPoint, Out, Prediction, Standing, Tests, Trial};
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]

@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 
 use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
+use super::trial::NetworkTrial;
 use super::{BlockError, failure};
 use crate::arrays::group_rows;
 use crate::options::unknown;
@@ -117,6 +118,15 @@ impl BlockNetwork {
     ) -> PyResult<BlockCovariances> {
         let found = factored(py, (&self.network, &self.options), state, threads, progress)?;
         found.map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn trial(&self, py: Python<'_>, state: &BlockState, threads: usize) -> PyResult<NetworkTrial> {
+        let images = self.network.images.len();
+        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
+            self.network.trial(&self.options, &state.state, pool)
+        })?;
+        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (state, *, threads))]

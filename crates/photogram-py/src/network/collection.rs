@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use super::block_network::{BlockCovariances, factored};
 use super::solution::CollectionSolution;
 use super::state::BlockState;
+use super::trial::NetworkTrial;
 use super::{CollectionError, failure, images, points, said};
 use crate::arrays::{check_lengths, rows, slices, table};
 use crate::options::{named_loss, named_ordering, unknown};
@@ -50,10 +51,7 @@ impl CollectionNetwork {
             Some(start) => self.network.adjust_again(&self.options, start, pool, watch),
         })?;
         let unknowns = self.unknowns;
-        solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| match error {
-            Failure::Index(_) => PyValueError::new_err(said(&error, "collection")),
-            error => refused(&error),
-        })
+        solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (state, *, threads, progress))]
@@ -67,10 +65,22 @@ impl CollectionNetwork {
         let found = factored(py, (&self.network, &self.options), state, threads, progress)?;
         found.map_err(|error| refused(&error))
     }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn trial(&self, py: Python<'_>, state: &BlockState, threads: usize) -> PyResult<NetworkTrial> {
+        let images = self.network.images.len();
+        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
+            self.network.trial(&self.options, &state.state, pool)
+        })?;
+        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
+    }
 }
 
 fn refused(error: &Failure) -> PyErr {
-    CollectionError::new_err(failure(error, "collection"))
+    match error {
+        Failure::Index(_) => PyValueError::new_err(said(error, "collection")),
+        error => CollectionError::new_err(failure(error, "collection")),
+    }
 }
 
 /// Parameters of a pose in vectors.

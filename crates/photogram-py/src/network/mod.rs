@@ -6,6 +6,7 @@ mod collection;
 mod first_values;
 mod solution;
 mod state;
+mod trial;
 
 use numpy::PyReadonlyArrayDyn;
 use photocore::network::{Coarse, Combination, Image, NetworkError as Failure, Point, PosePart};
@@ -36,6 +37,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     block_network::register(module)?;
     collection::register(module)?;
     first_values::register(module)?;
+    trial::register(module)?;
     solution::register(module)
 }
 
