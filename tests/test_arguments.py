@@ -27,7 +27,7 @@ PACKAGES = (
 )
 MADE_BY_THE_LIBRARY = {
     "photogram": "FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection Result"
-    " Simulation VarianceComponents",
+    " Simulation VarianceComponents VarianceFunction",
     "photogram.absolute_orientation": "Orientation",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
@@ -140,6 +140,7 @@ def good(tmp_path_factory):
             "hints": {"block": block},
             "orient": {"stations": stations},
             "variance_components": {"network": block, "max_steps": 3},
+            "variance_function": {"network": block, "max_steps": 2, "bins": 2},
             "plan": {"patterns": {"one": block}},
             "predict": {"block": block},
             "resect": {"object_points": resected, "image_xy": seen, "principal_distance": -150.0},

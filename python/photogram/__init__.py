@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.adjustment.snooping import snoop
+    from photogram.adjustment.variance_function import variance_function
     from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from photogram.results.iteration import Iteration
     from photogram.results.result import Result
     from photogram.results.snooped import Snooped
+    from photogram.results.variance_function import VarianceFunction
 
 __all__ = [
     "AdjustmentError",
@@ -61,6 +63,7 @@ __all__ = [
     "Snooped",
     "Spheroid",
     "VarianceComponents",
+    "VarianceFunction",
     "__version__",
     "adjust",
     "check",
@@ -74,6 +77,7 @@ __all__ = [
     "simulate",
     "snoop",
     "variance_components",
+    "variance_function",
 ]
 
 _HOMES = {
@@ -83,6 +87,7 @@ _HOMES = {
     "Block": "network.block",
     "Camera": "network.cameras",
     "VarianceComponents": "results.components",
+    "VarianceFunction": "results.variance_function",
     "FirstValues": "adjustment.first_values",
     "GroupSums": "results.group_sums",
     "InnerConstraints": "network.datum",
@@ -116,6 +121,7 @@ _HOMES = {
     "simulate": "network.simulation",
     "snoop": "adjustment.snooping",
     "variance_components": "adjustment.components",
+    "variance_function": "adjustment.variance_function",
 }
 """The module of each name, loaded when it is first asked for.
 

@@ -300,7 +300,7 @@ class _Run:
                 names = [self.groups.names[g] for g in pool]
                 name = parent if len(pool) == len(siblings) or "other" in parent else f"others of {parent}"
                 self.messages.append(
-                    f"{listed(names)}: merged, each has too little redundancy for itself: {name}"
+                    f"{listed(names)}: merged into {name}, each has too little redundancy for itself"
                 )
                 pools |= dict.fromkeys(pool, (name, pool))
         units: list[tuple[str, list[int]]] = []
@@ -432,7 +432,8 @@ class _Run:
         """Test whether all free components are equal.
 
         The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2: twice its
-        difference between the equal components and the estimated ones is the integral of q_g - r_g along the line.
+        difference between the equal components and the estimated ones is the integral of q_g - r_g along
+        the line.
         """
         free = self.free
         if len(free) < 2 or not self.converged:
