@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import shown
 from photogram.checks.adjusting import Adjuster
@@ -36,7 +37,7 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 
-__all__ = ["Manner", "check", "check_block"]
+__all__ = ["Manner", "check", "check_block", "check_of"]
 
 FINAL_STATIONS = 5.0
 """Stations count as adjusted when half the residuals are below so many standard deviations."""
@@ -63,7 +64,6 @@ class Manner:
     intersect_only: str = ""
 
 
-@singledispatch
 def check(network: object, *, threads: int | None = None) -> Check:
     """Look for mistakes and gross errors in a network: units, axes, signs, names, images, control, stations.
 
@@ -99,12 +99,19 @@ def check(network: object, *, threads: int | None = None) -> Check:
     >>> [finding.kind for finding in check(block.replace(point_positions=feet)).grave]
     ['control-set']
     """
+    core_threads(threads)
+    return check_of(network, threads)
+
+
+@singledispatch
+def check_of(network: object, threads: int | None) -> Check:
+    """Check a network; defined for each class of networks in the files above it."""
     del threads
     raise InputError(f"a check is of a block, a project or a collection, not of {shown(network)}")
 
 
-@check.register
-def _(network: Block, *, threads: int | None = None) -> Check:
+@check_of.register
+def _(network: Block, threads: int | None) -> Check:
     return Check(network.title, *check_block(network, Manner({"threads": threads})))
 
 
