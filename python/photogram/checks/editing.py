@@ -23,7 +23,7 @@ from photogram.checks.predictions import (
 )
 from photogram.checks.rivals import rival_images
 from photogram.checks.robust import critical, mad_sd
-from photogram.checks.views import kept_images
+from photogram.checks.views import View, kept_images
 from photogram.checks.words import small_unit
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
@@ -185,9 +185,9 @@ def _gross_control(block: Block, adjusted: Adjuster) -> Indices:
     With standard deviations of a hundredth of the flying height, control strains no block, and what is wrong
     by many times that shows.
     """
-    rays = Rays.of(block)
+    rays = Rays.of(View.of(block).seen)
     away = np.linalg.norm(
-        rays.intersect().positions[block.image_points] - rays.centres[block.image_photos], axis=1
+        rays.intersect().positions[rays.block.image_points] - rays.centres[rays.block.image_photos], axis=1
     )
     if not np.isfinite(away).any():
         return np.empty(0, dtype=np.int64)
