@@ -10,6 +10,7 @@ SOURCES = Path(photogram.__file__).parent
 PROGRAMS = ("giant", "collection", "perspective_center", "absolute_orientation", "comparator", "stellar")
 FLOORS = (
     ("cli",),
+    ("formats",),
     PROGRAMS,
     ("planning", "checks"),
     ("adjustment",),

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.components import variance_components
     from photogram.adjustment.first_values import FirstValues, first_values
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
     from photogram.planning import Plan, plan
+    from photogram.results.components import VarianceComponents
+    from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
     from photogram.results.result import Result
 
@@ -36,6 +39,7 @@ __all__ = [
     "Block",
     "Camera",
     "FirstValues",
+    "GroupSums",
     "InnerConstraints",
     "InputError",
     "Iteration",
@@ -53,16 +57,19 @@ __all__ = [
     "Result",
     "Simulation",
     "Spheroid",
+    "VarianceComponents",
     "__version__",
     "adjust",
     "check",
     "first_values",
+    "group_sums",
     "hints",
     "orient",
     "plan",
     "predict",
     "resect",
     "simulate",
+    "variance_components",
 ]
 
 _HOMES = {
@@ -71,7 +78,9 @@ _HOMES = {
     "Attitudes": "network.attitudes",
     "Block": "network.block",
     "Camera": "network.cameras",
+    "VarianceComponents": "results.components",
     "FirstValues": "adjustment.first_values",
+    "GroupSums": "results.group_sums",
     "InnerConstraints": "network.datum",
     "InputError": "errors",
     "Iteration": "results.iteration",
@@ -93,12 +102,14 @@ _HOMES = {
     "adjust": "adjustment.adjustment",
     "check": "checks.checking",
     "first_values": "adjustment.first_values",
+    "group_sums": "results.group_sums",
     "hints": "adjustment.hints",
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",
     "resect": "adjustment.resection",
     "simulate": "network.simulation",
+    "variance_components": "adjustment.components",
 }
 """The module of each name, loaded when it is first asked for.
 

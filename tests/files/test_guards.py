@@ -45,6 +45,10 @@ RUNS = {
     "perspective-center": (["perspective-center", "grid.deck"], ["grid.deck"]),
     "stellar-camera plate": (["stellar-camera", "plate.toml"], ["plate.toml", "stars.csv", "images.csv"]),
     "stellar-camera exposures": (["stellar-camera", "exposures", "night.toml"], ["night.toml", "images.csv"]),
+    "adjust": (["adjust", "project"], ["project/images.csv", "project/project.toml"]),
+    "info": (["info", "project"], ["project/images.csv"]),
+    "convert": (["convert", "project"], ["project/images.csv"]),
+    "new": (["new"], []),
     "plan": (["plan", "galveston", "second"], ["galveston/FRAMES", "second/GROUND"]),
     "simulate": (["simulate"], []),
 }
@@ -94,6 +98,7 @@ def place(tmp_path, request):
                 shutil.copy(file, tmp_path)
     for project in ("galveston", "second"):
         shutil.copytree(EXAMPLES / "galveston", tmp_path / project)
+    shutil.copytree(EXAMPLES / "project", tmp_path / "project")
     (tmp_path / "former.json").write_text("{}")
     (tmp_path / "grid.csv").write_text("point,x_um,y_um\n1,0,0\n")
     return tmp_path

@@ -15,12 +15,12 @@ from photogram.checks.heights import neighbours
 from photogram.checks.orientation import MIRRORS
 from photogram.checks.predictions import exchange
 from photogram.checks.robust import critical, fit, mad_sd
-from photogram.checks.stations import strips_of
 from photogram.checks.structure import parts_of
 from photogram.cli import app
 from photogram.giant import Limits, Project, check, write_project
 from photogram.network.geometry import Spheroid
 from photogram.network.rays import Rays
+from photogram.network.strips import strips_of
 
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
 

@@ -13,10 +13,14 @@ import typer
 
 from photogram.cli import (
     absolute_orientation,
+    adjust,
     check,
     collection,
     comparator,
+    convert,
     giant,
+    info,
+    new,
     perspective_center,
     plan,
     simulate,
@@ -55,6 +59,10 @@ stellar_app = typer.Typer(
 )
 stellar_app.command("plate")(stellar_camera.stellar_camera)
 stellar_app.command("exposures")(stellar_camera.exposures)
+app.command()(adjust.adjust)
+app.command()(info.info)
+app.command()(convert.convert)
+app.command()(new.new)
 app.add_typer(giant_app)
 app.add_typer(orientation_app)
 app.add_typer(comparator_app)

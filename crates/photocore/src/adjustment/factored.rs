@@ -150,7 +150,7 @@ impl Factored {
 }
 
 /// The equations at some values: it takes a pass over unknowns, and is not kept.
-fn linearized<'a, M: Model>(
+pub(super) fn linearized<'a, M: Model>(
     problem: &'a Problem<M>,
     loss: Option<Loss>,
     values: &[f64],

@@ -60,12 +60,18 @@ pub enum Of {
 /// An adjusted network whose normal equations are factored: cofactors of anything with anything.
 #[derive(Debug)]
 pub struct Covariances {
-    assembled: Assembled,
-    factored: Factored,
+    pub(super) assembled: Assembled,
+    pub(super) factored: Factored,
+    /// How many images the network has.
+    pub(super) images: usize,
+    /// How many observations beside these.
+    pub(super) observations: usize,
     /// The place of each point among those that took part.
-    point: Vec<Option<usize>>,
+    pub(super) point: Vec<Option<usize>>,
     /// A photo of each camera.
-    photo_of_camera: Vec<Option<usize>>,
+    pub(super) photo_of_camera: Vec<Option<usize>>,
+    /// The camera of each photo.
+    pub(super) camera_of_photo: Vec<usize>,
     memory: Option<usize>,
 }
 
@@ -114,7 +120,16 @@ impl Network {
         assembled.points.iter().enumerate().for_each(|(place, &index)| point[index] = Some(place));
         let mut photo_of_camera = vec![None; self.cameras.len()];
         self.photos.iter().enumerate().for_each(|(index, photo)| photo_of_camera[photo.camera] = Some(index));
-        Ok(Covariances { assembled, factored, point, photo_of_camera, memory: options.memory })
+        Ok(Covariances {
+            assembled,
+            factored,
+            images: self.images.len(),
+            observations: self.observations.len(),
+            point,
+            photo_of_camera,
+            camera_of_photo: self.photos.iter().map(|photo| photo.camera).collect(),
+            memory: options.memory,
+        })
     }
 
     /// Takes an adjusted network to another datum without adjusting again: values, cofactors, redundancy numbers.
@@ -189,7 +204,7 @@ impl Network {
     }
 
     /// The problem whose solution a state is.
-    fn assembled_again(
+    pub(super) fn assembled_again(
         &self,
         options: &Options,
         state: &State,

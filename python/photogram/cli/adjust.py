@@ -1,0 +1,240 @@
+"""`photogram adjust`: adjust whatever lies at a path."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from photogram.cli.console import print_remark, print_sections
+from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, default_out, out_option
+from photogram.cli.progress import shown
+from photogram.cli.projects import (
+    EXAMPLE,
+    Additions,
+    Angles,
+    CamerasFile,
+    ControlCrs,
+    ControlFile,
+    Deviations,
+    FormatName,
+    ImagesFile,
+    Model,
+    NamesFile,
+    PixelOrigin,
+    described,
+    read_project,
+)
+
+if TYPE_CHECKING:
+    from photogram import Block, Result
+    from photogram.formats import Project
+
+__all__ = ["adjust"]
+
+
+class DatumName(StrEnum):
+    """What coordinates refer to."""
+
+    CONTROL = "control"
+    MINIMUM = "minimum"
+    INNER = "inner"
+
+
+class LossName(StrEnum):
+    """What is minimised."""
+
+    NONE = "none"
+    HUBER = "huber"
+    CAUCHY = "cauchy"
+
+
+@with_job
+def adjust(
+    job: Job,
+    path: Annotated[
+        Path | None,
+        Reads.FILE,
+        typer.Argument(
+            metavar="PATH",
+            help="A project: a folder or file of any format that `photogram convert --help` lists.",
+            show_default=False,
+        ),
+    ] = None,
+    example: Annotated[
+        bool, typer.Option("--example", help="Adjust the packaged example instead, that of `photogram new`.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        Writes.DIRECTORY,
+        out_option(
+            "Directory for report.txt, the tables of the result, and the adjusted project in `adjusted/`."
+            " Default: PATH-adjusted."
+        ),
+    ] = None,
+    json: JsonFile = None,
+    file_format: FormatName = None,
+    control: ControlFile = None,
+    control_crs: ControlCrs = None,
+    images: ImagesFile = None,
+    names: NamesFile = None,
+    camera: CamerasFile = None,
+    sd: Deviations = None,
+    pixel_origin: PixelOrigin = None,
+    model: Model = None,
+    angles: Angles = None,
+    datum: Annotated[
+        DatumName | None,
+        typer.Option(
+            help="What coordinates refer to. Default: what PATH says, else control and other observations,"
+            " and minimum constraints where there are none.",
+            show_default=False,
+        ),
+    ] = None,
+    loss: Annotated[
+        LossName | None,
+        typer.Option(help="Robust loss of image coordinates. Default: what PATH says.", show_default=False),
+    ] = None,
+    self_calibrate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Parameters of cameras that are unknown (f,cx,cy,k1 ...), or `all`.",
+            show_default=False,
+        ),
+    ] = None,
+    ordering: Ordering = OrderingName.AUTO,
+    threads: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Adjust a block in whatever files it lies: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...
+
+    Photos without a pose are oriented first. The report, the tables of photos, points, images and all other
+    observations with their standard deviations, redundancy numbers and test values, and the adjusted project
+    go to --out.
+    """
+    if example:
+        path = job.packaged(*EXAMPLE)
+    assert path is not None
+    target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
+    with job:
+        from photogram.formats.additions import self_calibrated
+
+        added = Additions(
+            file_format, control, control_crs, images, names, camera, sd, pixel_origin, model, angles
+        )
+        project = read_project(job, path, added)
+        wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
+        project = self_calibrated(project, wanted)
+        sections = described(project)
+        if not quiet:
+            print_sections(sections, "`photogram info`")
+        block, remarks = _started(project)
+        for remark in remarks:
+            if not quiet:
+                print_remark(remark)
+        result = _adjusted(job, project, block, datum, loss, ordering, threads)
+        files = _files(project, result, sections)
+        good = result.converged
+        job.finish(
+            {target / name: content for name, content in files.items()},
+            {} if json is None else {json: result.to_json()},
+            summary=lambda: print_sections(_summary(result), "report.txt"),
+            good=good,
+        )
+
+
+def _started(project: Project) -> tuple[Block, list[str]]:
+    """Return the block with poses for all its photos, and what is to be said about them."""
+    from photogram import first_values
+
+    block = project.block
+    if np.isfinite(block.photo_positions).all() and np.isfinite(block.photo_attitudes).all():
+        return block, []
+    found = first_values(block)
+    return found.usable(), [str(each) for each in found.messages]
+
+
+def _adjusted(
+    job: Job,
+    project: Project,
+    block: Block,
+    datum: DatumName | None,
+    loss: LossName | None,
+    ordering: OrderingName,
+    threads: int | None,
+) -> Result:
+    from dataclasses import replace
+
+    from photogram import InnerConstraints, InputError, MinimumConstraints
+    from photogram import adjust as adjust_block
+
+    options = project.options
+    chosen = datum.value if datum is not None else options.datum
+    robust = (
+        options.loss if loss is None else {"none": None, "huber": "huber", "cauchy": "cauchy"}[loss.value]
+    )
+    with job.status("adjusting") as status:
+        result = adjust_block(
+            block,
+            unit_variance=options.unit_variance,
+            loss=robust,
+            datum=InnerConstraints()
+            if chosen == "inner"
+            else MinimumConstraints()
+            if chosen == "minimum"
+            else None,
+            ordering=ordering.value,
+            threads=threads,
+            progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
+        )
+    if chosen == "control" and result.datum.is_chosen:
+        raise InputError(
+            "control gives no datum: --control FILE adds it, --datum inner or minimum does without it",
+            file=project.path,
+        )
+    return replace(result, messages=[*project.messages, *result.messages])
+
+
+def _files(project: Project, result: Result, sections: list[tuple[str, list[str]]]) -> dict[str, bytes]:
+    """Make everything that goes to the output directory, before anything is written."""
+    from photogram.formats import FORMATS, to_files
+    from photogram.formats.adjusted import adjusted, table_files
+
+    read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
+    files = {"report.txt": f"{result.report()}\n{read}\n".encode(), **table_files(result)}
+    after = adjusted(project, result)
+    files |= {f"adjusted/{name}": content for name, content in to_files(after, "plain").items()}
+    own = next((name for name, each in FORMATS.items() if each.title == project.title), None)
+    if own not in (None, "plain"):
+        files |= {
+            f"adjusted-{own}/{name}": content for name, content in _same_format(after, str(own)).items()
+        }
+        beside = FORMATS[str(own)].results
+        if beside is not None:
+            files |= {f"adjusted-{own}/{name}": content for name, content in beside(after, result).items()}
+    return files
+
+
+def _same_format(project: Project, name: str) -> dict[str, bytes]:
+    """Return the adjusted project in the format in which it came, if that can hold it."""
+    from photogram import InputError
+    from photogram.formats import FORMATS, to_files
+
+    if FORMATS[name].write is None:
+        return {}
+    try:
+        return dict(to_files(project, name))
+    except InputError as error:
+        print_remark(f"not written as {FORMATS[name].title}: {error}")
+        return {}
+
+
+def _summary(result: Result) -> list[tuple[str, list[str]]]:
+    from photogram.results.report import summary
+
+    return [each for each in summary(result) if each[1]]

@@ -1,0 +1,232 @@
+"""What the commands on projects of any format share: options, reading, telling what was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from photogram.cli.job import Job, Reads
+
+if TYPE_CHECKING:
+    from photogram.formats import Project
+    from photogram.show.sections import Section
+
+__all__ = [
+    "EXAMPLE",
+    "Additions",
+    "AngleName",
+    "Angles",
+    "CamerasFile",
+    "ControlCrs",
+    "ControlFile",
+    "Deviations",
+    "FormatName",
+    "ImagesFile",
+    "Model",
+    "NamesFile",
+    "OriginName",
+    "PixelOrigin",
+    "described",
+    "read_project",
+]
+
+EXAMPLE = ("project",)
+"""The packaged example, a directory of photogram.examples."""
+
+
+class OriginName(StrEnum):
+    """Which place of the first pixel is 0, 0."""
+
+    CORNER = "corner"
+    CENTER = "center"
+
+
+class AngleName(StrEnum):
+    """Units of angles."""
+
+    DEG = "deg"
+    GON = "gon"
+    RAD = "rad"
+
+
+FormatName = Annotated[
+    str | None,
+    typer.Option(
+        "--format", metavar="NAME", help="The format of PATH. Default: found out.", show_default=False
+    ),
+]
+ControlFile = Annotated[
+    Path | None,
+    Reads.FILE,
+    typer.Option("--control", metavar="FILE", help="Table of control and check points.", show_default=False),
+]
+ControlCrs = Annotated[
+    str | None,
+    typer.Option(
+        "--control-crs",
+        metavar="CRS",
+        help="Coordinate reference system of --control (EPSG:25832, ENU:lat,lon,h ...), where it is not that"
+        " of PATH; needs pyproj.",
+        show_default=False,
+    ),
+]
+ImagesFile = Annotated[
+    Path | None,
+    Reads.FILE,
+    typer.Option(
+        "--images",
+        metavar="FILE",
+        help="Further measurements: photo, point, column, row.",
+        show_default=False,
+    ),
+]
+NamesFile = Annotated[
+    Path | None,
+    Reads.FILE,
+    typer.Option("--names", metavar="FILE", help="Other names of points: point, name.", show_default=False),
+]
+CamerasFile = Annotated[
+    Path | None,
+    Reads.FILE,
+    typer.Option(
+        "--camera", metavar="FILE", help="Table of cameras, for formats that have none.", show_default=False
+    ),
+]
+Deviations = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--sd",
+        metavar="TABLE=S[,S,S]",
+        help="Standard deviations where PATH has none: images=0.5, control=0.02,0.02,0.03, gnss=...",
+        show_default=False,
+    ),
+]
+PixelOrigin = Annotated[
+    OriginName | None,
+    typer.Option(
+        help="Corner or center of the first pixel is 0, 0, in tables of pixels.", show_default=False
+    ),
+]
+Model = Annotated[
+    int | None,
+    typer.Option(
+        min=0, help="Which of several models of a file, from 0. Default: the largest.", show_default=False
+    ),
+]
+Angles = Annotated[
+    AngleName | None, typer.Option(help="Unit of angles in files that do not say it.", show_default=False)
+]
+
+
+@dataclass(frozen=True)
+class Additions:
+    """What a user adds to a project."""
+
+    file_format: str | None = None
+    control: Path | None = None
+    control_crs: str | None = None
+    images: Path | None = None
+    names: Path | None = None
+    camera: Path | None = None
+    sd: list[str] | None = None
+    pixel_origin: OriginName | None = None
+    model: int | None = None
+    angles: AngleName | None = None
+
+
+def read_project(job: Job, path: Path, added: Additions) -> Project:
+    """Read what lies at a path, with what a user adds; its files are inputs of the job from now on."""
+    from photogram.formats import Wishes, read
+    from photogram.formats.additions import deviations, with_control, with_images, with_sd
+    from photogram.formats.names import with_names
+
+    if path.is_dir():
+        job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
+    sd = deviations(added.sd or [])
+    origin = None if added.pixel_origin is None else added.pixel_origin.value
+    wishes = Wishes(
+        cameras=added.camera,
+        pixel_origin=origin,
+        model=added.model,
+        angles=None if added.angles is None else added.angles.value,
+        sd=sd,
+    )
+    project = with_sd(read(path, added.file_format, wishes), sd)
+    if added.images is not None:
+        project = with_images(project, added.images, origin)
+    if added.names is not None:
+        project = with_names(project, added.names)
+    if added.control is not None:
+        project = with_control(project, added.control, sd, added.control_crs)
+    return project
+
+
+def described(project: Project) -> list[Section]:
+    """Return what was read, as titled sections."""
+    from photogram.formats.plain.writing import known_cameras
+    from photogram.formats.self_check import agreement, doubts
+
+    block = project.block
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    held = int(np.count_nonzero(np.isfinite(block.point_sd).any(axis=1)))
+    posed = int(np.count_nonzero(np.isfinite(block.photo_positions).all(axis=1)))
+    size = [
+        f"{len(block.photo_ids)} photos, {posed} with a position; {len(block.image_xy)} images of"
+        f" {np.count_nonzero(rays)} points",
+        "rays of points: "
+        + ", ".join(f"{count} with {k}{' or more' if k == _MANY else ''}" for k, count in _ray_counts(rays)),
+        f"control: {held} points held, {len(project.checks)} check points",
+    ]
+    kinds: dict[str, int] = {}
+    for each in block.observations:
+        kinds[each.label] = kinds.get(each.label, 0) + 1
+    size += [f"{count} observations of the kind {kind}" for kind, count in kinds.items()]
+    if block.mounts:
+        size.append(f"{len(block.mounts)} photos on frames with others")
+    cameras = []
+    known, which = known_cameras(block)
+    for row, camera in enumerate(known):
+        pictures = project.sizes[row] if row < len(project.sizes) else None
+        extent = "" if pictures is None else f", {pictures[0]} x {pictures[1]} pixels"
+        values = ", ".join(f"{name} {value:.7g}" for name, value in camera.parameters.items() if value)
+        cameras.append(
+            f"{camera.title}: {camera.model}{extent}, {which.count(row)} photos: {values} ({camera.unit})"
+        )
+    found = agreement(project)
+    conventions = [
+        f"frame: {project.frame}, unit {block.linear_unit}",
+        f"image coordinates in {block.image_unit}"
+        + (", pixels from the upper-left corner" if {each.image_y for each in known} == {"down"} else ""),
+    ]
+    if found.images:
+        conventions.append(
+            f"median residual of {found.images} images with the positions of the file: {found.median:.3g}"
+            f" {block.image_unit}"
+        )
+    remarks = [str(each) for each in (*project.messages, *doubts(project))]
+    return [
+        each
+        for each in (
+            ("Read", [f"{project.path}: {project.title}"]),
+            ("Size", size),
+            ("Cameras", cameras),
+            ("Units and axes", conventions),
+            ("Lacking", list(project.lacks)),
+            ("Remarks", remarks),
+        )
+        if each[1]
+    ]
+
+
+_MANY = 10
+
+
+def _ray_counts(rays: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[tuple[int, int]]:
+    """Return how many points have one, two, ... rays."""
+    counts = np.bincount(np.minimum(rays[rays > 0], _MANY), minlength=_MANY + 1)
+    return [(k, int(count)) for k, count in enumerate(counts.tolist()) if count]

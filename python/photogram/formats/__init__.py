@@ -1,0 +1,18 @@
+"""Projects in the files that people have: read, write, convert (docs/formats.md)."""
+
+from photogram.formats.format import Format, Wishes
+from photogram.formats.project import Frame, Options, Project
+from photogram.formats.registry import FORMATS, cannot_hold, read, recognised, to_files
+
+__all__ = [
+    "FORMATS",
+    "Format",
+    "Frame",
+    "Options",
+    "Project",
+    "Wishes",
+    "cannot_hold",
+    "read",
+    "recognised",
+    "to_files",
+]

@@ -1,0 +1,309 @@
+"""What a user adds to a project: control, measurements, names, standard deviations, unknown cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.images import from_corner
+from photogram.formats.intersection import intersected
+from photogram.formats.plain.reading import read_control
+from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.tables import Tables, indices_of
+from photogram.formats.plain.transform import Transform
+from photogram.formats.plain.writing import attitude_matrices
+from photogram.formats.project import Frame, Options, Project
+from photogram.io.delimited import ColumnTable, read_columns
+from photogram.messages import Message, listed
+from photogram.network.attitudes import Attitudes
+
+__all__ = ["deviations", "self_calibrated", "with_control", "with_images", "with_sd"]
+
+SIMILAR = 10.0
+"""How much better control must fit a model after a similarity for the model to be carried over."""
+_PIXELS = {
+    "image": "photo",
+    "file": "photo",
+    "filename": "photo",
+    "name": "point",
+    "id": "point",
+    "target": "point",
+    "track": "point",
+    "marker": "point",
+    "x": "column",
+    "u": "column",
+    "col": "column",
+    "y": "row",
+    "v": "row",
+}
+
+
+def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Return standard deviations by table from words such as `images=0.5` or `control=0.02,0.02,0.03`.
+
+    Raises
+    ------
+    InputError
+        Other words, a table that has none, numbers that are no standard deviations.
+    """
+    found = {}
+    for each in given:
+        name, equals, numbers = each.partition("=")
+        name = name.strip()
+        if name not in ("images", "control", "gnss"):
+            raise InputError(f"--sd {each}: images=.., control=.. or gnss=..")
+        try:
+            values = tuple(float(number) for number in numbers.split(","))
+        except ValueError:
+            raise InputError(f"--sd {each}: what follows the = is no number, or three with commas") from None
+        counts = (1, 2) if name == "images" else (1, 3)
+        if not equals or len(values) not in counts or not all(0 <= value < np.inf for value in values):
+            raise InputError(f"--sd {each}: {' or '.join(map(str, counts))} standard deviations")
+        if name == "images" and not all(values):
+            raise InputError(f"--sd {each}: image coordinates cannot be without error")
+        found[name] = values
+    return found
+
+
+def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:
+    """Return a project with the standard deviations of image coordinates that a user gives.
+
+    A plain project has them where its tables say nothing.
+    """
+    if "images" not in sd or project.title == "plain project":
+        return project
+    own = np.broadcast_to(sd["images"], (len(project.block.image_xy), 2))
+    lacks = tuple(each for each in project.lacks if "--sd images" not in each)
+    return project.replace(block=project.block.replace(image_sd=own), lacks=lacks)
+
+
+def self_calibrated(project: Project, names: Sequence[str]) -> Project:
+    """Return a project whose cameras have unknown parameters: those named, or all for `all`.
+
+    Raises
+    ------
+    InputError
+        A name that no camera has as a parameter.
+    """
+    if not names:
+        return project
+    if not project.block.cameras:
+        raise InputError("the block has principal distances and no cameras that could be calibrated")
+    wanted = {name.lower() for name in names}
+    cameras, used = [], set()
+    for camera in project.block.cameras:
+        free = {
+            name: np.inf
+            for name in camera.names
+            if name not in camera.constants and ("all" in wanted or _named(name, wanted))
+        }
+        used |= {_named(name, wanted) for name in free}
+        held = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+        cameras.append(
+            camera.replace(sd={k: v for k, v in {**held, **free}.items() if k not in camera.constants})
+        )
+    if missing := sorted(wanted - used - {"all"}):
+        known = listed(sorted({name for each in project.block.cameras for name in each.names}), 40)
+        raise InputError(f"no camera has the parameter {missing[0]}; there are {known}")
+    return project.replace(block=project.block.replace(cameras=cameras))
+
+
+def _named(name: str, wanted: set[str]) -> str:
+    """Return by which of the words a parameter is wanted: f is that of both axes; nothing for none."""
+    own = name.lower()
+    if own in wanted:
+        return own
+    return "f" if own in ("fx", "fy") and "f" in wanted else ""
+
+
+def pixel_table(path: Path) -> ColumnTable:
+    """Read a table of image measurements under all usual names of its columns."""
+    names = {"photo", "point", "column", "row"}
+    table = read_columns(
+        path,
+        known=names,
+        numbers={"column", "row", "sd", "sd_column", "sd_row"},
+        spelling=lambda name: _PIXELS.get(name, name),
+    )
+    if "photo" in table and "point" not in table and "column" in table:
+        raise table.head.error("the column point is missing")
+    table.require("photo", "point", "column", "row")
+    return table
+
+
+def with_images(project: Project, path: Path, pixel_origin: str | None) -> Project:
+    """Return a project with further image measurements: columns and rows of points in photos, pixels.
+
+    Raises
+    ------
+    InputError
+        Photos that are not there, images that are there already, cameras in millimetres.
+    """
+    block = project.block
+    if block.image_unit != "px":
+        raise InputError("further images are in pixels, and the cameras of the project in mm", file=path)
+    table = pixel_table(path)
+    assert block.photo_cameras is not None
+    photos = indices_of(table, "photo", {name: row for row, name in enumerate(block.photo_ids)}, "photo")
+    names = table.names("point")
+    known = {name: row for row, name in enumerate(block.point_ids)}
+    new = [name for name in names.names if name not in known]
+    known |= {name: len(block.point_ids) + k for k, name in enumerate(new)}
+    points = np.array([known[name] for name in names.names], dtype=np.int64)[names.rows]
+    corner = np.column_stack([table.numbers("column"), table.numbers("row")]) + (
+        0.5 if pixel_origin == "center" else 0.0
+    )
+    if np.isnan(corner).any():
+        raise table.error(int(np.argwhere(np.isnan(corner))[0][0]), "column or row is empty")
+    xy = corner.copy()
+    for row, camera in enumerate(block.cameras):
+        own = block.photo_cameras[photos] == row
+        xy[own] = from_corner(camera, project.sizes[row], corner[own])
+    fill = np.full((len(new), 3), np.nan)
+    default = float(np.median(block.image_sd)) if len(block.image_sd) else 1.0
+    sd = np.column_stack([table.numbers("sd", default)] * 2)
+    try:
+        larger = block.replace(
+            point_ids=[*block.point_ids, *new],
+            point_positions=np.vstack([block.point_positions, fill]),
+            point_sd=np.vstack([block.point_sd, np.full_like(fill, np.inf)]),
+            image_photos=np.concatenate([block.image_photos, photos]),
+            image_points=np.concatenate([block.image_points, points]),
+            image_xy=np.vstack([block.image_xy, xy]),
+            image_sd=np.vstack([block.image_sd, sd]),
+        )
+    except InputError as error:
+        raise InputError(error.message, file=path) from None
+    return project.replace(block=larger, starts=np.vstack([project.starts, fill]))
+
+
+def with_control(
+    project: Project, path: Path, sd: Mapping[str, tuple[float, ...]], crs: str | None
+) -> Project:
+    """Return a project with control and check points of a table, carried onto it where its frame is another.
+
+    Parameters
+    ----------
+    project
+        The project; its points bear the names of the table.
+    path
+        A table `control` of the plain project.
+    sd
+        Standard deviations for tables without columns for them.
+    crs
+        Of the table, where it is not the frame of the project.
+
+    Raises
+    ------
+    InputError
+        A table at fault; none of its points has an image.
+    """
+    settings = Settings(
+        path=path,
+        name="",
+        frame=project.frame,
+        options=Options(),
+        length=project.block.linear_unit,
+        angle="deg",
+        image="px",
+        image_y="down",
+        pixel_origin="corner",
+        attitude="omega_phi_kappa",
+        rotation="object_to_photo",
+        photo="y_up",
+        sd=sd,
+        tables={"control": path},
+        crs={"control": crs} if crs else {},
+    )
+    tables = Tables(settings, [])
+    table = tables.read("control")
+    assert table is not None
+    transform = Transform(settings, tables.messages)
+    given = read_control(tables, table, transform)
+    block = project.block
+    places = {name: row for row, name in enumerate(block.point_ids)}
+    rows = [row for row, name in enumerate(given.names) if name in places]
+    if not rows:
+        raise table.head.error(
+            f"none of the points {listed(given.names, 4)} has an image; --images FILE adds measurements of"
+            " control, --names FILE gives points other names"
+        )
+    missing = [name for name in given.names if name not in places]
+    messages = [*project.messages, *tables.messages]
+    if missing:
+        messages.append(Message(f"control without images is left out: {listed(missing)}", path))
+    targets = np.array([places[given.names[row]] for row in rows])
+    held = [row for row in rows if np.isfinite(given.positions[row]).all()]
+    carried = _carried(
+        project,
+        np.array([places[given.names[row]] for row in held], dtype=np.int64),
+        given.positions[held],
+        transform.frame,
+    )
+    block = carried.block
+    positions, deviation = block.point_positions.copy(), block.point_sd.copy()
+    positions[targets], deviation[targets] = given.positions[rows], given.sd[rows]
+    full = [each for each in given.observed if each.points[0] in places]
+    for each in full:
+        positions[places[each.points[0]]] = np.nan
+    return carried.replace(
+        block=block.replace(
+            point_positions=positions, point_sd=deviation, observations=[*block.observations, *full]
+        ),
+        messages=(*messages, *carried.messages[len(project.messages) :]),
+    )
+
+
+def _carried(
+    project: Project, points: np.ndarray[tuple[int], np.dtype[np.int64]], targets: Floats, frame: Frame
+) -> Project:
+    """Carry a model onto control by a similarity, where it fits so much better than as it stands."""
+    block = project.block
+    model = project.starts[points].copy()
+    unknown = np.flatnonzero(~np.isfinite(model).all(axis=1))
+    model[unknown] = intersected(project, points[unknown])
+    known = np.isfinite(model).all(axis=1)
+    same = replace(project, frame=frame) if frame != project.frame else project
+    if np.count_nonzero(known) < 3 or block.observations or np.isfinite(block.photo_position_sd).any():
+        return same
+    scale, turn, shift, misfit = _similarity(model[known], targets[known])
+    before = float(np.sqrt(np.mean((model[known] - targets[known]) ** 2)))
+    if not (np.isfinite(misfit) and SIMILAR * misfit < before):
+        return same
+    matrices = attitude_matrices(block)
+    posed = np.isfinite(matrices).all(axis=(1, 2))
+    angles = block.photo_attitudes.copy()
+    angles[posed] = Attitudes(turn @ matrices[posed]).values("omega_phi_kappa")
+    message = Message(
+        f"the model is carried onto {np.count_nonzero(known)} control points by a similarity: scale"
+        f" {scale:.6g}, {misfit:.3g} {block.linear_unit} rms left, {before:.3g} before"
+    )
+    return project.replace(
+        block=block.replace(
+            photo_positions=scale * block.photo_positions @ turn.T + shift,
+            photo_attitudes=angles,
+            photo_to_ground=False,
+        ),
+        starts=scale * project.starts @ turn.T + shift,
+        frame=frame,
+        messages=(*project.messages, message),
+    )
+
+
+def _similarity(model: Floats, targets: Floats) -> tuple[float, Floats, Floats, float]:
+    """Return scale, rotation, shift and rms misfit of the similarity between points (Umeyama 1991)."""
+    middle, aim = model.mean(axis=0), targets.mean(axis=0)
+    a, b = model - middle, targets - aim
+    u, s, vt = np.linalg.svd(b.T @ a)
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt)) or 1.0])
+    if s[1] < 1e-9 * s[0] or not s[0] > 0:
+        return 1.0, np.eye(3), np.zeros(3), np.inf
+    turn = (u * signs) @ vt
+    scale = float((s * signs).sum() / (a**2).sum())
+    left = b - scale * a @ turn.T
+    return scale, turn, aim - scale * turn @ middle, float(np.sqrt(np.mean(left**2)))

@@ -1,0 +1,97 @@
+"""The project of an adjusted block, and the tables of its result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.formats.project import Project
+from photogram.io.csv_text import csv_text
+from photogram.results.result import Result
+from photogram.show.ways import columns_of
+
+__all__ = ["adjusted", "table_files"]
+
+_TABLES = {
+    "photos": "photo",
+    "points": "point",
+    "images": "image",
+    "control": "control",
+    "check_points": "check",
+    "stations": "station",
+    "observations": "observation",
+    "cameras": "camera",
+    "unknowns": "unknown",
+}
+"""File and kind of each table."""
+
+
+def adjusted(project: Project, result: Result) -> Project:
+    """Return a project with what was found where it was unknown: what was observed stays as it was given."""
+    block = result.block
+    cameras = [
+        each.camera.replace(
+            parameters={
+                name: float(value) if np.isinf(deviation) else float(given)
+                for name, value, given, deviation in zip(
+                    each.names, each.values, each.given.values, each.given.deviations, strict=True
+                )
+            }
+        )
+        for each in result.cameras
+    ]
+    free = {name: np.isinf(getattr(block, f"photo_{name}_sd")) for name in ("position", "attitude")}
+    starts = np.where(np.isfinite(result.point_positions), result.point_positions, project.starts)
+    own = block.replace(
+        cameras=cameras or block.cameras,
+        photo_positions=np.where(free["position"], result.photo_positions, block.photo_positions),
+        photo_attitudes=np.where(free["attitude"], result.photo_attitudes, block.photo_attitudes),
+    )
+    return project.replace(block=own, starts=starts, lacks=())
+
+
+def table_files(result: Result) -> Mapping[str, bytes]:
+    """Return the tables of a result as text of commas, by the names of files; none without rows."""
+    files = {}
+    for file, kind in _TABLES.items():
+        columns: dict[str, Any] = dict(columns_of(result, kind))
+        if len(next(iter(columns.values()))):
+            files[f"{file}.csv"] = csv_text(columns, _units(result, columns))
+    if np.isfinite(result.photo_cofactors).any():
+        names = ("x", "y", "z", "omega", "phi", "kappa")
+        files["photo_covariances.csv"] = _packed(
+            "photo", result.block.photo_ids, result.photo_covariances, names, result
+        )
+        used = [name for name, there in zip(result.block.point_ids, result.used_points, strict=True) if there]
+        files["point_covariances.csv"] = _packed(
+            "point", used, result.point_covariances[result.used_points], names[:3], result
+        )
+    return files
+
+
+def _units(result: Result, columns: Mapping[str, Any]) -> list[str]:
+    rest = [name for name in columns if name.split("_")[-1] in ("X", "Y", "Z", "height")]
+    unit = result.block.linear_unit
+    return [f"unit of {', '.join(rest)}: {unit}"] if rest else []
+
+
+def _packed(
+    kind: str, names: list[str], covariances: Floats, order: tuple[str, ...], result: Result
+) -> bytes:
+    """Return lower triangles, row by row, one a line."""
+    pairs = [(i, j) for i in range(len(order)) for j in range(i + 1)]
+    columns: dict[str, Any] = {kind: names}
+    columns |= {f"c_{order[i]}_{order[j]}": covariances[:, i, j] for i, j in pairs}
+    unit = result.block.linear_unit
+    return csv_text(
+        columns,
+        [
+            f"covariances, scaled by the variance of unit weight {result.covariance_scale!r};"
+            f" datum: {result.datum}",
+            f"units: {unit} for {', '.join(order[:3])}"
+            + ("" if len(order) == 3 else f", rad for {', '.join(order[3:])}"),
+        ],
+    )

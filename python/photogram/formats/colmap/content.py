@@ -1,0 +1,143 @@
+"""What a COLMAP model holds, as its files have it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from photogram.arguments.types import Floats, Indices
+from photogram.io.places import Place
+
+__all__ = [
+    "CAMERA",
+    "IMU",
+    "MODELS",
+    "NO_POINT",
+    "Camera",
+    "Frame",
+    "Images",
+    "Model",
+    "Points",
+    "Pose",
+    "Rig",
+]
+
+MODELS: tuple[tuple[str, int], ...] = (
+    ("SIMPLE_PINHOLE", 3),
+    ("PINHOLE", 4),
+    ("SIMPLE_RADIAL", 4),
+    ("RADIAL", 5),
+    ("OPENCV", 8),
+    ("OPENCV_FISHEYE", 8),
+    ("FULL_OPENCV", 12),
+    ("FOV", 5),
+    ("SIMPLE_RADIAL_FISHEYE", 4),
+    ("RADIAL_FISHEYE", 5),
+    ("THIN_PRISM_FISHEYE", 12),
+    ("RAD_TAN_THIN_PRISM_FISHEYE", 16),
+    ("SIMPLE_DIVISION", 4),
+    ("DIVISION", 5),
+    ("SIMPLE_FISHEYE", 3),
+    ("FISHEYE", 4),
+    ("EUCM", 6),
+    ("EQUIRECTANGULAR", 2),
+)
+"""Names in the order of their numbers, with how many parameters; those of the house in small letters."""
+NO_POINT = -1
+CAMERA, IMU = "CAMERA", "IMU"
+
+
+@dataclass(frozen=True)
+class Pose:
+    """R and t of a rigid motion: w, x, y, z of its quaternion, and its translation."""
+
+    quaternion: tuple[float, ...]
+    translation: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A line of cameras."""
+
+    number: int
+    model: str
+    width: int
+    height: int
+    parameters: tuple[float, ...]
+    place: Place
+
+
+@dataclass(frozen=True)
+class Images:
+    """The images: n of them, with all features one after the other.
+
+    Attributes
+    ----------
+    numbers, cameras
+        (n,) ids.
+    quaternions, translations
+        (n, 4) w, x, y, z and (n, 3), world to camera.
+    names
+        Of the files.
+    counts
+        (n,) features of each image.
+    xy, points
+        (f, 2) columns and rows from the corner, and (f,) ids of points, `NO_POINT` without.
+    places
+        Where each stands.
+    """
+
+    numbers: Indices
+    cameras: Indices
+    quaternions: Floats
+    translations: Floats
+    names: list[str]
+    counts: Indices
+    xy: Floats
+    points: Indices
+    places: Sequence[Place]
+
+
+@dataclass(frozen=True)
+class Points:
+    """The points: (n,) ids, (n, 3) positions, (n, 3) colours, (n,) how many images the tracks have."""
+
+    numbers: Indices
+    positions: Floats
+    colours: Indices
+    tracks: Indices
+    places: Sequence[Place]
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig: its reference sensor, and the others with their poses, sensor from rig."""
+
+    number: int
+    reference: tuple[str, int] | None
+    sensors: tuple[tuple[str, int, Pose | None], ...]
+    place: Place
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame: the pose of its rig, rig from world, and the images of its sensors."""
+
+    number: int
+    rig: int
+    pose: Pose
+    data: tuple[tuple[str, int, int], ...]
+    place: Place
+
+
+@dataclass(frozen=True)
+class Model:
+    """A whole model; without rigs and frames each camera is a rig, and each image a frame."""
+
+    path: Path
+    cameras: list[Camera]
+    images: Images
+    points: Points
+    rigs: list[Rig] = field(default_factory=list)
+    frames: list[Frame] = field(default_factory=list)

@@ -1,0 +1,238 @@
+"""Coordinate reference systems: in from any that PROJ knows to a cartesian frame, and back.
+
+x is the longitude or easting, y the latitude or northing, z the height, whatever order an authority has.
+A topocentric frame has its axes to the east, north and up of the ellipsoid of WGS 84 at its origin.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.project import Frame
+
+if TYPE_CHECKING:
+    import pyproj
+
+__all__ = ["amid", "east_north_up", "from_frame", "geocentric", "to_frame"]
+
+GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
+ROUND = 1e-4
+"""Degrees to which a chosen origin is rounded; its height to a metre."""
+_ENU = re.compile(r"\s*ENU:\s*([-+.\d]+)\s*,\s*([-+.\d]+)\s*(?:,\s*([-+.\d]+)\s*)?", re.IGNORECASE)
+STEP = 1.0
+"""Metres, for the directions of the axes of a system at a point."""
+
+
+@cache
+def _system(crs: str) -> pyproj.CRS:
+    import pyproj
+
+    try:
+        return pyproj.CRS.from_user_input(crs)
+    except pyproj.exceptions.CRSError as error:
+        raise InputError(f"{crs!r} is no coordinate reference system that PROJ knows: {error}") from None
+
+
+@cache
+def _transformer(source: str, target: str) -> Any:
+    """Return a transformation that never passes heights through for want of a grid."""
+    import pyproj
+
+    first, second = _system(source), _system(target)
+    try:
+        return pyproj.Transformer.from_crs(
+            first, second, always_xy=True, only_best=True, allow_ballpark=False
+        )
+    except pyproj.exceptions.ProjError as error:
+        raise InputError(f"there is no transformation from {source} to {target}: {error}") from None
+
+
+def _transformed(source: str, target: str, xyz: Floats) -> Floats:
+    import pyproj
+
+    transformer = _transformer(source, target)
+    try:
+        found = np.column_stack(transformer.transform(*xyz.T, errcheck=True))
+    except pyproj.exceptions.ProjError as error:
+        hint = ""
+        if _system(source).is_compound or _system(target).is_compound:
+            hint = (
+                "; heights above sea level need the grid of a geoid: give ellipsoidal heights and the"
+                " horizontal system alone, or install the grid (projsync)"
+            )
+        raise InputError(f"cannot be transformed from {source} to {target}: {error}{hint}") from None
+    if not np.isfinite(found).all():
+        row = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
+        raise InputError(f"{xyz[row].tolist()} of {source} has no place in {target}")
+    return found
+
+
+def geocentric(crs: str, xyz: Floats) -> Floats:
+    """Return (n, 3) geocentric coordinates (WGS 84) of positions in a system, metres.
+
+    `ENU:latitude,longitude[,height]` is the topocentric frame there.
+
+    Raises
+    ------
+    InputError
+        A system that PROJ does not know, heights for which a grid is missing, positions beyond the system.
+    """
+    local = enu_origin(crs)
+    if local is not None:
+        return _geocentric_of(local) + xyz @ east_north_up(local)
+    system = _system(crs)
+    if len(system.axis_info) == 2:
+        # Heights pass through a system of two dimensions; the ellipsoidal one that belongs to it says so.
+        crs = _with_heights(crs)
+    return _transformed(crs, GEOCENTRIC, xyz)
+
+
+@cache
+def _with_heights(crs: str) -> str:
+    return str(_system(crs).to_3d().to_wkt())
+
+
+def enu_origin(crs: str) -> tuple[float, float, float] | None:
+    """Return latitude, longitude and height of a system that is written as `ENU:lat,lon[,h]`."""
+    match = _ENU.fullmatch(crs)
+    if match is None:
+        return None
+    return float(match[1]), float(match[2]), float(match[3] or 0.0)
+
+
+def east_north_up(origin: tuple[float, float, float]) -> Floats:
+    """Return (3, 3) E: rows are the directions east, north and up at a place, in geocentric axes."""
+    lat, lon = np.radians(origin[:2])
+    return np.array(
+        [
+            [-np.sin(lon), np.cos(lon), 0.0],
+            [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)],
+            [np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)],
+        ]
+    )
+
+
+def _geocentric_of(origin: tuple[float, float, float]) -> Floats:
+    latitude, longitude, height = origin
+    found: Floats = _transformed(GEOGRAPHIC, GEOCENTRIC, np.array([[longitude, latitude, height]]))[0]
+    return found
+
+
+def amid(crs: str, xyz: Floats) -> tuple[float, float, float]:
+    """Return latitude, longitude and height amid positions, rounded."""
+    middle = _transformed(GEOCENTRIC, GEOGRAPHIC, geocentric(crs, xyz).mean(axis=0)[np.newaxis])[0]
+    return (
+        round(float(middle[1]) / ROUND) * ROUND,
+        round(float(middle[0]) / ROUND) * ROUND,
+        float(round(middle[2])),
+    )
+
+
+def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[Floats, Floats, list[str]]:
+    """Carry positions into the frame of a project.
+
+    Parameters
+    ----------
+    crs
+        The system of the positions.
+    xyz
+        (n, 3) longitude or easting, latitude or northing, height.
+    covariances
+        (n, 3, 3) along east, north and up of the system (of a geocentric one along its axes), metres.
+    frame
+        Topocentric with an origin, geocentric or geographic (WGS 84).
+
+    Returns
+    -------
+    (n, 3) positions and (n, 3, 3) covariances in the frame, and what is to be said about it.
+
+    Raises
+    ------
+    InputError
+        As for :func:`geocentric`.
+    """
+    remarks = _remarks(crs)
+    earth = geocentric(crs, xyz)
+    axes = _axes(crs, xyz, earth)
+    turned = axes.transpose(0, 2, 1) @ covariances @ axes
+    if frame.kind == "geocentric":
+        return earth, turned, remarks
+    if frame.kind == "geographic":
+        found = _transformed(GEOCENTRIC, GEOGRAPHIC, earth)
+        local = np.array([east_north_up((lat, lon, 0.0)) for lon, lat, _ in found.tolist()])
+        found[:, :2] = np.radians(found[:, :2])
+        return found, local @ turned @ local.transpose(0, 2, 1), remarks
+    if frame.origin is None:
+        raise InputError("a topocentric frame has an origin")
+    rows = east_north_up(frame.origin)
+    return (earth - _geocentric_of(frame.origin)) @ rows.T, rows @ turned @ rows.T, remarks
+
+
+def from_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[Floats, Floats]:
+    """Carry positions of a frame into a system, with covariances along its own east, north and up, metres.
+
+    Raises
+    ------
+    InputError
+        A frame that has no place on the earth, or as for :func:`geocentric`.
+    """
+    if frame.kind == "topocentric" and frame.origin is not None:
+        rows = east_north_up(frame.origin)
+        earth, turned = _geocentric_of(frame.origin) + xyz @ rows, rows.T @ covariances @ rows
+    elif frame.kind == "geocentric":
+        earth, turned = xyz, covariances
+    else:
+        raise InputError(f"a frame that is {frame} has no known place on the earth")
+    if (local := enu_origin(crs)) is not None:
+        rows = east_north_up(local)
+        return (earth - _geocentric_of(local)) @ rows.T, rows @ turned @ rows.T
+    target = _with_heights(crs) if len(_system(crs).axis_info) == 2 else crs
+    found = _transformed(GEOCENTRIC, target, earth)
+    axes = _axes(crs, found, earth)
+    return found, axes @ turned @ axes.transpose(0, 2, 1)
+
+
+def _axes(crs: str, xyz: Floats, earth: Floats) -> Floats:
+    """Return (n, 3, 3) rows: the directions of a system's axes at points, in geocentric axes.
+
+    Of a projected system they are those of its grid, so that the convergence of meridians is in them.
+    """
+    if (local := enu_origin(crs)) is not None:
+        return np.broadcast_to(east_north_up(local), (len(xyz), 3, 3)).copy()
+    system = _system(crs)
+    if system.is_geocentric:
+        return np.broadcast_to(np.eye(3), (len(xyz), 3, 3)).copy()
+    geographic = _transformed(GEOCENTRIC, GEOGRAPHIC, earth)
+    found = np.array([east_north_up((lat, lon, h)) for lon, lat, h in geographic.tolist()])
+    if system.is_projected or (system.is_compound and system.sub_crs_list[0].is_projected):
+        north = geocentric(crs, xyz + np.array([0.0, STEP, 0.0])) - earth
+        local = np.einsum("nij,nj->ni", found, north)
+        angle = np.arctan2(local[:, 0], local[:, 1])
+        zero, one = np.zeros_like(angle), np.ones_like(angle)
+        turn = np.array(
+            [[np.cos(angle), -np.sin(angle), zero], [np.sin(angle), np.cos(angle), zero], [zero, zero, one]]
+        ).transpose(2, 0, 1)
+        found = turn @ found
+    return found
+
+
+def _remarks(crs: str) -> list[str]:
+    if enu_origin(crs) is not None:
+        return []
+    system = _system(crs)
+    remarks = []
+    if len(system.axis_info) == 2:
+        remarks.append(f"{crs} says nothing of heights: they are taken as ellipsoidal")
+    if system.datum is not None and "dynamic" in system.datum.type_name.lower():
+        remarks.append(f"{crs} is of a datum that moves: the epoch is not regarded")
+    if system.axis_info and system.axis_info[0].direction == "north":
+        remarks.append(
+            f"{crs} has the northing or latitude first: x was read as easting or longitude all the same"
+        )
+    return remarks

@@ -1,0 +1,68 @@
+"""What a format is: how its files are known, and how projects are read from them and written to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from photogram.formats.project import Project
+from photogram.results.result import Result
+
+__all__ = ["Format", "Wishes"]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a user says of files that do not say it themselves.
+
+    Attributes
+    ----------
+    cameras
+        A table of cameras (that of the plain project) for formats without; None: those of the files.
+    pixel_origin
+        `corner` or `center` of the first pixel is 0, 0, in tables of pixels; None: as the format has it.
+    model
+        Which of several models of one file, counted from 0; None: the largest.
+    angles
+        `deg`, `gon` or `rad` where a file has angles and does not say which.
+    sd
+        Standard deviations by table where files have none: one number or three.
+    """
+
+    cameras: Path | None = None
+    pixel_origin: str | None = None
+    model: int | None = None
+    angles: str | None = None
+    sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of projects.
+
+    Attributes
+    ----------
+    name
+        As commands and functions take it.
+    title
+        As people are told what lies there.
+    recognises
+        Whether what lies at a path is meant for one; it reads no more than the beginning of a file.
+    read
+        A project. Raises `InputError` that names file, record and what stands there, and nothing else.
+    write
+        The files of a project, by their names below a directory; None where the format is only read.
+    cannot_hold
+        What of a project gets lost in the format, in sentences.
+    results
+        Files with what an adjustment found that go beside an adjusted project in the format; None: none.
+    """
+
+    name: str
+    title: str
+    recognises: Callable[[Path], bool]
+    read: Callable[[Path, Wishes], Project]
+    write: Callable[[Project], Mapping[str, bytes]] | None = None
+    cannot_hold: Callable[[Project], list[str]] = lambda _: []
+    results: Callable[[Project, Result], Mapping[str, bytes]] | None = None

@@ -1,0 +1,75 @@
+"""Image coordinates of files and of cameras: pixels from the corner, or what a model counts in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.project import Project, Size
+from photogram.network.cameras import Camera
+
+__all__ = ["from_corner", "sizes_of", "to_corner"]
+
+
+def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
+    """Return (m, 2) image coordinates of a camera in pixels from columns and rows from the upper-left corner.
+
+    Models that count y upwards count from the middle of the picture.
+
+    Raises
+    ------
+    InputError
+        Such a camera whose pictures have no known size.
+    """
+    if camera.image_y == "down":
+        return corner
+    width, height = _size(camera, size)
+    found: Floats = np.column_stack([corner[:, 0] - width / 2, height / 2 - corner[:, 1]])
+    return found
+
+
+def to_corner(project: Project) -> Floats:
+    """Return (m, 2) columns and rows from the upper-left corner, pixels.
+
+    Raises
+    ------
+    InputError
+        A camera in millimetres without the size of a pixel, one whose pictures have no known size.
+    """
+    block = project.block
+    found = block.image_xy.copy()
+    assert block.photo_cameras is not None
+    cameras = block.photo_cameras[block.image_photos]
+    for row, camera in enumerate(block.cameras):
+        own = cameras == row
+        xy = found[own]
+        if camera.unit == "mm":
+            pixel = project.pixel_mm[row]
+            if pixel is None:
+                raise InputError(f"the camera {camera.title} is in millimetres and has no pixel_mm")
+            xy = xy / pixel
+        if camera.image_y == "up":
+            width, height = _size(camera, project.sizes[row])
+            xy = np.column_stack([xy[:, 0] + width / 2, height / 2 - xy[:, 1]])
+        found[own] = xy
+    return found
+
+
+def _size(camera: Camera, size: Size | None) -> Size:
+    if size is None:
+        raise InputError(f"the size of the pictures of the camera {camera.title} is not known")
+    return size
+
+
+def sizes_of(project: Project) -> Sequence[Size]:
+    """Return width and height of the pictures of each camera.
+
+    Raises
+    ------
+    InputError
+        One that is not known.
+    """
+    return [_size(each, size) for each, size in zip(project.block.cameras, project.sizes, strict=True)]

@@ -1,0 +1,54 @@
+"""Where the rays of points come nearest to each other, by the poses of a project."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.formats.plain.writing import attitude_matrices
+from photogram.formats.project import Project
+from photogram.network.directions import image_directions
+
+__all__ = ["complete_positions", "intersected"]
+
+STEEPEST = 1e12
+"""Condition of the normal equations of a point beyond which its rays are parallel."""
+
+
+def intersected(project: Project, points: Indices) -> Floats:
+    """Return (k, 3) where the rays of points come nearest; NaN where they do not meet."""
+    block = project.block
+    found = np.full((len(points), 3), np.nan)
+    if not len(points) or block.geographic:
+        return found
+    places = np.full(len(block.point_ids), -1, dtype=np.int64)
+    places[points] = np.arange(len(points))
+    rows = np.flatnonzero(places[block.image_points] >= 0)
+    own = block.replace(
+        image_photos=block.image_photos[rows],
+        image_points=block.image_points[rows],
+        image_xy=block.image_xy[rows],
+        image_sd=block.image_sd[rows],
+    )
+    photos = own.image_photos
+    rays = np.einsum("nij,nj->ni", attitude_matrices(block)[photos], image_directions(own))
+    centres = block.photo_positions[photos]
+    good: Bools = np.asarray(np.isfinite(np.hstack([rays, centres])).all(axis=1))
+    across = np.eye(3) - rays[good, :, np.newaxis] * rays[good, np.newaxis, :]
+    owner = places[own.image_points[good]]
+    normal, right = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
+    np.add.at(normal, owner, across)
+    np.add.at(right, owner, np.einsum("nij,nj->ni", across, centres[good]))
+    counts = np.bincount(owner, minlength=len(points))
+    firm = np.flatnonzero(counts >= 2)
+    firm = firm[np.linalg.cond(normal[firm]) < STEEPEST]
+    found[firm] = np.linalg.solve(normal[firm], right[firm][..., np.newaxis])[..., 0]
+    return found
+
+
+def complete_positions(project: Project) -> Floats:
+    """Return (n, 3) the best that is known of points, intersected where a file says nothing; else NaN."""
+    found = project.positions()
+    missing = np.flatnonzero(~np.isfinite(found).all(axis=1))
+    found[missing] = intersected(project, missing)
+    return found

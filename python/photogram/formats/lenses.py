@@ -1,0 +1,102 @@
+"""Cameras of one family, forward Brown about a principal point, under the names of other packages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from photogram.formats.project import Size
+from photogram.network.cameras import Camera
+
+__all__ = ["Lens", "lens_of"]
+
+_FAMILY = frozenset(
+    {
+        "bal",
+        "radial",
+        "simple_radial",
+        "simple_pinhole",
+        "pinhole",
+        "opencv",
+        "full_opencv",
+        "opencv_pinhole",
+        "agisoft_frame",
+    }
+)
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A camera in pixels whose lens is that of OpenCV, y down; p1 belongs to r^2 + 2 y^2 in y.
+
+    Attributes
+    ----------
+    fx, fy
+        Principal distances.
+    cx, cy
+        Principal point from the upper-left corner.
+    k1 .. k6, p1, p2
+        Terms; k4 .. k6 are of the denominator.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    k1: float = 0.0
+    k2: float = 0.0
+    k3: float = 0.0
+    k4: float = 0.0
+    k5: float = 0.0
+    k6: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+
+    @property
+    def terms(self) -> tuple[float, ...]:
+        """k1, k2, p1, p2, k3, k4, k5, k6."""
+        return self.k1, self.k2, self.p1, self.p2, self.k3, self.k4, self.k5, self.k6
+
+    def is_plain(self, *names: str) -> bool:
+        """Whether nothing but the named terms is there."""
+        all_terms = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
+        return not any(getattr(self, name) for name in all_terms if name not in names)
+
+
+def lens_of(camera: Camera, size: Size | None) -> Lens | None:
+    """Return a camera as one of the family, to the last digit; None where it is none.
+
+    A camera that counts from the middle of the picture needs its size.
+    """
+    values = camera.parameters
+    if camera.unit != "px" or camera.model not in _FAMILY:
+        return None
+    if camera.model == "opencv_pinhole" and any(values[name] for name in ("s1", "s2", "s3", "s4")):
+        return None
+    terms = {
+        name: values[name] for name in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2") if name in values
+    }
+    if camera.model == "agisoft_frame":
+        if values["b2"] or values["k4"]:
+            return None
+        terms = {
+            "k1": values["k1"],
+            "k2": values["k2"],
+            "k3": values["k3"],
+            "p1": values["p2"],
+            "p2": values["p1"],
+        }
+        return Lens(
+            values["f"] + values["b1"],
+            values["f"],
+            values["w"] / 2 + values["cx"],
+            values["h"] / 2 + values["cy"],
+            **terms,
+        )
+    if camera.model == "bal":
+        if size is None:
+            return None
+        return Lens(values["f"], values["f"], size[0] / 2, size[1] / 2, **terms)
+    if "k" in values:
+        terms = {"k1": values["k"]}
+    fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
+    return Lens(fx, fy, values["cx"], values["cy"], **terms)

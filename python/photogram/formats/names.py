@@ -1,0 +1,77 @@
+"""Names of points beside formats that number them: `names.csv` with the columns `point` and `name`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from photogram.formats.plain.tables import indices_of
+from photogram.formats.project import Project
+from photogram.io.csv_text import csv_text
+from photogram.io.delimited import read_columns
+from photogram.messages import Message
+
+__all__ = ["NAMES", "names_file", "numbered", "renamed", "with_names"]
+
+NAMES = "names.csv"
+LARGEST = 2**53
+
+
+def with_names(project: Project, path: Path) -> Project:
+    """Return a project with points under other names: a table with the columns `point` and `name`.
+
+    Raises
+    ------
+    InputError
+        Points that are not there, two points of one name.
+    """
+    table = read_columns(path, known=("point", "name"))
+    table.require("point", "name")
+    places = {name: row for row, name in enumerate(project.block.point_ids)}
+    rows, names = indices_of(table, "point", places, "point").tolist(), table.texts("name")
+    table.names("name")
+    ids = list(project.block.point_ids)
+    for place, name in zip(rows, names, strict=True):
+        ids[place] = name
+    taken: dict[str, int] = {}
+    for row, name in enumerate(ids):
+        if taken.setdefault(name, row) != row:
+            first = next(k for k, each in enumerate(names) if each == name)
+            raise table.error(first, f"two points would have the name {name}")
+    messages = (*project.messages, Message(f"{len(rows)} points have the names of {path.name}", path))
+    colours = project.details.get("colours", {})
+    new = dict(zip(project.block.point_ids, ids, strict=True))
+    details = {
+        **project.details,
+        "colours": {new.get(point, point): colour for point, colour in colours.items()},
+    }
+    details["point numbers"] = {name: old for old, name in new.items() if old.isdigit()}
+    return project.replace(
+        block=project.block.replace(point_ids=ids, observations=project.block.observations),
+        messages=messages,
+        details=details,
+    )
+
+
+def renamed(project: Project, path: Path) -> Project:
+    """Return a project with the names of a table, where it lies there."""
+    return with_names(project, path) if path.is_file() else project
+
+
+def numbered(names: Sequence[str], known: Mapping[str, str | int] | None = None) -> dict[str, int]:
+    """Return a number for each name: those known, its own where all are numbers, else 1, 2, ..."""
+    given = known or {}
+    if all(name in given for name in names):
+        return {name: int(given[name]) for name in names}
+    if all(
+        name.isascii() and name.isdigit() and str(int(name)) == name and int(name) < LARGEST for name in names
+    ):
+        return {name: int(name) for name in names}
+    return {name: number for number, name in enumerate(names, 1)}
+
+
+def names_file(numbers: Mapping[str, int]) -> dict[str, bytes]:
+    """Return the table of names, if there are others than the numbers themselves."""
+    if all(str(number) == name for name, number in numbers.items()):
+        return {}
+    return {NAMES: csv_text({"point": list(numbers.values()), "name": list(numbers)})}

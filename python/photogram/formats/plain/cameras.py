@@ -1,0 +1,156 @@
+"""The table of cameras."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from photogram import _photocore
+from photogram.errors import InputError
+from photogram.formats.plain.tables import Tables
+from photogram.formats.project import Size
+from photogram.io.delimited import ColumnTable
+from photogram.messages import quoted
+from photogram.network.cameras import Camera
+
+__all__ = ["Cameras", "read_cameras", "spread_over_photos"]
+
+_MODELS = dict(_photocore.camera_models())
+_EACH = ("all", "photo", "group")
+
+
+@dataclass(frozen=True)
+class Cameras:
+    """The cameras of a project: with the size of their pictures, and whether photos have their own."""
+
+    cameras: list[Camera]
+    sizes: list[Size | None]
+    pixel_mm: list[float | None]
+    for_each: list[str]
+
+
+def read_cameras(tables: Tables) -> Cameras:
+    """Read the table of cameras.
+
+    Raises
+    ------
+    InputError
+        There is none, a model that there is not, a parameter that is missing or that the model does not have.
+    """
+    table = tables.read("cameras")
+    if table is None:
+        raise InputError("has no table of cameras (cameras.csv)", file=tables.settings.path)
+    if not table.count:
+        raise table.head.error("the table names no cameras")
+    found = Cameras([], [], [], [])
+    names = table.texts("camera")
+    table.names("camera")
+    for row, name in enumerate(names):
+        if name in names[:row]:
+            raise table.error(row, f"the camera {name} is there twice")
+        each = table.texts("for_each", "all")[row].lower()
+        if each not in _EACH:
+            raise table.error(row, f"column for_each: {quoted(each)} is none of {', '.join(_EACH)}")
+        size = _size(table, row)
+        try:
+            found.cameras.append(_camera(tables, table, row, size))
+        except InputError as error:
+            raise (error if error.file else table.error(row, error.message)) from None
+        found.sizes.append(size)
+        pixel = table.numbers("pixel_mm")[row]
+        found.pixel_mm.append(None if math.isnan(pixel) else float(pixel))
+        found.for_each.append(each)
+    return found
+
+
+def _size(table: ColumnTable, row: int) -> Size | None:
+    width, height = (float(table.numbers(name)[row]) for name in ("width", "height"))
+    if math.isnan(width) or math.isnan(height):
+        return None
+    for name, value in (("width", width), ("height", height)):
+        if not (0 < value < 2**31 and value == int(value)):
+            raise table.error(row, f"column {name}: {value:g} is no number of pixels")
+    return int(width), int(height)
+
+
+def _camera(tables: Tables, table: ColumnTable, row: int, size: Size | None) -> Camera:
+    given = {name: table.numbers(name)[row] for name in table.columns if name in _ALL}
+    known = {name: float(value) for name, value in given.items() if not math.isnan(value)}
+    default = "brown" if "c" in known and not known.keys() & {"f", "fx"} else "pinhole"
+    model = table.texts("model", default)[row].lower()
+    if model not in _MODELS:
+        raise table.error(row, f"column model: there is no {quoted(model)}, but {', '.join(_MODELS)}")
+    powers = dict(_MODELS[model][1])
+    own = {name.lower(): name for name in powers}
+    image = tables.settings.image
+    if size is None and "w" in own:
+        raise table.error(row, f"columns width and height are needed by the model {model}")
+    parameters = _spread(own, known)
+    if model == "perspective" and "c" in parameters:
+        # In files a principal distance is positive for the positive plane; the model has it negative there.
+        parameters["c"] = -parameters["c"]
+    deviations = _spread(
+        own,
+        {
+            name: float(value)
+            for name in (each.removeprefix("sd_") for each in table.columns if each.startswith("sd_"))
+            if not math.isnan(value := table.numbers(f"sd_{name}", infinite=True)[row])
+        },
+    )
+    if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
+        raise table.error(row, f"the model {model} has no {strange[0]}, but {', '.join(powers)}")
+    scale = 1e-3 if image == "um" else 1.0
+    values = {own[k]: v * scale ** powers[own[k]] for k, v in parameters.items() if k in own}
+    if size is not None and image == "px":
+        if "w" in own:
+            values |= {own["w"]: float(size[0]), own["h"]: float(size[1])}
+        elif "cx" in own:
+            values = {own["cx"]: size[0] / 2, own["cy"]: size[1] / 2} | values
+    elif "cx" in own and image != "px":
+        values = {own["cx"]: 0.0, own["cy"]: 0.0} | values
+    constants = Camera(model, dict.fromkeys(powers, 1.0), unit="mm").constants
+    return Camera(
+        model,
+        values,
+        {
+            own[k]: v * scale ** powers[own[k]]
+            for k, v in deviations.items()
+            if k in own and own[k] not in constants
+        },
+        name=table.texts("camera")[row],
+        unit="px" if image == "px" else "mm",
+    )
+
+
+def _spread(own: dict[str, str], values: dict[str, float]) -> dict[str, float]:
+    """Return values by parameter: one focal length is that of both axes."""
+    if "f" in values and "f" not in own and "fx" in own:
+        values = {"fx": values["f"], "fy": values["f"], **{k: v for k, v in values.items() if k != "f"}}
+    return values
+
+
+_ALL = frozenset(name.lower() for facts in _MODELS.values() for name, _ in facts[1])
+
+
+def spread_over_photos(
+    cameras: Cameras, photo_cameras: Sequence[int], photos: Sequence[str], groups: Sequence[str]
+) -> tuple[Cameras, list[int]]:
+    """Give photos, or groups of them, cameras of their own where the table says so."""
+    if set(cameras.for_each) == {"all"}:
+        return cameras, list(photo_cameras)
+    found = Cameras([], [], [], [])
+    places: dict[tuple[int, str], int] = {}
+    of_photos = []
+    for row, photo, group in zip(photo_cameras, photos, groups, strict=True):
+        each = cameras.for_each[row]
+        own = "" if each == "all" else photo if each == "photo" else group
+        if (row, own) not in places:
+            places[row, own] = len(found.cameras)
+            camera = cameras.cameras[row]
+            found.cameras.append(camera.replace(name=f"{camera.name}/{own}") if own else camera)
+            found.sizes.append(cameras.sizes[row])
+            found.pixel_mm.append(cameras.pixel_mm[row])
+            found.for_each.append("all")
+        of_photos.append(places[row, own])
+    return found, of_photos

@@ -1,0 +1,281 @@
+"""`project.toml`: units, axes, frame, standard deviations and options of a plain project."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn, cast
+
+from photogram.errors import InputError
+from photogram.formats.project import DatumName, Frame, Options
+from photogram.io.files import read_bytes
+from photogram.io.places import Place
+
+__all__ = ["TABLES", "Settings", "read_settings"]
+
+VERSION = 1
+TABLES = (
+    "cameras",
+    "photos",
+    "images",
+    "points",
+    "control",
+    "distances",
+    "height_differences",
+    "coordinate_differences",
+    "gnss",
+    "gnss_groups",
+    "attitudes",
+    "attitude_groups",
+    "rigs",
+    "frames",
+)
+"""In the order in which they are read and written."""
+WITH_CRS = ("control", "gnss", "points", "photos")
+WITH_SD = (
+    "images",
+    "control",
+    "points",
+    "gnss",
+    "photos",
+    "attitudes",
+    "distances",
+    "height_differences",
+    "coordinate_differences",
+)
+ENDINGS = (".csv", ".tsv", ".txt", ".parquet")
+
+_CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
+    ("frame", "kind"): ("cartesian", "topocentric", "geocentric", "geographic"),
+    ("units", "length"): ("m", "mm", "ft", "us-ft"),
+    ("units", "angle"): ("deg", "gon", "rad", "dms"),
+    ("units", "image"): ("px", "mm", "um"),
+    ("axes", "image_y"): ("down", "up"),
+    ("axes", "pixel_origin"): ("corner", "center"),
+    ("axes", "attitude"): (
+        "omega_phi_kappa",
+        "phi_omega_kappa",
+        "yaw_pitch_roll",
+        "azimuth_tilt_swing",
+        "quaternion",
+        "rotation_vector",
+        "matrix",
+    ),
+    ("axes", "rotation"): ("object_to_photo", "photo_to_object"),
+    ("axes", "photo"): ("y_up", "y_down"),
+    ("adjust", "datum"): ("control", "minimum", "inner"),
+    ("adjust", "loss"): ("none", "huber", "cauchy"),
+    ("adjust", "unit_variance"): ("free", "constrained", "unity"),
+}
+"""Words that a key may have; the first is the default."""
+_KEYS: Mapping[str, tuple[str, ...]] = {
+    "project": ("format", "name"),
+    "frame": ("kind", "crs", "origin"),
+    "units": ("length", "angle", "image"),
+    "axes": ("image_y", "pixel_origin", "attitude", "rotation", "photo"),
+    "sd": WITH_SD,
+    "tables": TABLES,
+    "adjust": ("datum", "loss", "unit_variance"),
+    **dict.fromkeys(WITH_CRS, ("crs",)),
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What `project.toml` says, defaults filled in.
+
+    Attributes
+    ----------
+    path
+        The file.
+    name
+        Of the project.
+    frame, options
+        As in a project.
+    length, angle, image
+        Units.
+    image_y, pixel_origin, attitude, rotation, photo
+        Axes.
+    sd
+        Standard deviations of tables without columns for them: three numbers, of images two.
+    tables
+        The file of each table that is there.
+    crs
+        Of tables whose coordinates are not in the frame.
+    """
+
+    path: Path
+    name: str
+    frame: Frame
+    options: Options
+    length: str
+    angle: str
+    image: str
+    image_y: str
+    pixel_origin: str
+    attitude: str
+    rotation: str
+    photo: str
+    sd: Mapping[str, tuple[float, ...]]
+    tables: Mapping[str, Path]
+    crs: Mapping[str, str]
+
+
+def read_settings(path: Path) -> Settings:
+    """Read a file of settings, and find the tables that it names or that lie beside it.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is no TOML; a section or key that there is not, with the nearest one; a
+        value that cannot be; two files of one table.
+    """
+    file = _File(path)
+    file.check_keys()
+    version = file.value("project", "format", None)
+    if isinstance(version, bool) or version != VERSION:
+        message = "[project] format is missing" if version is None else f"has format {version!r}"
+        file.fail("format", f"{message}: this is version {VERSION} of the schema, `format = {VERSION}`")
+    image = file.word("units", "image")
+    return Settings(
+        path=path,
+        name=file.text("project", "name"),
+        frame=Frame(file.word("frame", "kind"), file.text("frame", "crs"), file.origin()),
+        options=Options(
+            cast("DatumName | None", file.word("adjust", "datum") if file.has("adjust", "datum") else None),
+            cast("Any", {"none": None}.get(loss := file.word("adjust", "loss"), loss)),
+            cast("Any", file.word("adjust", "unit_variance")),
+        ),
+        length=file.word("units", "length"),
+        angle=file.word("units", "angle"),
+        image=image,
+        image_y=file.word("axes", "image_y")
+        if file.has("axes", "image_y")
+        else ("down" if image == "px" else "up"),
+        pixel_origin=file.word("axes", "pixel_origin"),
+        attitude=file.word("axes", "attitude"),
+        rotation=file.word("axes", "rotation"),
+        photo=file.word("axes", "photo"),
+        sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)},
+        tables=_tables(file),
+        crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
+    )
+
+
+class _File:
+    """A file of settings whose errors name the line."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self.lines = read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n").split("\n")
+            self.content: dict[str, Any] = tomllib.loads("\n".join(self.lines))
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"is no text of UTF-8: {error.reason} at byte {error.start}", file=path
+            ) from None
+        except tomllib.TOMLDecodeError as error:
+            where = re.search(r"at line (\d+)", str(error))
+            record = int(where[1]) if where else None
+            text = self.lines[record - 1] if record and record <= len(self.lines) else None
+            raise InputError(f"is no TOML: {error}", file=path, record=record, text=text) from None
+        except RecursionError:
+            raise InputError("is nested too deep", file=path) from None
+
+    def fail(self, key: str, message: str) -> NoReturn:
+        """Raise an error at the first line that has the key."""
+        pattern = re.compile(rf"^\s*\[?\[?\s*[\"']?{re.escape(key)}[\"']?\s*[\]=.]")
+        for record, line in enumerate(self.lines, 1):
+            if pattern.match(line):
+                raise Place(self.path, record, line).error(message)
+        raise Place(self.path).error(message)
+
+    def check_keys(self) -> None:
+        """Refuse sections and keys that there are not."""
+        for section, values in self.content.items():
+            if section not in _KEYS:
+                self.fail(section, f"there is no section [{section}]{_nearest(section, _KEYS)}")
+            if not isinstance(values, dict):
+                self.fail(section, f"{section} is no section")
+            for key in values:
+                if key not in _KEYS[section]:
+                    self.fail(key, f"[{section}] has no key {key}{_nearest(key, _KEYS[section])}")
+
+    def has(self, section: str, key: str) -> bool:
+        """Whether a key is there."""
+        return key in self.content.get(section, {})
+
+    def value(self, section: str, key: str, default: Any) -> Any:
+        """Return what a key has."""
+        return self.content.get(section, {}).get(key, default)
+
+    def text(self, section: str, key: str) -> str:
+        """Return a text; empty where the key is not there."""
+        value = self.value(section, key, "")
+        if not isinstance(value, str):
+            self.fail(key, f"{key} is no text: {value!r}")
+        return value
+
+    def word(self, section: str, key: str) -> str:
+        """Return one of the words of a key."""
+        words = _CHOICES[section, key]
+        value = self.value(section, key, words[0])
+        if value not in words:
+            self.fail(key, f"{key} is one of {', '.join(words)}, not {value!r}")
+        return str(value)
+
+    def numbers(self, section: str, key: str, counts: tuple[int, ...]) -> tuple[float, ...]:
+        """Return a number, or some of them."""
+        value = self.value(section, key, None)
+        listed = value if isinstance(value, list) else [value]
+        good = all(isinstance(each, int | float) and not isinstance(each, bool) for each in listed)
+        if not good or len(listed) not in counts:
+            self.fail(key, f"{key} is {' or '.join(map(str, counts))} numbers, not {value!r}")
+        return tuple(float(each) if abs(each) < 2**1023 else math.inf for each in listed)
+
+    def origin(self) -> tuple[float, float, float] | None:
+        """Return latitude, longitude, height."""
+        if not self.has("frame", "origin"):
+            return None
+        latitude, longitude, height = self.numbers("frame", "origin", (3,))
+        if not (abs(latitude) <= 90 and abs(longitude) <= 360 and math.isfinite(height)):
+            self.fail("origin", "origin is latitude and longitude in degrees, and the ellipsoidal height")
+        return latitude, longitude, height
+
+    def deviations(self, table: str) -> tuple[float, ...]:
+        """Return standard deviations of a table."""
+        counts = (1, 2) if table == "images" else (1,) if table.endswith("ances") else (1, 3)
+        found = self.numbers("sd", table, counts)
+        if not all(each >= 0 for each in found):
+            self.fail(table, f"{list(found)} is no standard deviation")
+        return found
+
+
+def _nearest(word: str, known: Any) -> str:
+    close = difflib.get_close_matches(word, list(known), 1, 0.5)
+    return f"; did you mean {close[0]}?" if close else f", but {', '.join(known)}"
+
+
+def _tables(file: _File) -> dict[str, Path]:
+    folder = file.path.parent
+    found: dict[str, Path] = {}
+    for name in TABLES:
+        if file.has("tables", name):
+            found[name] = folder / file.text("tables", name)
+            if not found[name].is_file():
+                file.fail(name, f"the table {name} is not there: {found[name]}")
+            continue
+        present = [path for ending in ENDINGS if (path := folder / f"{name}{ending}").is_file()]
+        if len(present) > 1:
+            names = " and ".join(path.name for path in present)
+            raise InputError(
+                f"two files for the table {name}: {names}; name one under [tables]", file=file.path
+            )
+        if present:
+            found[name] = present[0]
+    return found

@@ -1,0 +1,329 @@
+"""The tables of a plain project: which columns they have, and how cells become numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
+from photogram.formats.plain.settings import Settings
+from photogram.io.delimited import ColumnTable, read_columns
+from photogram.messages import Message, listed, quoted
+from photogram.network.attitudes import Attitudes, Representation
+
+__all__ = ["ANGLES", "AXES", "COLUMNS", "Tables", "covariances_of", "indices_of", "matrices_of"]
+
+AXES = ("x", "y", "z")
+ANGLES: Mapping[str, tuple[str, ...]] = {
+    "omega_phi_kappa": ("omega", "phi", "kappa"),
+    "phi_omega_kappa": ("phi", "omega", "kappa"),
+    "yaw_pitch_roll": ("yaw", "pitch", "roll"),
+    "azimuth_tilt_swing": ("azimuth", "tilt", "swing"),
+    "quaternion": ("qw", "qx", "qy", "qz"),
+    "rotation_vector": ("rx", "ry", "rz"),
+    "matrix": ("m11", "m12", "m13", "m21", "m22", "m23", "m31", "m32", "m33"),
+}
+"""Columns of each representation of attitudes."""
+_ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
+_SD_ANGLES = tuple(f"sd_{name}" for name in _ALL_ANGLES[:8] if not name.startswith(("q", "m")))
+_ROTATIONS = ("sd_rotation_x", "sd_rotation_y", "sd_rotation_z")
+_SD = tuple(f"sd_{axis}" for axis in AXES)
+_COVARIANCES = ("cov_xy", "cov_xz", "cov_yz")
+
+
+def _parameters() -> tuple[str, ...]:
+    names = {name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}
+    return tuple(sorted(names))
+
+
+_PARAMETERS = _parameters()
+
+COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "cameras": (
+        "camera",
+        "model",
+        "width",
+        "height",
+        "pixel_mm",
+        "for_each",
+        *_PARAMETERS,
+        *(f"sd_{name}" for name in _PARAMETERS),
+    ),
+    "photos": (
+        "photo",
+        "camera",
+        *AXES,
+        *_ALL_ANGLES,
+        *_SD,
+        *_SD_ANGLES,
+        *_ROTATIONS,
+        "group",
+        "strip",
+        "frame",
+        "time",
+        "use",
+    ),
+    "images": (
+        "photo",
+        "point",
+        "column",
+        "row",
+        "x",
+        "y",
+        "sd",
+        "sd_x",
+        "sd_y",
+        "sd_column",
+        "sd_row",
+        "correlation",
+        "use",
+    ),
+    "points": ("point", *AXES, *_SD),
+    "control": ("point", *AXES, "sd", *_SD, *_COVARIANCES, "use"),
+    "gnss": ("photo", *AXES, "sd", *_SD, *_COVARIANCES, "group", "time"),
+    "gnss_groups": (
+        "group",
+        *(f"{kind}{axis}" for kind in ("lever_", "sd_lever_", "sd_shift_", "sd_drift_") for axis in AXES),
+        "shift",
+        "drift",
+    ),
+    "attitudes": ("photo", *_ALL_ANGLES, *_SD_ANGLES, *_ROTATIONS, "group"),
+    "attitude_groups": ("group", *_ALL_ANGLES, *_ROTATIONS),
+    "distances": ("from", "to", "distance", "sd"),
+    "height_differences": ("from", "to", "dz", "sd"),
+    "coordinate_differences": ("from", "to", "dx", "dy", "dz", "sd", "sd_dx", "sd_dy", "sd_dz"),
+    "rigs": ("rig", "camera", *AXES, *_ALL_ANGLES, *_SD, *_ROTATIONS),
+    "frames": ("frame", "rig", "photo"),
+}
+"""Columns that a table may have."""
+REQUIRED: Mapping[str, tuple[str, ...]] = {
+    "cameras": ("camera",),
+    "photos": ("photo",),
+    "images": ("photo", "point"),
+    "points": ("point", *AXES),
+    "control": ("point",),
+    "gnss": ("photo", *AXES),
+    "gnss_groups": ("group",),
+    "attitudes": ("photo",),
+    "attitude_groups": ("group",),
+    "distances": ("from", "to", "distance"),
+    "height_differences": ("from", "to", "dz"),
+    "coordinate_differences": ("from", "to", "dx", "dy", "dz"),
+    "rigs": ("rig", "camera"),
+    "frames": ("frame", "rig", "photo"),
+}
+SYNONYMS: Mapping[str, str] = {
+    "easting": "x",
+    "northing": "y",
+    "longitude": "x",
+    "latitude": "y",
+    "height": "z",
+    "altitude": "z",
+    "elevation": "z",
+}
+"""Of coordinates; tables of cameras have a height of their own."""
+_TEXTS = frozenset(
+    {
+        "camera",
+        "model",
+        "for_each",
+        "photo",
+        "point",
+        "group",
+        "strip",
+        "frame",
+        "rig",
+        "from",
+        "to",
+        "use",
+        "shift",
+        "drift",
+    }
+)
+
+_DMS = re.compile(r"([+-]?)(\d+)[\s:°d-]+(\d+)(?:[\s:'m-]+(\d+(?:\.\d*)?))?[\s\"s]*")
+
+
+@dataclass(frozen=True)
+class Tables:
+    """The tables of a project with its settings, read as they are asked for; collects remarks."""
+
+    settings: Settings
+    messages: list[Message]
+
+    def read(self, name: str) -> ColumnTable | None:
+        """Return a table that is there.
+
+        Raises
+        ------
+        InputError
+            It cannot be read, or a column is missing.
+        """
+        if name not in self.settings.tables:
+            return None
+        known = COLUMNS[name]
+        spelled = {} if name == "cameras" else SYNONYMS
+        table = read_columns(
+            self.settings.tables[name],
+            known=known,
+            numbers=set(known) - _TEXTS,
+            spelling=lambda column: spelled.get(column, column),
+        )
+        table.require(*REQUIRED[name])
+        if others := [each for each in table.columns if each and each not in known]:
+            self.messages.append(
+                Message(
+                    f"columns that the table {name} does not have are not read: {listed(others)}", table.path
+                )
+            )
+        return table
+
+    def angle(self, text: str) -> float:
+        """Return an angle in radians from a cell in the unit of the project."""
+        from photogram.io.numbers import finite_number
+
+        unit = self.settings.angle
+        if unit == "dms":
+            return math.radians(_degrees(text))
+        value = finite_number(text)
+        return {"deg": math.radians(value), "gon": value * math.pi / 200, "rad": value}[unit]
+
+    def attitudes(self, table: ColumnTable) -> Floats:
+        """Return (rows, k) numbers of attitudes, angles in radians; NaN where there are none.
+
+        Raises
+        ------
+        InputError
+            Columns of another representation than that of the settings, rows with some of the numbers only.
+        """
+        names = ANGLES[self.settings.attitude]
+        others = [each for each in table.columns if each in _ALL_ANGLES and each not in names]
+        if others and not set(names) <= set(table.columns):
+            raise table.head.error(
+                f"columns {listed(others)}, but [axes] attitude is {self.settings.attitude}:"
+                f" {', '.join(names)}"
+            )
+        plain = self.settings.attitude in ("quaternion", "rotation_vector", "matrix")
+        columns = [table.numbers(name, read=None if plain else self.angle) for name in names]
+        values: Floats = np.stack(columns, axis=1)
+        bad = np.flatnonzero(np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1))
+        if bad.size:
+            raise table.error(int(bad[0]), f"some of {', '.join(names)} are empty: give all or none")
+        return values
+
+    def matrices(self, table: ColumnTable) -> Floats:
+        """Return (rows, 3, 3) attitudes A, photo to object; NaN where there are none."""
+        values = self.attitudes(table)
+        found = np.full((len(values), 3, 3), np.nan)
+        known = np.flatnonzero(~np.isnan(values).any(axis=1))
+        if len(known):
+            self._check_rows(table, values, known)
+            found[known] = matrices_of(self.settings, values[known])
+        return found
+
+    def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
+        """Refuse quaternions without length and matrices that are no rotations, with their rows."""
+        kind = self.settings.attitude
+        for row in known.tolist():
+            if kind == "quaternion":
+                size = float(np.linalg.norm(values[row]))
+                if not 0.99 < size < 1.01:
+                    raise table.error(row, f"the quaternion has the length {size:.6g}, not 1")
+            elif kind == "matrix":
+                matrix = values[row].reshape(3, 3)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
+                if not apart < 1e-6 or np.linalg.det(matrix) < 0:
+                    raise table.error(row, "m11 .. m33 are no rotation matrix: not orthonormal, or mirrored")
+
+    def deviations(
+        self, table: ColumnTable, kind: str, columns: Sequence[str], default: float = math.nan
+    ) -> Floats:
+        """Return (rows, k) standard deviations: of the table, else of `[sd]`, else the default.
+
+        Raises
+        ------
+        InputError
+            Negative ones.
+        """
+        given = self.settings.sd.get(kind)
+        defaults = (
+            [default] * len(columns)
+            if given is None
+            else list(given) * (len(columns) if len(given) == 1 else 1)
+        )
+        common = table.numbers("sd", infinite=True) if "sd" in table and kind != "photos" else None
+        found = np.empty((table.count, len(columns)))
+        for k, column in enumerate(columns):
+            own = table.numbers(column, infinite=True)
+            if common is not None:
+                own = np.where(np.isnan(own), common, own)
+            found[:, k] = np.where(np.isnan(own), defaults[k], own)
+        negative = np.argwhere(found < 0)
+        if len(negative):
+            row, k = negative[0]
+            raise table.error(int(row), f"column {columns[k]}: {found[row, k]:g} is no standard deviation")
+        return found
+
+
+def matrices_of(settings: Settings, values: Floats) -> Floats:
+    """Return (n, 3, 3) attitudes A, photo to object, from the numbers of the representation of a project."""
+    kind = settings.attitude
+    given = values.reshape(-1, 3, 3) if kind == "matrix" else values
+    found = Attitudes.of(_own(kind), given).matrices
+    if kind in ("yaw_pitch_roll", "azimuth_tilt_swing"):
+        return found
+    # Of these kinds the numbers are read as a matrix Q, and the settings say what Q is.
+    turned = found.transpose(0, 2, 1) if kind in ("omega_phi_kappa", "phi_omega_kappa") else found
+    to_photo = turned if settings.rotation == "object_to_photo" else turned.transpose(0, 2, 1)
+    if settings.photo == "y_down":
+        to_photo = np.diag([1.0, -1.0, -1.0]) @ to_photo
+    photo_to_object: Floats = to_photo.transpose(0, 2, 1)
+    return photo_to_object
+
+
+def _own(kind: str) -> Representation:
+    return kind  # type: ignore[return-value]
+
+
+def covariances_of(sd: Floats, table: ColumnTable | None = None) -> Floats:
+    """Return (n, 3, 3) covariances from standard deviations and the columns cov_xy, cov_xz, cov_yz."""
+    found = np.zeros((len(sd), 3, 3))
+    found[:, range(3), range(3)] = np.asarray(sd) ** 2
+    if table is not None:
+        for name, (i, j) in zip(_COVARIANCES, ((0, 1), (0, 2), (1, 2)), strict=True):
+            found[:, i, j] = found[:, j, i] = table.numbers(name, 0.0)
+    return found
+
+
+def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind: str) -> Indices:
+    """Return (rows,) which of the named things each row is of.
+
+    Raises
+    ------
+    InputError
+        A name that is not there.
+    """
+    found = table.names(column)
+    rows = np.array([places.get(name, -1) for name in found.names], dtype=np.int64)
+    if (rows < 0).any():
+        missing = int(np.flatnonzero(rows < 0)[0])
+        row = int(np.flatnonzero(found.rows == missing)[0])
+        raise table.error(row, f"column {column}: there is no {kind} {quoted(found.names[missing])}")
+    return rows[found.rows]
+
+
+def _degrees(text: str) -> float:
+    match = _DMS.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(f"{quoted(text)} is no angle in degrees, minutes and seconds")
+    sign, degrees, minutes, seconds = match.groups()
+    if int(minutes) >= 60 or float(seconds or 0) >= 60:
+        raise ValueError(f"{quoted(text)} has minutes or seconds of 60 or more")
+    value = int(degrees) + int(minutes) / 60 + float(seconds or 0) / 3600
+    return -value if sign == "-" else value

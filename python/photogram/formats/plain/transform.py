@@ -1,0 +1,94 @@
+"""Coordinates of tables in other systems than that of the frame of a project."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.plain.settings import Settings
+from photogram.formats.project import Frame
+from photogram.io.delimited import ColumnTable
+from photogram.messages import Message
+
+__all__ = ["Transform"]
+
+
+class Transform:
+    """What carries coordinates of tables into the frame, in units of the house.
+
+    Parameters
+    ----------
+    settings
+        With the frame, and the systems of tables.
+    messages
+        Where remarks go.
+    """
+
+    def __init__(self, settings: Settings, messages: list[Message]) -> None:
+        self.settings, self._messages = settings, messages
+        self.frame = settings.frame
+
+    def positions(
+        self, name: str, values: Floats, covariances: Floats | None, table: ColumnTable
+    ) -> tuple[Floats, Floats]:
+        """Return positions of a table in the frame, and their covariances.
+
+        Parameters
+        ----------
+        name
+            Of the table.
+        values
+            (n, 3) as the table has them; NaN where not given.
+        covariances
+            (n, 3, 3) along the axes of the table's system: metres.
+        table
+            For errors.
+
+        Raises
+        ------
+        InputError
+            A system that PROJ does not know, positions beyond it or with some coordinates only.
+        """
+        own = np.zeros((len(values), 3, 3)) if covariances is None else covariances
+        crs = self.settings.crs.get(name, "")
+        if not crs:
+            if self.frame.kind == "geographic":
+                return np.column_stack(
+                    [np.radians(values[:, 0]), np.radians(values[:, 1]), values[:, 2]]
+                ), own
+            return values, own
+        from photogram.formats.crs import to_frame
+
+        if self.settings.length != "m":
+            raise InputError("with a crs, the unit of length is the metre", file=self.settings.path)
+        partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
+        if partly.any():
+            raise table.error(
+                int(np.flatnonzero(partly)[0]),
+                f"some coordinates are empty: in {crs} a point needs all three to be transformed",
+            )
+        known = ~np.isnan(values).any(axis=1)
+        if not known.any():
+            return values, own
+        try:
+            self._settle(crs, values[known])
+            found, turned, remarks = to_frame(crs, values[known], own[known], self.frame)
+        except InputError as error:
+            raise (error if error.file else table.head.error(error.message)) from None
+        positions, rotated = np.full_like(values, math.nan), own.copy()
+        positions[known], rotated[known] = found, turned
+        self._messages += [Message(text, table.path) for text in remarks]
+        return positions, rotated
+
+    def _settle(self, crs: str, values: Floats) -> None:
+        """Choose an origin for a topocentric frame that has none: amid the first positions that are given."""
+        from photogram.formats.crs import amid
+
+        if self.frame.kind == "cartesian" or (self.frame.kind == "topocentric" and self.frame.origin is None):
+            self.frame = Frame("topocentric", "EPSG:4979", amid(crs, values))
+            self._messages.append(
+                Message(f"coordinates in {crs} are adjusted in a frame that is {self.frame}")
+            )

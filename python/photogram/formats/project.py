@@ -1,0 +1,269 @@
+"""A project: a block with what files say of it beyond, and how it came out of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.io.places import Place
+from photogram.messages import Message, listed
+from photogram.network.attitudes import Attitudes
+from photogram.network.block import Block
+from photogram.network.cameras import Camera
+from photogram.network.geometry import Spheroid
+from photogram.network.observations import Observation
+from photogram.network.rigs import Mount
+
+__all__ = ["DatumName", "Frame", "Options", "Project", "Size", "assembled"]
+
+DatumName = Literal["control", "minimum", "inner"]
+Size = tuple[int, int]
+"""Width and height of the pictures of a camera, pixels."""
+
+ASSUMED_SD = {"px": 1.0, "mm": 0.010}
+"""Of image coordinates where nothing says how good they are."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What the coordinates of a project are.
+
+    Attributes
+    ----------
+    kind
+        `cartesian`, `topocentric` (east, north, up at the origin), `geocentric` or `geographic`.
+    crs
+        Coordinate reference system of the origin, or of the coordinates; empty where none is said.
+    origin
+        Latitude and longitude in degrees and ellipsoidal height in metres of a topocentric frame.
+    """
+
+    kind: str = "cartesian"
+    crs: str = ""
+    origin: tuple[float, float, float] | None = None
+
+    def __str__(self) -> str:
+        at = (
+            ""
+            if self.origin is None
+            else " at latitude {:.9g}, longitude {:.9g}, height {:.9g}".format(*self.origin)
+        )
+        return self.kind + at + (f" ({self.crs})" if self.crs else "")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a project asks to be adjusted; None: it does not say."""
+
+    datum: DatumName | None = None
+    loss: Literal["huber", "cauchy"] | None = None
+    unit_variance: Literal["free", "constrained", "unity"] = "free"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Project:
+    """A block with what files say of it beyond.
+
+    Attributes
+    ----------
+    block
+        What is adjusted. Points that are neither control nor check points have no position in it.
+    path
+        Where it was read.
+    title
+        The format, as people are told.
+    sizes
+        Width and height of the pictures of each camera of the block, pixels; None where not known.
+    pixel_mm
+        The side of a pixel of each camera in millimetres; None where not known.
+    starts
+        (n, 3) positions that the file gives for points of the block; NaN without.
+    frame
+        What coordinates are.
+    options
+        How it asks to be adjusted.
+    lacks
+        What an adjustment needs or assumes that the file does not say, with the option that adds it.
+    messages
+        What was left out, corrected or doubtful.
+    details
+        What the writer of the same format wants to know again; other formats do not read it.
+    """
+
+    block: Block
+    path: Path
+    title: str
+    sizes: tuple[Size | None, ...]
+    pixel_mm: tuple[float | None, ...]
+    starts: Floats
+    frame: Frame = field(default_factory=Frame)
+    options: Options = field(default_factory=Options)
+    lacks: tuple[str, ...] = ()
+    messages: tuple[Message, ...] = ()
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a project with some members replaced."""
+        return replace(self, **changes)
+
+    @property
+    def checks(self) -> list[int]:
+        """Points with a known position of which nothing is held."""
+        block = self.block
+        known = np.isfinite(block.point_positions).any(axis=1) & ~np.isfinite(block.point_sd).any(axis=1)
+        return [int(row) for row in np.flatnonzero(known)]
+
+    def positions(self) -> Floats:
+        """Return (n, 3) the best that is known of points: as held or checked, else as the file has them."""
+        found: Floats = np.where(
+            np.isnan(self.block.point_positions), self.starts, self.block.point_positions
+        )
+        return found
+
+
+def assembled(
+    *,
+    path: Path,
+    title: str,
+    cameras: Sequence[Camera],
+    sizes: Sequence[Size | None],
+    photo_ids: list[str],
+    photo_cameras: ArrayLike,
+    centres: Floats,
+    matrices: Floats,
+    point_ids: list[str],
+    starts: Floats,
+    image_photos: Indices,
+    image_points: Indices,
+    image_xy: Floats,
+    image_sd: Floats | float | None = None,
+    pixel_mm: Sequence[float | None] | None = None,
+    point_positions: Floats | None = None,
+    point_sd: Floats | None = None,
+    photo_position_sd: ArrayLike = np.inf,
+    photo_attitude_sd: ArrayLike = np.inf,
+    observations: Sequence[Observation] = (),
+    mounts: Sequence[Mount] = (),
+    frame: Frame | None = None,
+    options: Options | None = None,
+    lacks: Sequence[str] = (),
+    messages: Sequence[Message] = (),
+    details: Mapping[str, Any] | None = None,
+    linear_unit: str = "m",
+    name: str = "",
+    spheroid: Spheroid | None = None,
+) -> Project:
+    """Put together what a reader has found.
+
+    Parameters
+    ----------
+    path, title, sizes, pixel_mm, starts, frame, options, lacks, messages, details
+        As in :class:`Project`.
+    centres, matrices
+        (P, 3) positions and (P, 3, 3) attitudes A, photo to object; NaN where unknown.
+    image_sd
+        None where the file says nothing: it is assumed, and so said.
+    name
+        Of the project.
+    cameras, photo_ids, photo_cameras, point_ids, image_photos, image_points, image_xy, observations, mounts
+        As in :class:`photogram.Block`.
+    point_positions, point_sd, photo_position_sd, photo_attitude_sd, linear_unit, spheroid
+        As there.
+
+    Raises
+    ------
+    InputError
+        What a block refuses, with the name of the file.
+    """
+    place, found = Place(path), list(messages)
+    if not photo_ids:
+        raise place.error("has no photos")
+    _different(place, "photo", photo_ids)
+    _different(place, "point", point_ids)
+    keep = _first_images(image_photos, image_points, photo_ids, point_ids, found)
+    lacking = list(lacks)
+    if image_sd is None:
+        unit = cameras[0].unit or "px"
+        image_sd = ASSUMED_SD[unit]
+        lacking.append(
+            f"no standard deviations of image coordinates: {image_sd:g} {unit} is assumed (--sd images=...)"
+        )
+    sd: Any = image_sd if np.ndim(image_sd) == 0 else np.asarray(image_sd)[keep]
+    count = len(point_ids)
+    angles = np.full((len(photo_ids), 3), np.nan)
+    known = np.isfinite(matrices).all(axis=(1, 2))
+    if known.any():
+        angles[known] = Attitudes(matrices[known]).values("omega_phi_kappa")
+    try:
+        block = Block(
+            photo_ids=photo_ids,
+            photo_positions=centres,
+            photo_attitudes=angles,
+            photo_position_sd=np.asarray(photo_position_sd),
+            photo_attitude_sd=np.asarray(photo_attitude_sd),
+            cameras=list(cameras),
+            photo_cameras=np.asarray(photo_cameras),
+            point_ids=point_ids,
+            point_positions=np.full((count, 3), np.nan) if point_positions is None else point_positions,
+            point_sd=np.full((count, 3), np.inf) if point_sd is None else point_sd,
+            image_photos=image_photos[keep],
+            image_points=image_points[keep],
+            image_xy=image_xy[keep],
+            image_sd=sd,
+            observations=observations,
+            mounts=mounts,
+            linear_unit=linear_unit,
+            title=name,
+            spheroid=spheroid,
+        )
+    except InputError as error:
+        raise InputError(error.message, file=path) from None
+    return Project(
+        block=block,
+        path=path,
+        title=title,
+        sizes=tuple(sizes),
+        pixel_mm=tuple(pixel_mm) if pixel_mm is not None else (None,) * len(cameras),
+        starts=starts,
+        frame=frame or Frame(),
+        options=options or Options(),
+        lacks=tuple(lacking),
+        messages=tuple(found),
+        details=details or {},
+    )
+
+
+def _different(place: Place, kind: str, names: Sequence[str]) -> None:
+    if len(set(names)) < len(names):
+        twice = next(name for name, count in Counter(names).items() if count > 1)
+        raise place.error(f"the {kind} {twice} is there more than once")
+
+
+def _first_images(
+    photos: Indices,
+    points: Indices,
+    photo_ids: Sequence[str],
+    point_ids: Sequence[str],
+    messages: list[Message],
+) -> Indices:
+    """Return rows of images without second ones of a point on a photo, which a block does not take."""
+    pairs = np.asarray(photos, dtype=np.int64) * max(len(point_ids), 1) + points
+    if len(pairs) < 2 or (np.diff(pairs) > 0).all():
+        return np.arange(len(pairs))
+    _, first = np.unique(pairs, return_index=True)
+    if len(first) == len(pairs):
+        return np.arange(len(pairs))
+    left = np.setdiff1d(np.arange(len(pairs)), first)
+    names = [f"{point_ids[points[row]]} on {photo_ids[photos[row]]}" for row in left[:20].tolist()]
+    messages.append(
+        Message(f"{len(left)} second images of a point on a photo are left out: {listed(names, 3)}")
+    )
+    return np.sort(first)

@@ -1,0 +1,91 @@
+"""Photos on frames: mounts for a block, and photos that stand for frames whose first sensor took none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.network.rigs import Mount
+from photogram.network.unknowns import Sensor
+
+__all__ = ["FrameOf", "Rig", "Stand", "mounted"]
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Sensors on one frame.
+
+    Attributes
+    ----------
+    name
+        For reports.
+    reference
+        The camera that is the frame.
+    sensors
+        The pose of each other camera.
+    """
+
+    name: str
+    reference: str
+    sensors: Mapping[str, Sensor]
+
+
+@dataclass(frozen=True)
+class FrameOf:
+    """Photos that were taken together: their indices by camera."""
+
+    name: str
+    rig: Rig
+    photos: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A photo without images that stands for a frame."""
+
+    name: str
+    camera: str
+    centre: Floats
+    matrix: Floats
+
+
+def mounted(
+    frames: Sequence[FrameOf], photos: Sequence[str], centres: Floats, matrices: Floats
+) -> tuple[list[Mount], list[Stand]]:
+    """Return mounts, and the photos that are missing for them.
+
+    Parameters
+    ----------
+    frames
+        All frames of more than one photo, or without one of the reference camera.
+    photos
+        Names.
+    centres, matrices
+        (P, 3) and (P, 3, 3) poses A, photo to object; NaN where unknown.
+    """
+    mounts: list[Mount] = []
+    stands: list[Stand] = []
+    taken = set(photos)
+    for frame in frames:
+        first = frame.photos.get(frame.rig.reference)
+        if first is not None:
+            name = photos[first]
+        else:
+            camera, row = next(iter(frame.photos.items()))
+            sensor = frame.rig.sensors[camera]
+            matrix = matrices[row] @ np.asarray(sensor.matrix).T
+            name = f"frame {frame.name}"
+            while name in taken:
+                name += "'"
+            taken.add(name)
+            centre = centres[row] - matrix @ np.asarray(sensor.value)
+            stands.append(Stand(name, frame.rig.reference, centre, matrix))
+        mounts += [
+            Mount(photos[row], name, frame.rig.sensors[camera])
+            for camera, row in frame.photos.items()
+            if camera != frame.rig.reference
+        ]
+    return mounts, stands

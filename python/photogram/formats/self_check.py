@@ -1,0 +1,151 @@
+"""Whether positions and observations of a file agree by the conventions that it is read with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.project import Project
+from photogram.messages import Message
+from photogram.network.cameras import Camera, images_of
+
+__all__ = ["Agreement", "agreement", "doubts"]
+
+MOST = 20_000
+"""Images that are looked at."""
+GROSS, PART = 50.0, 0.1
+"""Pixels, and part of the width, that a median residual must exceed to be doubted."""
+BETTER = 10.0
+"""How much smaller it must be with another convention for that to be named."""
+NEARLY_ALL = 0.9
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How images agree with positions as they were read.
+
+    Attributes
+    ----------
+    median
+        Of the residuals' lengths, in the unit of the images; NaN without any.
+    behind
+        The part of the points that lie behind their photos.
+    images
+        How many images were looked at.
+    """
+
+    median: float
+    behind: float
+    images: int
+
+
+@dataclass(frozen=True)
+class _Sample:
+    cameras: list[Camera]
+    which: Indices
+    vectors: Floats
+    matrices: Floats
+    xy: Floats
+
+    def residuals(self) -> Floats:
+        directions = np.einsum("nij,nj->ni", self.matrices, self.vectors)
+        with np.errstate(all="ignore"):
+            images = images_of(self.cameras, self.which, directions)
+        lengths = np.linalg.norm(images - self.xy, axis=1)
+        found: Floats = np.where(np.isfinite(lengths) & (directions[:, 2] < 0), lengths, np.inf)
+        return found
+
+    def median(self) -> float:
+        return float(np.median(self.residuals())) if len(self.xy) else np.nan
+
+
+def _sample(project: Project) -> _Sample:
+    block = project.block
+    points, matrices = project.positions(), attitude_matrices(block)
+    poses = np.column_stack([matrices.reshape(-1, 9), block.photo_positions])
+    posed: Bools = np.asarray(np.isfinite(poses).all(axis=1))
+    placed: Bools = np.asarray(np.isfinite(points).all(axis=1))
+    good = posed[block.image_photos] & placed[block.image_points]
+    if block.geographic:
+        good = np.zeros_like(good)
+    rows = np.flatnonzero(good)
+    rows = rows[:: max(1, len(rows) // MOST)]
+    photos = block.image_photos[rows]
+    cameras, photo_cameras = known_cameras(block)
+    return _Sample(
+        cameras,
+        np.asarray(photo_cameras, dtype=np.int64)[photos],
+        points[block.image_points[rows]] - block.photo_positions[photos],
+        matrices[photos].transpose(0, 2, 1),
+        block.image_xy[rows],
+    )
+
+
+def agreement(project: Project) -> Agreement:
+    """Return how images agree with positions as they were read."""
+    sample = _sample(project)
+    if not len(sample.xy):
+        return Agreement(np.nan, 0.0, 0)
+    depths = np.einsum("nij,nj->ni", sample.matrices, sample.vectors)[:, 2]
+    return Agreement(sample.median(), float(np.mean(depths > 0)), len(sample.xy))
+
+
+def doubts(project: Project) -> list[Message]:
+    """Return what is to be said where images and positions do not agree, with the convention that would help.
+
+    Nothing is changed.
+    """
+    found = agreement(project)
+    if not found.images:
+        return []
+    messages = []
+    if found.behind > NEARLY_ALL:
+        messages.append(
+            Message(
+                f"{100 * found.behind:.0f} % of the points lie behind their photos: the file may be mirrored,"
+                " or its photos look the other way"
+            )
+        )
+    elif found.behind > 0:
+        messages.append(
+            Message(f"{100 * found.behind:.2g} % of the images show points that lie behind their photos")
+        )
+    widths = [size[0] for size in project.sizes if size is not None]
+    scale = float(np.median(project.block.camera_scales()))
+    limit = max(GROSS, PART * min(widths)) if widths and project.block.image_unit == "px" else PART * scale
+    if found.median > limit:
+        sample = _sample(project)
+        helps = [name for name, change in _OTHERS.items() if change(sample).median() * BETTER < found.median]
+        advice = f"; it would be {BETTER:g} times smaller with {' or with '.join(helps)}" if helps else ""
+        messages.append(
+            Message(
+                f"positions and images do not agree: the median residual is {found.median:.3g}"
+                f" {project.block.image_unit}{advice}"
+            )
+        )
+    return messages
+
+
+def _mirrored(axis: int) -> Callable[[_Sample], _Sample]:
+    """Return a change: image coordinates counted the other way, about the principal point."""
+
+    def change(sample: _Sample) -> _Sample:
+        middle = images_of(sample.cameras, sample.which, np.tile([0.0, 0.0, -1.0], (len(sample.xy), 1)))
+        xy = sample.xy.copy()
+        xy[:, axis] = 2 * middle[:, axis] - xy[:, axis]
+        return replace(sample, xy=xy)
+
+    return change
+
+
+_FLIP = np.diag([1.0, -1.0, -1.0])
+_OTHERS: dict[str, Callable[[_Sample], _Sample]] = {
+    "y (rows) counted the other way": _mirrored(1),
+    "x (columns) counted the other way": _mirrored(0),
+    "rotations transposed": lambda sample: replace(sample, matrices=sample.matrices.transpose(0, 2, 1)),
+    "photos that look the other way": lambda sample: replace(sample, matrices=_FLIP @ sample.matrices),
+}

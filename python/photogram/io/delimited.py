@@ -1,0 +1,444 @@
+"""Tables as people write them: any usual delimiter, decimal point or comma, comments, columns in any order.
+
+The header says what is what. A record is a line; names may stand in quotation marks. Large tables that are
+well formed go through the parser of pandas; all others, and all that is at fault, are read line by line with
+the same result and the place of every cell.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
+from photogram.io.files import read_bytes
+from photogram.io.numbers import finite_number
+from photogram.io.places import Place
+from photogram.io.rows import LONGEST_RECORD
+from photogram.messages import listed, quoted
+
+__all__ = ["ColumnTable", "Names", "read_columns"]
+
+DELIMITERS = ("\t", ";", ",", "|")
+"""In this order; blanks where a header has none of them."""
+LARGE = 1 << 20
+"""Bytes from which a table is worth the parser of pandas."""
+COMMENT = "#"
+_BLANKS = re.compile(r'"([^"]*)"|(\S+)')
+_TRUE, _FALSE = frozenset({"true", "yes", "1", "t", "y"}), frozenset({"false", "no", "0", "f", "n"})
+
+
+@dataclass(frozen=True)
+class Names:
+    """A column of names: each name once, in the order in which they come, and which one each row has."""
+
+    names: list[str]
+    rows: Indices
+
+
+@dataclass(frozen=True)
+class ColumnTable:
+    """A table whose columns are asked for by name.
+
+    Attributes
+    ----------
+    path
+        The file.
+    head
+        The record that names the columns.
+    columns
+        Their names, in small letters.
+    count
+        How many rows there are.
+    cells
+        Columns of text.
+    ready
+        Columns that were read as numbers or names already.
+    records
+        Number of the record of each row.
+    """
+
+    path: Path
+    head: Place
+    columns: tuple[str, ...]
+    count: int
+    cells: Mapping[str, Sequence[str]]
+    records: Sequence[int]
+    delimiter: str = ","
+    ready: Mapping[str, Floats | Names] = field(default_factory=dict)
+
+    def __contains__(self, column: str) -> bool:
+        return column in self.columns
+
+    @cached_property
+    def _lines(self) -> list[str]:
+        return [] if self.path.suffix == ".parquet" else _text(self.path).split("\n")
+
+    def place(self, row: int) -> Place:
+        """Return where a row stands."""
+        record = self.records[row]
+        text = self._lines[record - 1] if record <= len(self._lines) else None
+        return Place(self.path, record, text)
+
+    def error(self, row: int, message: str) -> InputError:
+        """Return an error that names the place of a row."""
+        return self.place(row).error(message)
+
+    def require(self, *columns: str) -> None:
+        """Refuse a table without these columns.
+
+        Raises
+        ------
+        InputError
+            Those that are missing, beside those that are there.
+        """
+        if missing := [column for column in columns if column not in self.columns]:
+            what = "the column {} is missing" if len(missing) == 1 else "the columns {} are missing"
+            raise self.head.error(f"{what.format(listed(missing))}; there are {listed(list(self.columns))}")
+
+    def names(self, column: str) -> Names:
+        """Return a column of names, without blanks at both ends.
+
+        Raises
+        ------
+        InputError
+            A cell that is empty or says NaN, names that differ by inner blanks or by case alone.
+        """
+        found = self.ready.get(column)
+        if not isinstance(found, Names):
+            found = _factorised(self.cells[column])
+        for name in found.names:
+            if not name or name.lower() == "nan":
+                row = int(np.flatnonzero(found.rows == found.names.index(name))[0])
+                raise self.error(
+                    row, f"column {column}: {'is empty' if not name else f'{name!r} is no name'}"
+                )
+        self._check_alike(column, found)
+        return found
+
+    def _check_alike(self, column: str, found: Names) -> None:
+        seen: dict[str, int] = {}
+        for place, name in enumerate(found.names):
+            plain = "".join(name.split()).casefold()
+            other = seen.setdefault(plain, place)
+            if other != place:
+                row = int(np.flatnonzero(found.rows == place)[0])
+                raise self.error(
+                    row,
+                    f"column {column}: {quoted(name)} differs from {quoted(found.names[other])} by blanks or"
+                    " case alone",
+                )
+
+    def texts(self, column: str, default: str = "") -> list[str]:
+        """Return a column of text, without blanks at both ends; empty cells have the default."""
+        found = self.ready.get(column)
+        if isinstance(found, Names):
+            return [found.names[row] or default for row in found.rows]
+        if column not in self.columns:
+            return [default] * self.count
+        return [cell or default for cell in self.cells[column]]
+
+    def numbers(
+        self,
+        column: str,
+        default: float = math.nan,
+        *,
+        infinite: bool = False,
+        read: Callable[[str], float] | None = None,
+    ) -> Floats:
+        """Return (rows,) a column of numbers.
+
+        Parameters
+        ----------
+        column
+            Its name.
+        default
+            For empty cells, and where the column is missing.
+        infinite
+            Whether `inf` is a number here.
+        read
+            Reads a cell in place of a plain number.
+
+        Raises
+        ------
+        InputError
+            A cell that is no such number; names file, record and column.
+        """
+        found = self.ready.get(column)
+        if isinstance(found, np.ndarray):
+            return found if read is None else np.array([read(repr(each)) for each in found.tolist()])
+        if column not in self.columns:
+            return np.full(self.count, default)
+        convert = finite_number if read is None else read
+        values = np.empty(self.count)
+        comma = self.delimiter != ","
+        for row, cell in enumerate(self.texts(column)):
+            if not cell:
+                values[row] = default
+                continue
+            if infinite and cell.lower() in ("inf", "+inf", "infinity"):
+                values[row] = math.inf
+                continue
+            try:
+                values[row] = convert(cell.replace(",", ".") if comma and "." not in cell else cell)
+            except ValueError as error:
+                raise self.error(row, f"column {column}: {error}") from None
+        return values
+
+    def flags(self, column: str, default: bool = True) -> Bools:
+        """Return (rows,) a column of true and false (yes, no, 1, 0).
+
+        Raises
+        ------
+        InputError
+            Another word.
+        """
+        values = np.full(self.count, default)
+        if column in self.columns:
+            for row, cell in enumerate(self.texts(column)):
+                word = cell.lower()
+                if word and word not in _TRUE | _FALSE:
+                    raise self.error(row, f"column {column}: {quoted(cell)} is neither true nor false")
+                values[row] = word in _TRUE if word else default
+        return values
+
+
+def read_columns(
+    path: Path,
+    *,
+    known: Collection[str] = (),
+    numbers: Collection[str] = (),
+    spelling: Callable[[str], str] = str,
+) -> ColumnTable:
+    """Read a table.
+
+    Parameters
+    ----------
+    path
+        The file: text, or Parquet by its ending.
+    known
+        Columns of which a header has one at least: it may then begin with the mark of a comment.
+    numbers
+        Columns that are numbers where they are there: for the parser of large tables.
+    spelling
+        Gives the name of a column from what the file calls it, in small letters.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, holds no table, two columns have one name, a row has more or fewer cells than
+        the header.
+    """
+    if path.suffix == ".parquet":
+        return _parquet(path, spelling)
+    text = _text(path)
+    head, delimiter = _head(path, text, known, spelling)
+    columns = tuple(spelling(cell.strip().lower()) for cell in _split(head, delimiter))
+    for column in columns:
+        if column and columns.count(column) > 1:
+            raise head.error(f"the column {quoted(column)} is there twice")
+    assert head.record is not None
+    if len(text) > LARGE and delimiter != " ":
+        fast = _by_pandas(path, text, head, columns, delimiter, numbers)
+        if fast is not None:
+            return fast
+    rows, records = _by_lines(path, text.split("\n"), head.record, columns, delimiter)
+    cells = {name: [row[k] for row in rows] for k, name in enumerate(columns) if name}
+    return ColumnTable(path, head, columns, len(rows), cells, records, delimiter)
+
+
+def _text(path: Path) -> str:
+    data = read_bytes(path)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
+def _head(path: Path, text: str, known: Collection[str], spelling: Callable[[str], str]) -> tuple[Place, str]:
+    """Find the header: the first line, or the last comment before it where only that names known columns."""
+    comment: Place | None = None
+    for record, line in enumerate(io.StringIO(text), 1):
+        line = line.rstrip("\n")
+        if line.lstrip().startswith(COMMENT):
+            comment = Place(path, record, line.lstrip()[1:])
+            continue
+        if not line.strip(" \t,;|"):
+            continue
+        head = Place(path, record, line)
+        for place in (head, comment):
+            if place is not None and known and _knows(place, known, spelling):
+                return place, _delimiter(place)
+        if known and comment is None:
+            raise head.error(f"is no header: it names none of the columns {listed(sorted(known))}")
+        return head, _delimiter(head)
+    if comment is not None and _knows(comment, known, spelling):
+        return comment, _delimiter(comment)
+    raise Place(path).error("holds no table")
+
+
+def _knows(place: Place, known: Collection[str], spelling: Callable[[str], str]) -> bool:
+    return any(spelling(cell.strip().lower()) in known for cell in _split(place, _delimiter(place)))
+
+
+def _delimiter(head: Place) -> str:
+    outside = re.sub(r'"[^"]*"', "", head.text or "")
+    for each in DELIMITERS:
+        if each in outside:
+            return each
+    return " " if len(outside.split()) > 1 else ","
+
+
+def _split(place: Place, delimiter: str) -> list[str]:
+    text = place.text or ""
+    if len(text) > LONGEST_RECORD:
+        raise place.error(f"a record of {len(text)} characters; {LONGEST_RECORD} are the most")
+    if delimiter == " ":
+        return [whole or bare for whole, bare in _BLANKS.findall(text)]
+    if '"' not in text:
+        return [cell.strip() for cell in text.split(delimiter)]
+    try:
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))]
+    except (csv.Error, StopIteration) as error:
+        raise place.error(f"cannot be split into cells: {error}") from None
+
+
+def _by_lines(
+    path: Path, lines: Sequence[str], head: int, columns: Sequence[str], delimiter: str
+) -> tuple[list[list[str]], list[int]]:
+    rows, records = [], []
+    width = len(columns)
+    for record in range(head + 1, len(lines) + 1):
+        line = lines[record - 1]
+        if not line.strip() or line.lstrip().startswith(COMMENT):
+            continue
+        place = Place(path, record, line)
+        cells = _split(place, delimiter)
+        if len(cells) != width:
+            # A delimiter at the end of every line is one cell too many, and empty.
+            if len(cells) == width + 1 and not cells[-1]:
+                cells.pop()
+            else:
+                raise place.error(f"there are {len(cells)} cells under {width} columns")
+        rows.append(cells)
+        records.append(record)
+    return rows, records
+
+
+def _by_pandas(
+    path: Path,
+    text: str,
+    head: Place,
+    columns: Sequence[str],
+    delimiter: str,
+    numbers: Collection[str],
+) -> ColumnTable | None:
+    """Read a large table; None where anything is not as it should be: the other way says what."""
+    import pandas as pd
+
+    assert head.record is not None
+    start = 0
+    for _ in range(head.record):
+        start = text.find("\n", start) + 1
+    body = text[start:].rstrip("\n")
+    if not body or not all(columns) or body.startswith(COMMENT) or "\n" + COMMENT in body:
+        return None
+    count = body.count("\n") + 1
+    kinds = {each: float if each in numbers else str for each in columns}
+    # From version 3 on pandas reads every number to the last bit, and does not want to be asked.
+    exact: dict[str, Any] = (
+        {} if int(pd.__version__.partition(".")[0]) >= 3 else {"float_precision": "round_trip"}
+    )
+    sample = _split(Place(path, text=body.partition("\n")[0]), delimiter)
+    comma = delimiter != "," and any(
+        "," in cell for each, cell in zip(columns, sample, strict=False) if each in numbers
+    )
+    form: dict[str, Any] = {
+        "header": None,
+        "index_col": False,
+        "decimal": "," if comma else ".",
+        "keep_default_na": False,
+        "na_values": [""],
+        "skipinitialspace": True,
+        "skip_blank_lines": False,
+        "engine": "c",
+        **exact,
+    }
+    try:
+        frame = pd.read_csv(
+            io.BytesIO(body.encode()), sep=delimiter, names=list(columns), dtype=kinds, **form
+        )
+    except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning):
+        return None
+    if len(frame) != count:
+        return None
+    ready: dict[str, Floats | Names] = {}
+    for each in columns:
+        if each in numbers:
+            values = frame[each].to_numpy()
+            if not np.isfinite(values).all():
+                return None
+            ready[each] = values
+        else:
+            codes, texts = pd.factorize(frame[each])
+            if (codes < 0).any():
+                return None
+            ready[each] = _merged(codes.astype(np.int64), [str(text).strip() for text in texts])
+    records = range(head.record + 1, head.record + 1 + count)
+    return ColumnTable(path, head, tuple(columns), count, {}, records, delimiter, ready)
+
+
+def _merged(codes: Indices, texts: list[str]) -> Names:
+    """Return names of which those that were alike but for blanks at their ends are one."""
+    found = _factorised(texts)
+    return Names(found.names, found.rows[codes])
+
+
+def _factorised(cells: Sequence[str]) -> Names:
+    places: dict[str, int] = {}
+    rows = np.fromiter((places.setdefault(cell, len(places)) for cell in cells), np.int64, len(cells))
+    return Names(list(places), rows)
+
+
+def _parquet(path: Path, spelling: Callable[[str], str]) -> ColumnTable:
+    import pyarrow
+    import pyarrow.compute
+    import pyarrow.parquet
+
+    try:
+        table = pyarrow.parquet.read_table(path)
+    except (OSError, pyarrow.ArrowException) as error:
+        raise InputError(f"cannot be read as Parquet: {error}", file=path) from None
+    columns = tuple(spelling(name.strip().lower()) for name in table.column_names)
+    head = Place(path)
+    ready: dict[str, Floats | Names] = {}
+    cells: dict[str, Sequence[str]] = {}
+    for name, column in zip(columns, table.columns, strict=True):
+        if columns.count(name) > 1:
+            raise head.error(f"the column {quoted(name)} is there twice")
+        kind = column.type
+        if pyarrow.types.is_dictionary(kind) or pyarrow.types.is_string(kind):
+            whole = column.combine_chunks()
+            coded = whole if pyarrow.types.is_dictionary(kind) else pyarrow.compute.dictionary_encode(whole)
+            texts = [str(text).strip() for text in coded.dictionary.to_pylist()]
+            codes = coded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
+            if (codes < 0).any():
+                texts.append("")
+                codes = np.where(codes < 0, len(texts) - 1, codes)
+            ready[name] = _merged(codes, texts)
+        elif pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind):
+            ready[name] = column.to_numpy().astype(float)
+        else:
+            cells[name] = ["" if each is None else str(each) for each in column.to_pylist()]
+    return ColumnTable(path, head, columns, table.num_rows, cells, range(1, table.num_rows + 1), ready=ready)

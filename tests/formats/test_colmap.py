@@ -1,0 +1,311 @@
+"""COLMAP models: text and binary, rigs and frames, against the package itself where it is installed."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+from block import (
+    check_adjustment,
+    check_poses,
+    names_by_position,
+    same_blocks,
+    sample,
+    truth,
+    with_control,
+    with_noise,
+)
+from damaged import check_damaged
+from test_plain_project import EXAMPLE, written
+
+from photogram import Attitudes, Camera, InnerConstraints, InputError, adjust, formats
+from photogram.formats.colmap.content import MODELS
+from photogram.formats.self_check import agreement
+
+
+@pytest.mark.parametrize("dress", ["text", "text_legacy", "binary"])
+def test_the_sample_is_the_truth_and_comes_out_as_the_dense_adjustment(dress):
+    project = formats.read(sample("colmap", dress))
+    check_poses(project.block, truth()["photos"])
+    names = names_by_position(project)
+    known = {(each["photo"].replace(" ", "_"), each["point"]): each for each in truth()["observations"]}
+    block = project.block
+    for photo, point, xy in zip(block.image_photos, block.image_points, block.image_xy, strict=True):
+        own = known[block.photo_ids[photo].replace(" ", "_"), names[block.point_ids[point]]]
+        np.testing.assert_allclose(xy, [own["column"], own["row"]], rtol=0, atol=1e-9)
+    assert agreement(project).median < 1e-9
+    assert [each.model for each in block.cameras] == ["full_opencv", "radial"]
+    assert any("13 features have no point" in str(each) for each in project.messages)
+    check_adjustment(with_control(with_noise(project, names), names), names)
+
+
+@pytest.mark.parametrize("dress", ["rig_text", "rig_binary"])
+def test_the_sample_with_a_rig_has_its_frames(dress):
+    project = formats.read(sample("colmap", dress))
+    known = truth("colmap", "truth_rig.json")
+    check_poses(project.block, known["photos"])
+    assert len(project.block.mounts) == 3
+    assert len({id(each.sensor) for each in project.block.mounts}) == 1
+    assert agreement(project).median < 1e-9
+    free = adjust(project.block.replace(image_sd=1.0), datum=InnerConstraints())
+    assert free.converged
+    assert free.unknowns[0].kind == "sensor"
+
+
+@pytest.mark.parametrize("dress", ["text", "binary", "rig_text", "rig_binary"])
+@pytest.mark.parametrize("target", ["colmap", "colmap_text"])
+def test_a_round_trip_keeps_all_but_features_without_point(tmp_path, dress, target):
+    project = formats.read(sample("colmap", dress))
+    other = formats.read(written(project, tmp_path / "there", target))
+    if target == "colmap_text":
+        other = (
+            other.replace(
+                block=other.block.replace(
+                    photo_ids=[
+                        next(name for name in project.block.photo_ids if "_".join(name.split()) == own)
+                        for own in other.block.photo_ids
+                    ]
+                )
+            )
+            if not other.block.mounts
+            else other
+        )
+    same_blocks(project.block, other.block, 1e-12)
+    np.testing.assert_array_equal(other.starts, project.starts)
+    assert other.details["colours"] == project.details["colours"]
+    assert [each.parameters for each in other.block.cameras] == [
+        each.parameters for each in project.block.cameras
+    ]
+    if project.block.mounts:
+        mine, own = project.block.mounts[0].sensor, other.block.mounts[0].sensor
+        np.testing.assert_allclose(own.position, mine.position, atol=1e-15)
+
+
+def test_what_is_written_of_the_plain_project_adjusts_to_the_same(tmp_path):
+    project = formats.read(EXAMPLE)
+    lost = " ".join(formats.cannot_hold(project, "colmap"))
+    for word in ("standard deviations", "4 held and 1 check points", "7 observations beside images"):
+        assert word in lost
+    other = formats.read(written(project, tmp_path / "there", "colmap"))
+    # names.csv beside the model keeps the names of points.
+    assert set(other.block.point_ids) == set(project.block.point_ids)
+    order = [other.block.point_ids.index(name) for name in project.block.point_ids]
+    block = other.block.replace(
+        image_sd=0.5,
+        point_ids=other.block.point_ids,
+        point_positions=project.block.point_positions[np.argsort(order)],
+        point_sd=project.block.point_sd[np.argsort(order)],
+        observations=project.block.observations,
+    )
+    one, two = adjust(project.block, tolerance=1e-9), adjust(block, tolerance=1e-9)
+    assert (np.abs(two.point_positions[order] - one.point_positions) < 1e-9 * one.point_sd).all()
+    np.testing.assert_allclose(two.point_sd[order], one.point_sd, rtol=1e-7)
+
+
+def test_control_by_names_carries_a_model_in_a_frame_of_its_own(run, tmp_path):
+    project = formats.read(EXAMPLE)
+    written(project, tmp_path / "model", "colmap")
+    # The model turned, shifted and shrunk, as a reconstruction without control is.
+    other = formats.read(tmp_path / "model")
+    turn = Attitudes.of("omega_phi_kappa", [[0.4, -0.3, 2.0]]).matrices[0]
+    block = other.block
+    angles = Attitudes(turn @ Attitudes.of("omega_phi_kappa", block.photo_attitudes).matrices)
+    moved = other.replace(
+        block=block.replace(
+            photo_positions=0.1 * block.photo_positions @ turn.T + [3.0, -2.0, 1.0],
+            photo_attitudes=angles.values("omega_phi_kappa"),
+        ),
+        starts=0.1 * other.starts @ turn.T + [3.0, -2.0, 1.0],
+    )
+    written(moved, tmp_path / "moved", "colmap")
+    done = run(
+        "adjust", "moved", "--control", EXAMPLE / "control.csv", "--sd", "control=0.01", "--sd", "images=0.5"
+    )
+    assert done.exit_code == 0, done.output
+    assert "carried onto" in done.output
+    place = tmp_path / "moved-adjusted"
+    assert {"covariances.json", "images.bin", "photo_covariances.bin"} <= {
+        each.name for each in (place / "adjusted-colmap").iterdir()
+    }
+    result = adjust(project.block.replace(observations=()), unit_variance="free")
+    again = formats.read(place / "adjusted-colmap")
+    rows = [again.block.photo_ids.index(name) for name in project.block.photo_ids]
+    # The check point of the example is one more unknown there and here.
+    np.testing.assert_allclose(again.block.photo_positions[rows], result.photo_positions, atol=1e-4)
+    content = (place / "adjusted-colmap" / "photo_covariances.bin").read_bytes()
+    (count,) = struct.unpack_from("<Q", content)
+    table = np.frombuffer(content, [("id", "<u4"), ("c", "<f8", 21)], count, 8)
+    about = json.loads((place / "adjusted-colmap" / "covariances.json").read_text())
+    assert count == 6
+    np.testing.assert_allclose(
+        table["c"][:, 0],
+        result.photo_covariances[[project.block.photo_ids.index(n) for n in again.block.photo_ids], 0, 0],
+        rtol=1e-3,
+    )
+    assert about["datum"] == "given by the observations"
+
+
+def test_rotations_of_the_sidecar_are_those_of_the_cameras_axes():
+    from photogram.formats.colmap.writing import _centre_and_rotation
+
+    result = adjust(formats.read(EXAMPLE).block)
+    covariances = _centre_and_rotation(result)
+    flip = np.diag([1.0, -1.0, -1.0])
+
+    def small(angles, base):
+        turned = flip @ Attitudes.of("omega_phi_kappa", angles).matrices.transpose(0, 2, 1) @ base
+        return np.array([[m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]] for m in turned]) / 2
+
+    angles = result.photo_attitudes
+    base = (flip @ Attitudes.of("omega_phi_kappa", angles).matrices.transpose(0, 2, 1)).transpose(0, 2, 1)
+    step = 1e-6
+    rates = np.stack(
+        [
+            (small(angles + step * axis, base) - small(angles - step * axis, base)) / (2 * step)
+            for axis in np.eye(3)
+        ],
+        axis=2,
+    )
+    own = result.photo_covariances
+    np.testing.assert_allclose(
+        covariances[:, 3:, 3:], rates @ own[:, 3:, 3:] @ rates.transpose(0, 2, 1), rtol=1e-6
+    )
+    np.testing.assert_allclose(covariances[:, 3:, :3], rates @ own[:, 3:, :3], rtol=1e-6, atol=1e-16)
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "words"),
+    [
+        ("cameras.bin", lambda b: b[:-3], ["cameras.bin", "record 2", "3 bytes are missing"]),
+        (
+            "cameras.bin",
+            lambda b: b[:12] + struct.pack("<i", 99) + b[16:],
+            ["cameras.bin", "record 1", "number 99"],
+        ),
+        ("images.bin", lambda b: struct.pack("<Q", 2**60) + b[8:], ["images.bin", "announces", "left"]),
+        ("images.bin", lambda b: b[:-24], ["images.bin", "bytes"]),
+        ("points3D.bin", lambda b: b + b"\0", ["points3D.bin", "1 bytes beyond"]),
+        ("points3D.bin", lambda b: b[:-1], ["points3D.bin", "point 40", "1 bytes are missing"]),
+        ("frames.bin", lambda b: b[:-8], ["frames.bin", "8 bytes are missing"]),
+    ],
+)
+def test_a_damaged_binary_file_is_named_with_the_record(tmp_path, file, change, words):
+    source = sample("colmap", "binary")
+    for each in source.iterdir():
+        (tmp_path / each.name).write_bytes(
+            change(each.read_bytes()) if each.name == file else each.read_bytes()
+        )
+    with pytest.raises(InputError) as refused:
+        formats.read(tmp_path)
+    for word in words:
+        assert word in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "words"),
+    [
+        ("cameras.txt", "FULL_OPENCV", "FULL_OPENCW", ["cameras.txt", "record 2", "FULL_OPENCW"]),
+        ("cameras.txt", " 3612.5 3612.5", " 3612,5 3612.5", ["record 2", "'3612,5' is not a number"]),
+        ("images.txt", "1395.3837490217622 ", "x ", ["images.txt", "record 4", "feature 1", "'x'"]),
+        ("images.txt", "10 0.0103", "10 0.9103", ["images.txt", "record 3", "quaternion", "length"]),
+        ("images.txt", " 1 DJI_0002.JPG", " 2 DJI_0002.JPG", ["images.txt", "record 5", "camera 2"]),
+        (
+            "points3D.txt",
+            "100 -51.7594",
+            "107 -51.7594",
+            ["points3D.txt", "record 3", "point 107 is there twice"],
+        ),
+        ("frames.txt", "10 1 0.0103", "10 9 0.0103", ["frames.txt", "rig 9"]),
+    ],
+)
+def test_a_fault_of_a_text_file_is_named_with_its_line(tmp_path, file, old, new, words):
+    source = sample("colmap", "text")
+    for each in source.iterdir():
+        text = each.read_text()
+        if each.name == file:
+            assert old in text
+            text = text.replace(old, new, 1)
+        (tmp_path / each.name).write_text(text)
+    with pytest.raises(InputError) as refused:
+        formats.read(tmp_path)
+    for word in words:
+        assert word in str(refused.value)
+
+
+@pytest.mark.parametrize("dress", ["text", "binary", "rig_binary"])
+@pytest.mark.parametrize("seed", range(3))
+def test_damaged_models_end_in_a_message(tmp_path, dress, seed):
+    assert check_damaged(sample("colmap", dress), tmp_path, "colmap", 60, seed) > 10
+
+
+def test_a_camera_that_colmap_does_not_have_is_refused(tmp_path):
+    project = formats.read(EXAMPLE)
+    camera = Camera("brown", {"c": 3600.0, "K1": 1e-9}, unit="px", name="drone")
+    other = project.replace(block=project.block.replace(cameras=[camera]))
+    with pytest.raises(InputError, match="the model brown, which COLMAP does not have"):
+        formats.to_files(other, "colmap")
+
+
+# Against the package
+
+
+@pytest.fixture
+def pycolmap():
+    return pytest.importorskip("pycolmap", reason="pycolmap is not installed")
+
+
+def test_the_package_has_the_models_in_this_order(pycolmap):
+    own = {str(name): int(model) for name, model in pycolmap.CameraModelId.__members__.items()}
+    for number, (name, count) in enumerate(MODELS):
+        assert own[name] == number
+        assert len(pycolmap.Camera.create_from_model_name(1, name, 500.0, 1000, 800).params) == count
+
+
+@pytest.mark.parametrize("target", ["colmap", "colmap_text"])
+def test_the_package_reads_what_is_written(pycolmap, tmp_path, target):
+    project = formats.read(EXAMPLE)
+    place = written(project, tmp_path / "there", target)
+    theirs = pycolmap.Reconstruction(str(place))
+    assert theirs.num_reg_images() == 6
+    for image in theirs.images.values():
+        row = project.block.photo_ids.index(image.name)
+        np.testing.assert_allclose(image.projection_center(), project.block.photo_positions[row], atol=1e-10)
+        flip = np.diag([1.0, -1.0, -1.0])
+        matrix = Attitudes.of("omega_phi_kappa", project.block.photo_attitudes[[row]]).matrices[0]
+        np.testing.assert_allclose(image.cam_from_world().rotation.matrix(), flip @ matrix.T, atol=1e-12)
+    assert theirs.compute_num_observations() == len(project.block.image_xy)
+
+
+def test_a_model_of_the_package_adjusts_to_the_cost_of_its_own_adjustment(pycolmap, tmp_path):
+    pycolmap.set_random_seed(3)
+    options = pycolmap.SyntheticDatasetOptions()
+    options.num_rigs, options.num_cameras_per_rig, options.num_frames_per_rig, options.num_points3D = (
+        2,
+        1,
+        6,
+        150,
+    )
+    model = pycolmap.synthesize_dataset(options)
+    noise = pycolmap.SyntheticNoiseOptions()
+    noise.point2D_stddev = 0.6
+    pycolmap.synthesize_noise(noise, model)
+    (tmp_path / "before").mkdir()
+    model.write_binary(str(tmp_path / "before"))
+    project = formats.read(tmp_path / "before")
+    assert len(project.block.image_xy) == model.compute_num_observations()
+    assert agreement(project).median < 2.0
+    result = adjust(project.block, datum=InnerConstraints(), tolerance=1e-8)
+    assert result.converged
+    chosen = pycolmap.BundleAdjustmentOptions()
+    chosen.refine_focal_length = chosen.refine_principal_point = chosen.refine_extra_params = False
+    chosen.refine_sensor_from_rig = False
+    pycolmap.bundle_adjustment(model, chosen)
+    residuals = [
+        np.sum((image.project_point(model.points3D[own.point3D_id].xyz) - own.xy) ** 2)
+        for image in model.images.values()
+        for own in image.points2D
+        if own.has_point3D()
+    ]
+    np.testing.assert_allclose(result.sums_of_squares.plates, np.sum(residuals), rtol=1e-4)
+    assert np.isfinite(result.photo_covariances).all()
+    assert np.isfinite(result.point_covariances[result.used_points]).all()

@@ -1,0 +1,320 @@
+"""The plain project: what is read, what is refused and where, round trips."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from block import check_adjustment, check_poses, same_blocks, sample, truth, with_control, with_noise
+from damaged import check_damaged
+
+from photogram import Camera, InputError, adjust, first_values, formats, simulate
+from photogram.io import delimited
+from photogram.io.delimited import read_columns
+from photogram.network.observations import Attitude, Control, Difference, Distance, Position
+from photogram.network.rigs import Mount
+from photogram.network.unknowns import Boresight, Drift, LeverArm, Sensor, Shift
+
+EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
+
+
+@pytest.fixture
+def example(tmp_path):
+    return Path(shutil.copytree(EXAMPLE, tmp_path / "project"))
+
+
+def change(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def written(project, place, file_format="plain"):
+    place.mkdir(parents=True, exist_ok=True)
+    for name, content in formats.to_files(project, file_format).items():
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        (place / name).write_bytes(content)
+    return place
+
+
+# What is read
+
+
+def test_the_sample_is_the_truth():
+    project = formats.read(sample("project"))
+    check_poses(project.block, truth()["photos"])
+    found = {
+        (project.block.photo_ids[photo], project.block.point_ids[point]): xy
+        for photo, point, xy in zip(
+            project.block.image_photos, project.block.image_points, project.block.image_xy, strict=True
+        )
+    }
+    for each in truth()["observations"]:
+        np.testing.assert_allclose(
+            found[each["photo"], each["point"]], [each["column"], each["row"]], rtol=0, atol=1e-9
+        )
+    assert project.sizes == ((4000, 3000), (3000, 4000))
+    assert [project.block.point_ids[row] for row in project.checks] == ["CHK-1", "CHK-2"]
+    assert sum(isinstance(each, Position) for each in project.block.observations) == 6
+
+
+def test_the_sample_with_noise_comes_out_as_the_dense_adjustment():
+    check_adjustment(with_control(with_noise(formats.read(sample("project")))))
+
+
+def test_the_small_sample_has_no_more_than_it_needs():
+    project = formats.read(sample("project_small"))
+    started = first_values(project.block)
+    result = adjust(started.usable())
+    known = truth()["photos"]
+    for name, position in zip(result.block.photo_ids, result.photo_positions, strict=True):
+        np.testing.assert_allclose(position, known[name]["centre"], atol=1e-6)
+    assert "--sd images" in project.lacks[0]
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "decimal", "ending"),
+    [(",", ".", "\n"), (";", ",", "\r\n"), ("\t", ",", "\n"), (" ", ".", "\r")],
+)
+def test_tables_are_read_in_every_usual_dress(example, delimiter, decimal, ending):
+    plain = formats.read(example)
+    for path in example.glob("*.csv"):
+        rows = [line.split(",") for line in path.read_text().splitlines() if not line.startswith("#")]
+        order = np.random.default_rng(1).permutation(len(rows[0]))
+        text = [
+            delimiter.join(
+                row[k].replace(".", decimal) if row is not rows[0] else row[k].upper() for k in order
+            )
+            for row in rows
+        ]
+        path.write_bytes(b"\xef\xbb\xbf" + ending.join(["# a comment", *text, ""]).encode())
+    project = formats.read(example)
+    same_blocks(plain.block, project.block)
+    assert adjust(project.block).variance_of_unit_weight == pytest.approx(
+        adjust(plain.block).variance_of_unit_weight
+    )
+
+
+def test_a_large_table_is_read_by_the_quick_way_as_by_the_slow_one(tmp_path, monkeypatch):
+    random = np.random.default_rng(5)
+    rows = [
+        f"IMG {k // 40}.jpg, p{k % 977},{x!r},{y!r}"
+        for k, (x, y) in enumerate(random.uniform(-1e4, 1e4, (4000, 2)).tolist())
+    ]
+    path = tmp_path / "images.csv"
+    path.write_text("\n".join(["photo,point,column,row", *rows, ""]))
+    slow = read_columns(path, numbers={"column", "row"})
+    monkeypatch.setattr(delimited, "LARGE", 100)
+    fast = read_columns(path, numbers={"column", "row"})
+    assert fast.ready
+    assert not slow.ready
+    for name in ("photo", "point"):
+        assert fast.names(name).names == slow.names(name).names
+        np.testing.assert_array_equal(fast.names(name).rows, slow.names(name).rows)
+    for name in ("column", "row"):
+        np.testing.assert_array_equal(fast.numbers(name), slow.numbers(name))
+    assert fast.place(17) == slow.place(17)
+
+
+def test_angles_in_other_units_and_representations(example):
+    plain = formats.read(example).block
+    lines = (example / "photos.csv").read_text().splitlines()
+    rows = [line.split(",") for line in lines if line and not line.startswith("#")][1:]
+    matrices = [
+        np.array(m)
+        for m in __import__("photogram")
+        .Attitudes.of("omega_phi_kappa", plain.photo_attitudes)
+        .values("matrix_to_photo")
+    ]
+    flip = np.diag([1.0, -1.0, -1.0])
+    head = "photo,camera,x,y,z,"
+    names = ",".join(f"m{i}{j}" for i in "123" for j in "123")
+    cases = {
+        'angle = "gon"': (
+            "omega,phi,kappa",
+            [[repr(float(each) / 0.9) for each in row[5:]] for row in rows],
+        ),
+        'angle = "dms"': (
+            "omega,phi,kappa",
+            [[dms(float(each)) for each in row[5:]] for row in rows],
+        ),
+        'attitude = "matrix"': (names, [[repr(float(each)) for each in m.ravel()] for m in matrices]),
+        'attitude = "matrix"\nrotation = "photo_to_object"': (
+            names,
+            [[repr(float(e)) for e in m.T.ravel()] for m in matrices],
+        ),
+        'attitude = "matrix"\nphoto = "y_down"': (
+            names,
+            [[repr(float(e)) for e in (flip @ m).ravel()] for m in matrices],
+        ),
+    }
+    settings = (example / "project.toml").read_text()
+    for words, (columns, values) in cases.items():
+        section = "[units]" if words.startswith("angle") else "[axes]"
+        (example / "project.toml").write_text(settings.replace(section, f"{section}\n{words}", 1))
+        body = [",".join([*row[:5], *own]) for row, own in zip(rows, values, strict=True)]
+        (example / "photos.csv").write_text("\n".join([head + columns, *body, ""]))
+        found = formats.read(example).block
+        np.testing.assert_allclose(found.photo_attitudes, plain.photo_attitudes, atol=1e-12)
+
+
+def dms(angle):
+    """Return an angle of one decimal in degrees, minutes and seconds."""
+    return f"{'-' if angle < 0 else ''}{int(abs(angle))} {round((abs(angle) % 1) * 60)} 0.0"
+
+
+def test_every_kind_of_observation_comes_back(tmp_path):
+    made = simulate(
+        strips=2, photos_per_strip=3, points_per_photo=12, control="corners", check_points=2, seed=4
+    )
+    block = made.block
+    photos, points = block.photo_ids, block.point_ids
+    lever, shift, drift = LeverArm("lever", [0.1, 0.0, -0.2], 0.05), Shift("flight"), Drift("flight")
+    body = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    boresight = Boresight("imu", body, np.radians(0.5))
+    covariance = np.array([[4.0, 1.0, 0.5], [1.0, 5.0, -0.3], [0.5, -0.3, 9.0]]) * 1e-4
+    free = next(row for row in range(len(points)) if not np.isfinite(block.point_positions[row]).any())
+    camera = Camera("brown", {"c": 152.0, "xp": 0.01, "K1": 1e-8}, {"c": np.inf, "K1": 1e-9}, name="A")
+    observations = [
+        *(
+            Position(
+                name,
+                block.photo_positions[row],
+                covariance=covariance,
+                lever_arm=lever,
+                shift=shift,
+                drift=drift,
+                time=float(row),
+            )
+            for row, name in enumerate(photos)
+        ),
+        *(Attitude(name, np.eye(3), sd=1e-3, boresight=boresight) for name in photos[:3]),
+        Distance(points[0], points[1], 123.25, 0.01),
+        Difference(points[1], points[2], [np.nan, np.nan, 1.5], sd=0.002),
+        Control(points[free], [10.0, 20.0, 30.0], covariance=covariance),
+    ]
+    block = block.replace(
+        principal_distances=None, cameras=[camera], photo_cameras=None, observations=observations
+    )
+    block = block.replace(
+        photo_cameras=[0, 1, 0, 1, 0, 0],
+        cameras=[camera, camera.replace(name="B")],
+        mounts=[
+            Mount(photos[1], photos[0], sensor := Sensor("0/B", [0.5, 0.0, 0.1], np.eye(3), 0.01)),
+            Mount(photos[3], photos[2], sensor),
+        ],
+        photo_position_sd=np.inf,
+        photo_attitude_sd=np.inf,
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
+    )
+    project = formats.Project(
+        block=block,
+        path=tmp_path,
+        title="made",
+        sizes=(None, None),
+        pixel_mm=(None, None),
+        starts=made.block.point_positions,
+    )
+    assert formats.cannot_hold(project, "plain") == []
+    other = formats.read(written(project, tmp_path / "there")).block
+    assert sorted(each.KIND for each in other.observations) == sorted(each.KIND for each in observations)
+    by_kind = {
+        kind: [each for each in other.observations if kind == each.KIND]
+        for kind in ("position", "attitude", "control", "difference")
+    }
+    first = by_kind["position"][0]
+    np.testing.assert_allclose(first.precision, covariance, rtol=1e-14)
+    assert all(each.lever_arm is first.lever_arm for each in by_kind["position"])
+    np.testing.assert_allclose(first.lever_arm.value, [0.1, 0.0, -0.2])
+    np.testing.assert_allclose(first.lever_arm.deviations, 0.05)
+    assert first.shift is not None
+    assert [each.time for each in by_kind["position"]] == list(range(6))
+    np.testing.assert_allclose(by_kind["attitude"][0].boresight.attitude, body, atol=1e-12)
+    np.testing.assert_allclose(by_kind["control"][0].precision, covariance, rtol=1e-14)
+    np.testing.assert_allclose(by_kind["difference"][0].observed, [np.nan, np.nan, 1.5])
+    assert [(each.photo, each.frame) for each in other.mounts] == [
+        (each.photo, each.frame) for each in block.mounts
+    ]
+    np.testing.assert_allclose(other.mounts[0].sensor.position, [0.5, 0.0, 0.1])
+    np.testing.assert_allclose(other.mounts[0].sensor.deviations, 0.01, rtol=1e-12)
+    assert [each.parameters for each in other.cameras] == [each.parameters for each in block.cameras]
+    np.testing.assert_array_equal(other.cameras[0].deviations, camera.deviations)
+
+
+def test_a_round_trip_gives_the_same_adjustment(example, tmp_path):
+    one = formats.read(example)
+    two = formats.read(written(one, tmp_path / "again"))
+    first, second = adjust(one.block, tolerance=1e-9), adjust(two.block, tolerance=1e-9)
+    order = [two.block.point_ids.index(name) for name in one.block.point_ids]
+    assert (np.abs(second.point_positions[order] - first.point_positions) < 1e-9 * first.point_sd).all()
+    assert (np.abs(second.photo_positions - first.photo_positions) < 1e-9 * first.photo_sd[:, :3]).all()
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "words"),
+    [
+        ("images.csv", "DJI_0101,t02", "DJI_0101,t03", ["images.csv", "record", "already"]),
+        ("images.csv", "DJI_0101,t02", "DJI_0101,", ["images.csv", "record 4", "column point", "empty"]),
+        ("images.csv", "DJI_0101,t02", "DJI_0101,NaN", ["record 4", "column point", "no name"]),
+        ("images.csv", "DJI_0101,t02", "DJI_0101,T02", ["images.csv", "column point", "case alone"]),
+        ("images.csv", "DJI_0101,t02", "dji_0101,t02", ["record 4", "column photo"]),
+        (
+            "images.csv",
+            "DJI_0101,t02,",
+            "DJI_0101,t02,x",
+            ["record 4", "column column", "is not a number", "|DJI_0101,t02,x"],
+        ),
+        ("images.csv", "DJI_0101,t02,", "DJI_0101,t02,nan,", ["record 4"]),
+        ("images.csv", "photo,point,column,row", "photo,point,colum,row", ["record 2", "missing"]),
+        ("photos.csv", "DJI_0102,", "DJI_0101,", ["photos.csv", "record 5", "twice"]),
+        ("photos.csv", "DJI_0102,drone", "DJI_0102,phone", ["record 5", "column camera", "phone"]),
+        ("cameras.csv", "opencv", "opncv", ["cameras.csv", "record 4", "column model", "opncv"]),
+        ("cameras.csv", "drone,opencv,4000", "drone,opencv,4e3.", ["record 4", "column width"]),
+        ("control.csv", "south-2,", "south-1,", ["control.csv", "twice"]),
+        ("control.csv", ",check", ",chek", ["control.csv", "column use", "chek"]),
+        ("gnss.csv", "DJI_0103", "DJI_0203", ["gnss.csv", "column photo", "DJI_0203"]),
+        ("distances.csv", "south-1", "south-9", ["distances.csv", "column to", "south-9"]),
+        ("project.toml", "[units]", "[unit]", ["project.toml", "record", "did you mean units"]),
+        ("project.toml", "images = 0.5", "image = 0.5", ["project.toml", "did you mean images"]),
+        ("project.toml", "images = 0.5", "images = -0.5", ["project.toml", "standard deviation"]),
+        ("project.toml", "format = 1 ", "format = 7 ", ["project.toml", "version 1"]),
+        ("project.toml", "format = 1 ", "format = = ", ["project.toml", "record 6"]),
+    ],
+)
+def test_a_fault_is_named_with_file_row_and_column(example, file, old, new, words):
+    change(example / file, old, new)
+    with pytest.raises(InputError) as refused:
+        formats.read(example)
+    for word in words:
+        assert word in str(refused.value)
+
+
+def test_names_that_differ_by_blanks_inside_are_an_error(example):
+    text = (example / "images.csv").read_text().replace("t02", "t 2").replace("t03", "t  2")
+    (example / "images.csv").write_text(text)
+    with pytest.raises(InputError, match="differs from 't 2' by blanks or case alone"):
+        formats.read(example)
+
+
+def test_two_files_of_one_table_and_a_missing_one(example):
+    shutil.copy(example / "images.csv", example / "images.txt")
+    with pytest.raises(InputError, match=r"two files for the table images: images\.csv and images\.txt"):
+        formats.read(example)
+    change(example / "project.toml", '# images = "measurements.txt"', 'images = "measurements.txt"')
+    with pytest.raises(InputError, match=r"the table images is not there"):
+        formats.read(example)
+
+
+def test_a_point_that_is_known_twice_must_be_the_same(example):
+    (example / "points.csv").write_text("point,x,y,z\nsouth-1,1,2,3\n")
+    with pytest.raises(InputError, match="south-1 has another x in the table points"):
+        formats.read(example)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_damaged_projects_end_in_a_message(example, tmp_path, seed):
+    assert check_damaged(example, tmp_path / "damaged", None if seed else "plain", 100, seed) > 30

@@ -1,0 +1,156 @@
+"""`photogram new`, `adjust`, `info`, `convert`."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from photogram import adjust, formats
+
+
+def test_a_new_project_is_adjusted_in_one_command(run, tmp_path):
+    assert run("new", "own").exit_code == 0
+    assert run("new", "own").exit_code == 1
+    assert run("new", "own", "--overwrite").exit_code == 0
+    done = run("adjust", "own", "--json", "result.json")
+    assert done.exit_code == 0, done.output
+    assert "plain project" in done.output
+    assert "6 photos" in done.output
+    place = tmp_path / "own-adjusted"
+    result = adjust(formats.read(tmp_path / "own").block, unit_variance="free")
+    points = pd.read_csv(place / "points.csv", comment="#")
+    np.testing.assert_allclose(points[["X", "Y", "Z"]], result.point_positions, rtol=1e-12)
+    np.testing.assert_allclose(points[["sd_X", "sd_Y", "sd_Z"]], result.point_sd, rtol=1e-9)
+    covariances = pd.read_csv(place / "photo_covariances.csv", comment="#")
+    lower = np.tril_indices(6)
+    np.testing.assert_allclose(
+        covariances.iloc[:, 1:].to_numpy(),
+        result.photo_covariances[:, lower[0], lower[1]],
+        rtol=1e-9,
+        atol=1e-18,
+    )
+    assert json.loads((tmp_path / "result.json").read_text())["status"] == "converged"
+    report = (place / "report.txt").read_text()
+    assert "Units and axes" in report
+    again = run("adjust", place / "adjusted", "--out", "again", "--quiet")
+    assert again.exit_code == 0, again.output
+    assert again.stdout == ""
+    after = pd.read_csv(tmp_path / "again" / "points.csv", comment="#").set_index("point")
+    np.testing.assert_allclose(
+        after.loc[points["point"], ["X", "Y", "Z"]], points[["X", "Y", "Z"]], atol=1e-6
+    )
+
+
+def test_info_says_what_lies_there_and_writes_nothing_else(run, tmp_path):
+    run("new", "own")
+    before = set(tmp_path.rglob("*"))
+    done = run("info", "own", "--json", "info.json")
+    assert done.exit_code == 0
+    for word in (
+        "plain project",
+        "drone: opencv, 4000 x 3000",
+        "rays of points",
+        "frame: cartesian",
+        "position",
+    ):
+        assert word in done.output
+    assert set(tmp_path.rglob("*")) - before == {tmp_path / "info.json"}
+    assert json.loads((tmp_path / "info.json").read_text())["Read"]
+
+
+def test_what_no_format_knows_is_refused_with_the_formats(run, tmp_path):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file.bin").write_bytes(b"\x00\x01")
+    for path in ("folder", "file.bin"):
+        done = run("adjust", path)
+        assert done.exit_code == 1
+        assert "none of the formats" in done.stderr
+        assert "plain project" in done.stderr
+    done = run("adjust", "nothing")
+    assert done.exit_code == 1
+    assert "nothing" in done.stderr
+    assert run("adjust").exit_code == 2
+
+
+def test_without_control_the_datum_is_asked_for(run, tmp_path):
+    run("new", "own")
+    for name in ("control", "gnss", "distances"):
+        (tmp_path / "own" / f"{name}.csv").unlink()
+    done = run("adjust", "own", "--datum", "control")
+    assert done.exit_code == 1
+    assert "--datum inner" in done.stderr
+    free = run("adjust", "own", "--datum", "inner")
+    assert free.exit_code == 0, free.output
+    assert "inner constraints" in free.output
+    assert run("adjust", "own").exit_code == 0
+
+
+def test_a_user_adds_what_a_project_lacks(run, tmp_path):
+    run("new", "own")
+    whole = tmp_path / "own"
+    result = run("adjust", "own", "--out", "one", "-q")
+    assert result.exit_code == 0
+    (whole / "control.csv").rename(tmp_path / "given.csv")
+    settings = (whole / "project.toml").read_text()
+    (whole / "project.toml").write_text(settings.replace("control = 0.01 ", "# "))
+    (whole / "distances.csv").unlink()
+    lines = (tmp_path / "one" / "adjusted" / "points.csv").read_text()
+    assert lines
+    missing = run("adjust", "own", "--control", "given.csv")
+    assert missing.exit_code == 1
+    assert "control under [sd]" in missing.stderr or "standard deviations" in missing.stderr
+    done = run("adjust", "own", "--control", "given.csv", "--sd", "control=0.01", "--out", "two", "-q")
+    assert done.exit_code == 0, done.output
+    one, two = (
+        pd.read_csv(tmp_path / name / "points.csv", comment="#").set_index("point") for name in ("one", "two")
+    )
+    np.testing.assert_allclose(two.loc[one.index, "Z"], one["Z"], atol=0.02)
+    assert (two["kind"] == "control").sum() == 4
+    free = run(
+        "adjust",
+        "own",
+        "--control",
+        "given.csv",
+        "--sd",
+        "control=0.01",
+        "--self-calibrate",
+        "f,k1",
+        "--out",
+        "three",
+    )
+    assert free.exit_code == 0, free.output
+    cameras = pd.read_csv(tmp_path / "three" / "cameras.csv").set_index("parameter")
+    assert (cameras.loc[["fx", "fy", "k1"], "sd"] > 0).all()
+    for words, say in (
+        (["--self-calibrate", "k9"], "no camera has the parameter k9"),
+        (["--sd", "images=0"], "cannot be without error"),
+        (["--sd", "size=1"], "--sd size=1"),
+        (["--control", "own/gnss.csv"], "column point"),
+    ):
+        refused = run("adjust", "own", *words)
+        assert refused.exit_code == 1, refused.output
+        assert say in refused.stderr
+
+
+def test_what_a_format_cannot_hold_is_listed(run, tmp_path):
+    run("new", "own")
+    done = run("convert", "own", "other")
+    assert done.exit_code == 0
+    assert "Lost, as the format has no place for it\n  nothing" in done.output
+    assert run("convert", "own", "other", "--to", "nothing").exit_code == 1
+    assert {path.name for path in (tmp_path / "other").iterdir()} >= {
+        "project.toml",
+        "images.csv",
+        "gnss.csv",
+    }
+
+
+@pytest.mark.parametrize("command", ["adjust", "info"])
+def test_nothing_goes_over_what_is_read(run, tmp_path, command):
+    run("new", "own")
+    before = (tmp_path / "own" / "images.csv").read_bytes()
+    done = run(command, "own", "--json", "own/images.csv")
+    assert done.exit_code == 1
+    assert "over the input" in done.stderr
+    assert (tmp_path / "own" / "images.csv").read_bytes() == before
