@@ -5,6 +5,7 @@ from photogram.collection import (  # noqa: F401  (the ways to show a result, an
     checking,
     components,
     document,
+    findings,
     report,
     tables,
 )
