@@ -135,6 +135,7 @@ def good(tmp_path_factory):
             "Refraction": {"air": "giant", "water": None, "water_level": 0.0, "refractive_index": 1.34},
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},
+            "check": {"network": block},
             "first_values": {"block": block},
             "group_sums": {"result": photogram.adjust(block)},
             "hints": {"block": block},

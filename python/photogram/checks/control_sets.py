@@ -32,7 +32,7 @@ from photogram.network.rays import LocalAxes, local_axes
 from photogram.results.result import Result
 from photogram.statistics.likelihood import Judged, judged
 
-__all__ = ["Explained", "FreeModel", "doubtful", "explain", "free_model"]
+__all__ = ["Explained", "FreeModel", "doubtful", "explain", "free_model", "similarity_partials"]
 
 MOST = 60
 """Control points that are compared."""
@@ -235,7 +235,7 @@ class FreeModel:
         whole = np.kron(np.eye(len(turned)), similarity.scale * similarity.rotation)
         variances = ((self.per_unit * self.block.point_sd[self.points]).ravel()[rows]) ** 2
         own = (whole @ self.covariance @ whole.T)[np.ix_(rows, rows)] + np.diag(variances)
-        return (target - similarity.of(self.model)).ravel()[rows], _similarity_partials(turned)[rows], own
+        return (target - similarity.of(self.model)).ravel()[rows], similarity_partials(turned)[rows], own
 
     def _target(self, change: Change | None) -> Floats:
         """(k, 3) control as it was meant, in the axes."""
@@ -325,17 +325,16 @@ def _rotation(vector: Floats) -> Floats:
     return turned
 
 
-def doubtful(first: Result | None) -> bool:
-    """Whether control as a whole may be wrong: it does not converge with the images, or much does not fit."""
+def doubtful(first: Result | None, *kinds: str) -> bool:
+    """Whether all observations of some kinds may be wrong: an adjustment fails, or several do not fit."""
     if first is None or not first.converged:
         return True
     values = tests(first)
     size = max(mad_sd(first.standardized), np.finfo(np.float64).tiny)
     limit = critical(sum(int((each > 0).sum()) for each in values.values())) * size
-    held = np.isfinite(first.block.point_sd)
-    fixed = held & (first.block.point_sd == 0)
-    beyond = (values["control"] > limit).any(axis=1)
-    return bool(beyond.sum() >= MANY or (fixed.any() and size > MANY))
+    beyond = sum(int((values[kind] > limit).any(axis=1).sum()) for kind in kinds if kind in values)
+    fixed = "control" in kinds and bool((first.block.point_sd == 0).any())
+    return beyond >= MANY or (fixed and size > MANY)
 
 
 def free_model(block: Block, adjusted: Adjuster) -> FreeModel | None:
@@ -373,14 +372,14 @@ def _of_shape(covariance: Floats, model: Floats) -> Floats:
 
     A similarity is found anyhow; what the datum of the model says of it would only cost digits.
     """
-    basis, _ = np.linalg.qr(_similarity_partials(model - model.mean(axis=0)))
+    basis, _ = np.linalg.qr(similarity_partials(model - model.mean(axis=0)))
     across = np.eye(len(covariance)) - basis @ basis.T
     shape = across @ covariance @ across
     found: Floats = shape + np.trace(shape) / len(shape) * basis @ basis.T
     return found
 
 
-def _similarity_partials(turned: Floats) -> Floats:
+def similarity_partials(turned: Floats) -> Floats:
     """(3k, 7) partials of points, counted from their mean, by shift, scale and rotation."""
     design = np.zeros((len(turned), 3, 7))
     design[:, :, :3] = np.eye(3)

@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.checks.adjusting import Adjuster
-from photogram.checks.findings import Finding, Level, Section
+from photogram.checks.findings import Finding, Section
 from photogram.checks.gross import Suspects
 from photogram.checks.predictions import (
     exchange,
@@ -23,7 +23,7 @@ from photogram.checks.predictions import (
 )
 from photogram.checks.rivals import rival_images
 from photogram.checks.robust import critical, mad_sd
-from photogram.checks.views import kept_images
+from photogram.checks.views import View, kept_images
 from photogram.checks.words import small_unit
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
@@ -32,7 +32,7 @@ from photogram.results.kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC
 
-__all__ = ["Edited", "edit"]
+__all__ = ["BESIDE", "Edited", "edit"]
 
 ROUNDS = 20
 """Adjustments at the most."""
@@ -52,6 +52,7 @@ EXCHANGES = 5
 LOOSE = 0.01
 """Standard deviation of control that strains no block, as a part of the flying height."""
 BLUNDER = 3.0
+TWENTIETH = 1.96
 SURE = 1e-4
 """Chance that the largest test value of a good block is beyond what is grave."""
 SHOWN = 20
@@ -102,7 +103,6 @@ class _Suspect:
     row: int
     axis: int
     test: float
-    grave: bool
 
 
 def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
@@ -172,6 +172,9 @@ def _edited(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
     except AdjustmentError as error:
         return Edited(None, None, str(error), float("nan"), section)
     _list(last, spread, section)
+    limit = _grave(last, spread)
+    section.findings = _graded(section.findings, limit)
+    control = {name: _graded(findings, limit) for name, findings in control.items()}
     return Edited(first, last, "", spread, section, control, exchanged, cleared)
 
 
@@ -185,9 +188,9 @@ def _gross_control(block: Block, adjusted: Adjuster) -> Indices:
     With standard deviations of a hundredth of the flying height, control strains no block, and what is wrong
     by many times that shows.
     """
-    rays = Rays.of(block)
+    rays = Rays.of(View.of(block).seen)
     away = np.linalg.norm(
-        rays.intersect().positions[block.image_points] - rays.centres[block.image_photos], axis=1
+        rays.intersect().positions[rays.block.image_points] - rays.centres[rays.block.image_photos], axis=1
     )
     if not np.isfinite(away).any():
         return np.empty(0, dtype=np.int64)
@@ -228,15 +231,11 @@ def _judged(
 ) -> tuple[Result, float]:
     """Hold what agrees with its prediction of the control that was left out, and report the rest."""
     errors, tests = tests_of_predictions(result, given, points, spread)
-    count = int(np.isfinite(given.point_sd).sum())
-    limit, sure = critical(count), critical(count, SURE)
+    limit = critical(int(np.isfinite(given.point_sd).sum()))
     point_sd = result.block.point_sd.copy()
     for row, error, test in zip(points.tolist(), errors, np.abs(tests), strict=True):
         for axis in np.flatnonzero(test > limit).tolist():
-            value = float(test[axis])
-            finding = _control_finding(
-                given, row, axis, float(error[axis]), value * spread, grave=value > sure
-            )
+            finding = _control_finding(given, row, axis, float(error[axis]), float(test[axis]) * spread)
             control.setdefault(given.point_ids[row], []).append(finding)
         fits = test <= limit
         point_sd[row, fits] = given.point_sd[row, fits]
@@ -358,9 +357,9 @@ def _largest(result: Result, spread: float) -> list[_Suspect]:
     """Return the observations beyond the critical value that are the largest of their neighbourhood."""
     values = tests(result)
     count = sum(int((each > 0).sum()) for each in values.values())
-    limit, sure = critical(count) * spread, critical(count, SURE) * spread
+    limit = critical(count) * spread
     beyond = [
-        _Suspect(kind, int(row), int(axis), float(each[row, axis]), bool(each[row, axis] > sure))
+        _Suspect(kind, int(row), int(axis), float(each[row, axis]))
         for kind, each in values.items()
         for row, axis in np.argwhere(each > limit)
     ]
@@ -418,17 +417,16 @@ def _finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     if suspect.kind == "control":
         row, axis = suspect.row, suspect.axis
         error = -float(result.point_differences[row, axis] / result.point_redundancy[row, axis])
-        return _control_finding(result.block, row, axis, error, suspect.test, grave=suspect.grave)
-    level: Level = "grave" if suspect.grave else "look"
+        return _control_finding(result.block, row, axis, error, suspect.test)
     if suspect.kind != "station":
-        return _other_finding(result, suspect, level)
+        return _other_finding(result, suspect)
     name = result.block.photo_ids[suspect.row]
     what = ("first", "second", "third")[suspect.axis % 3] + (" coordinate" if suspect.axis < 3 else " angle")
     text = f"the {what} of station {name} contradicts its standard deviation (test value {suspect.test:.1f})"
-    return Finding("station-misfit", level, text, [name], [], {"test_value": suspect.test})
+    return Finding("station-misfit", "look", text, [name], [], {"test_value": suspect.test})
 
 
-def _other_finding(result: Result, suspect: _Suspect, level: Level) -> Finding:
+def _other_finding(result: Result, suspect: _Suspect) -> Finding:
     """Say that an observation beside images does not fit."""
     kind = _kind(result, suspect)
     observation = result.block.observations[int(kind.rows[suspect.row])]
@@ -442,10 +440,10 @@ def _other_finding(result: Result, suspect: _Suspect, level: Level) -> Finding:
     )
     values = {"test_value": suspect.test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
     photos, points = list(observation.photos), list(observation.points)
-    return Finding("observation-misfit", level, text, photos, points, values)
+    return Finding("observation-misfit", "look", text, photos, points, values)
 
 
-def _control_finding(block: Block, row: int, axis: int, error: float, test: float, *, grave: bool) -> Finding:
+def _control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
     """Say that a component of control does not fit; `error` is that of the given value."""
     angle = block.geographic and axis < 2
     unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
@@ -456,7 +454,7 @@ def _control_finding(block: Block, row: int, axis: int, error: float, test: floa
         f" its error is about {error:.3f} {unit}"
     )
     values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
-    return Finding("control-misfit", "grave" if grave else "look", text, [], [name], values)
+    return Finding("control-misfit", "look", text, [], [name], values)
 
 
 def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
@@ -478,7 +476,7 @@ def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     )
     return Finding(
         "blunder",
-        "grave" if suspect.grave else "look",
+        "look",
         text,
         [block.photo_ids[photo], *others],
         [block.point_ids[point]],
@@ -489,6 +487,24 @@ def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
             "axis": float(axis),
         },
     )
+
+
+def _grave(result: Result, spread: float) -> float:
+    """Return the test value from which a finding is grave.
+
+    Where errors have heavier tails than normal ones, the tail tells the spread: one in twenty is beyond 1.96.
+    """
+    values = tests(result)
+    images = values["image"][values["image"] > 0]
+    tail = float(np.quantile(images, 0.95)) / TWENTIETH if images.size else spread
+    return critical(sum(int((each > 0).sum()) for each in values.values()), SURE) * max(spread, tail)
+
+
+def _graded(findings: list[Finding], limit: float) -> list[Finding]:
+    """Return findings, grave where their test value is beyond a limit."""
+    return [
+        replace(each, level="grave" if each.values["test_value"] > limit else "look") for each in findings
+    ]
 
 
 def _list(result: Result, spread: float, section: Section) -> None:

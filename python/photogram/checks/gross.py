@@ -40,8 +40,10 @@ FEWEST_ERRORS, ERRORS_OF_PHOTO = 5, 0.3
 """So many gross errors, and such a part of its images, condemn a photo as a whole."""
 CANDIDATES = 5
 """Photos with the largest residuals that are left out on trial."""
-IMAGE_KINDS = ("gross-error", "exchanged-points")
+IMAGE_KINDS = ("gross-error", "exchanged-points", "name-used-twice")
 """Findings on images, which the adjusted stations may disprove."""
+PARTED, FEWEST_OF_TWO = 0.1, 2
+"""One name is of two points when so much is left of its residuals in two groups of so many rays or more."""
 MOST_PHOTOS = 20
 MOST_ON_PHOTO = 30
 
@@ -249,12 +251,42 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
         proof: Level = "grave" if len(rows) > 3 or departure > CHANCE * BREAK else "look"
         return Finding("gross-error", proof, text, [photo], [name], values), row
     photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
+    parted = _parted(solver, point, rows, before) if len(rows) >= 2 * FEWEST_OF_TWO else None
+    if parted is not None:
+        one, other = (
+            " and ".join(block.photo_ids[photo] for photo in block.image_photos[each].tolist())
+            for each in parted
+        )
+        text = (
+            f"the name {name} stands for two points: its rays of the photos {one} meet, and those of"
+            f" {other}, but not with each other (they miss by {before:.3f} {unit})"
+        )
+        return Finding("name-used-twice", "grave", text, photos, [name], values), rows
     text = (
         f"point {name} does not fit (its rays miss by {before:.3f} {unit}), on one of the photos"
         f" {', '.join(photos)}: misidentified, or one name for two points?"
     )
     level: Level = "grave" if departure > FLAGRANT else "look"
     return Finding("gross-error", level, text, photos, [name], values), rows
+
+
+def _parted(solver: _Solver, point: int, rows: Indices, before: float) -> tuple[Indices, Indices] | None:
+    """Return the images of a point in two groups, each of which meets well by itself, if there are such."""
+    best, found = PARTED * before, None
+    for pair in combinations(rows.tolist(), 2):
+        position = solver.changed(point, rows[~np.isin(rows, pair)].tolist(), [])
+        residuals, in_front = solver.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
+        near = in_front & (np.linalg.norm(residuals, axis=1) < PARTED * before)
+        one, other = rows[near], rows[~near]
+        if min(len(one), len(other)) < FEWEST_OF_TWO:
+            continue
+        left = max(
+            solver.largest(one, solver.changed(point, other.tolist(), [])),
+            solver.largest(other, solver.changed(point, one.tolist(), [])),
+        )
+        if left < best:
+            best, found = left, (one, other)
+    return found
 
 
 def _departures(rays: Rays, residuals: Floats) -> Floats:
