@@ -11,8 +11,8 @@ from photogram import adjust, resect
 from photogram.geometry import project
 from photogram.show.sections import verdict_section
 from photogram.simulation import simulate
-from photogram.statistics import Findings, Snooped, global_test, group_tests, verdict
-from photogram.statistics.findings import Component, Systematic, by_t, by_w, of_groups
+from photogram.statistics import Findings, Removed, global_test, group_tests, verdict
+from photogram.statistics.findings import GroupFactor, Systematic, by_t, by_w, of_groups
 from photogram.statistics.outliers import Observations
 from photogram.statistics.verdict import worst
 
@@ -40,7 +40,7 @@ def pattern(probability=1e-9, *, large=True):
 
 
 def component(factor, significant=True):
-    return Component("strip 1", factor, (0.9 * factor, 1.1 * factor), significant)
+    return GroupFactor("strip 1", factor, (0.9 * factor, 1.1 * factor), significant)
 
 
 with_blunder = good()
@@ -54,9 +54,9 @@ CASES = {
     "hint": (findings(with_blunder, 2.0, hints=["probably feet"]), 4, False, "Probably feet"),
     "stars": (findings(good(), doubtful=["exposure 2"]), 4, False, "The identification of stars is doubtful"),
     "blunder": (findings(with_blunder, 2.0), 4, False, "Gross errors likely: 1) y of point 7 (w = 9)"),
-    "removed": (findings(good(), snooped=Snooped([{"name": "a"}])), 0, False, "Usable after removal of 1"),
-    "too much": (findings(good(), snooped=Snooped([{"name": "a"}], images=0.06)), 4, False, "Too much had"),
-    "control": (findings(good(), snooped=Snooped([{"name": "a"}], control=0.4)), 4, False, "Too much had"),
+    "removed": (findings(good(), snooped=Removed([{"name": "a"}])), 0, False, "Usable after removal of 1"),
+    "too much": (findings(good(), snooped=Removed([{"name": "a"}], images=0.06)), 4, False, "Too much had"),
+    "control": (findings(good(), snooped=Removed([{"name": "a"}], control=0.4)), 4, False, "Too much had"),
     "factor": (findings(good(factor=2.0), 4.0), 0, True, "Weights too optimistic: standard deviations are"),
     "far": (findings(good(factor=200.0), 4e4), 4, False, "Weights too optimistic"),
     "group": (findings(good(), components=[component(2.0)]), 0, True, "Standard deviations are wrong: those"),
@@ -88,7 +88,7 @@ def test_conditions(case):
 def test_a_variance_of_thousands_is_never_without_problems():
     """Whatever else is known or not."""
     for w in (good(), good(factor=189.0), with_blunder, np.full((120, 2), math.nan)):
-        for more in ({}, {"snooped": Snooped([])}, {"systematic": [pattern()]}, {"computed": False}):
+        for more in ({}, {"snooped": Removed([])}, {"systematic": [pattern()]}, {"computed": False}):
             made = verdict(findings(w, 35_820.0, **more))
             assert made.exit == 4, (made.headline, more)
 

@@ -96,6 +96,7 @@ def _document(found: VarianceComponents) -> bytes:
     return json.to_json(
         {
             "program": f"photogram {_photocore.__version__}",
+            "verdict": found.verdict.document(),
             "converged": estimate.converged,
             "level": estimate.level,
             "components": [dict(zip(names, row, strict=True)) for row in zip(*columns.values(), strict=True)],
@@ -120,7 +121,7 @@ def _document(found: VarianceComponents) -> bytes:
 def _report(found: VarianceComponents) -> str:
     """Return the components as text: what to do first."""
     sections: list[Section] = [
-        ("Verdict", _verdict(found)),
+        ("Verdict", [f"{found.verdict.headline}.", *_verdict(found)]),
         ("Variance components", component_lines(found)),
         ("Groups that were merged or held", list(found.estimate.messages)),
     ]

@@ -205,7 +205,8 @@ class Evidence:
         """Return what is said of every adjustment: size of the factor, few degrees of freedom, no test."""
         lines = self._by_what()
         test = self.test
-        if test is not None and not (self.high or self.low) and (test.rejected_high or test.rejected_low):
+        rejected = test is not None and (test.rejected_low or (test.rejected_high and not self.gross))
+        if rejected and not (self.high or self.low):
             lines.append(
                 f"the global test rejects, but residuals are only {self.factor:.3g} times as expected"
             )
