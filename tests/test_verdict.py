@@ -116,6 +116,18 @@ def test_gross_errors_beside_a_common_factor():
     assert verdict(alike).code == "weights"
 
 
+def test_a_few_gross_errors_that_spoil_everything_are_no_model():
+    """A control point wrong by 500 m bends the block: all residuals show it, a few of them most of it."""
+    w = good(factor=5.0)
+    w[:3] *= 60.0
+    few = findings(w, 400.0, systematic=[pattern()])
+    assert verdict(few).code == "gross-errors"
+    assert any("The model is likely wrong" in line for line in verdict(few).lines)
+    w[:3] = good(factor=5.0)[:3]
+    w[0, 0] = 30.0
+    assert verdict(findings(w, 27.0, systematic=[pattern()])).code == "model"
+
+
 def test_the_order_is_that_of_the_probabilities():
     w = good()
     w[5, 0], w[9, 1], w[2, 0] = -7.0, 40.0, 6.0
