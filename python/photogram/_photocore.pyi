@@ -704,8 +704,8 @@ class BlockNetwork:
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended, in the datum that it was taken to."""
 
-    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
-        """Prepare for trials without some observations, from where the adjustment has ended."""
+    def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where an adjustment ended, or from the start."""
 
     def resistance(self, state: BlockState, *, threads: int) -> list[tuple[str, float]]:
         """Return what keeps the block from moving as a whole: kinds of observations.
@@ -745,14 +745,12 @@ class NetworkTrial:
     def deviations(self) -> _Floats:
         """(M,) standard deviations a priori, in the units of the observations."""
 
-    def stand(self, held: list[int]) -> tuple[str, int, float, int, list[int]]:
-        """Take the network as it stands, with everything in it; return how it stands, as `adjust`.
+    @property
+    def photos(self) -> list[list[float]]:
+        """The values of each photo where the last trial has ended: as they are given, pose first."""
 
-        Parameters
-        ----------
-        held
-            Unknowns that were held for a datum.
-        """
+    def stand(self) -> tuple[str, int, float, int, list[int]]:
+        """Take the network as its adjustment has ended, with everything in it; return what `adjust` does."""
 
     def adjust(
         self,
@@ -2012,8 +2010,8 @@ class CollectionNetwork:
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended."""
 
-    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
-        """Prepare for trials without some observations, from where the adjustment has ended."""
+    def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where an adjustment ended, or from the start."""
 
 @final
 class CollectionSolution(_NetworkSolution):

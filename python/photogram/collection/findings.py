@@ -32,6 +32,7 @@ def collection_findings(result: AdjustedCollection) -> Findings:
         computed=has_redundancy(result),
         systematic=_patterns(result),
         remarks=unseen(result),
+        snoop="--snoop (photogram.snoop)",
     )
 
 

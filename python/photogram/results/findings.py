@@ -32,6 +32,7 @@ def block_findings(result: Result) -> Findings:
         computed=has_redundancy(result),
         systematic=_patterns(result),
         remarks=unseen(result),
+        snoop="--snoop (photogram.snoop)",
     )
 
 

@@ -366,6 +366,22 @@ impl Network {
         }
     }
 
+    /// The problem of the network as it is given.
+    fn assembled_first(
+        &self,
+        options: &Options,
+        pool: &ThreadPool,
+    ) -> Result<problem::Assembled, NetworkError> {
+        self.check()?;
+        let screened = self.screen(&vec![false; self.points.len()]);
+        if screened.points.is_empty() {
+            return Err(NetworkError::Empty);
+        }
+        let assembled = pool.install(|| self.assemble(options, screened, None))?;
+        assembled.check_memory(options)?;
+        Ok(assembled)
+    }
+
     /// Refuses photos that cannot carry a datum.
     fn check_carriers(&self, inner: &InnerConstraints) -> Result<(), NetworkError> {
         let vectors = self.poses == PoseNumbers::Vectors && !inner.photos.is_empty();

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.statistics.distributions import LEVEL, log_chi_square, log_fisher
 from photogram.statistics.limits import global_test
 from photogram.statistics.reliability import TESTABLE
@@ -18,6 +18,7 @@ from photogram.statistics.snooping.log import Removal, Rival, Round
 from photogram.statistics.snooping.suspects import (
     LostSupportError,
     Out,
+    Prediction,
     Standing,
     Suspects,
     Tests,
@@ -118,6 +119,7 @@ class _Snooping:
         self.remarks: list[str] = []
         self.returns: set[int] = set()
         self.kept: set[int] = set()
+        self.predicted: dict[int, tuple[Prediction, float]] = {}
         self.before = self.standing = trial.adjust(self.out)
         self.tests = trial.tests()
         testable = self.tests.active & (self.tests.rank > 0) & (self.tests.least > TESTABLE)
@@ -133,6 +135,9 @@ class _Snooping:
                 break
         else:
             self.remarks.append(f"snooping has not ended after {self.settings.max_rounds} rounds")
+        out = [place for place, each in enumerate(self.log) if each.is_out]
+        for place in out:
+            self.log[place] = self._with_prediction(place)
         return Outcome(
             log=self.log,
             rounds=self.rounds,
@@ -399,8 +404,7 @@ class _Snooping:
 
     def _left(self, out: Out, point: int) -> Iterator[str]:
         """Put everything of a point out, and say so."""
-        groups = np.flatnonzero(self.suspects.points == point).tolist()
-        for group in groups:
+        for group in self.suspects.on_point(point).tolist():
             rows = self.suspects.rows(group)
             if not out.rows[rows].all():
                 out.rows[rows] = True
@@ -415,20 +419,19 @@ class _Snooping:
         """Test what is out against the rest, and take back what agrees: the best, or all that are apart."""
         places = [place for place, each in enumerate(self.log) if each.is_out]
         predictions = self.trial.predictions([self.log[place].group for place in places])
-        agreeing = []
-        for place, prediction in zip(places, predictions, strict=True):
-            if prediction is None:
-                continue
-            entry = self.log[place]
-            log_p = self._log_probability(prediction.statistic, len(prediction.rows), entry.group)
-            self.log[place] = entry.with_(
-                prediction=prediction.statistic,
-                prediction_log_probability=log_p,
-                prediction_error=prediction.error,
-            )
-            if log_p >= math.log(self.level.limit(0)) and entry.group not in self.returns:
-                agreeing.append((-log_p, place))
-        agreeing.sort()
+        known = [(place, own) for place, own in zip(places, predictions, strict=True) if own is not None]
+        log_p = self._log_probability(
+            np.array([own.statistic for _, own in known]),
+            np.array([len(own.rows) for _, own in known]),
+            np.array([self.log[place].group for place, _ in known], dtype=np.int64),
+        ).tolist()
+        self.predicted = {place: (own, value) for (place, own), value in zip(known, log_p, strict=True)}
+        limit = math.log(self.level.limit(0))
+        agreeing = sorted(
+            (-value, place)
+            for place, (_, value) in self.predicted.items()
+            if value >= limit and self.log[place].group not in self.returns
+        )
         returning = self._apart([place for _, place in agreeing])
         if not returning:
             return []
@@ -441,7 +444,7 @@ class _Snooping:
             return []
         for place in returning:
             self.returns.add(self.log[place].group)
-            self.log[place] = self.log[place].with_(returned=number)
+            self.log[place] = self._with_prediction(place).with_(returned=number)
         if not self.trial.whole:
             return returning
         return returning + self._take_back(number)
@@ -461,15 +464,26 @@ class _Snooping:
                 apart.append(place)
         return apart
 
-    def _log_probability(self, statistic: float, dimension: int, group: int) -> float:
-        """Return the log-probability of what is out as an observation of the network without it."""
+    def _with_prediction(self, place: int) -> Removal:
+        """Return an entry of the log with what the rest says of it."""
+        if place not in self.predicted:
+            return self.log[place]
+        prediction, log_p = self.predicted[place]
+        return self.log[place].with_(
+            prediction=prediction.statistic,
+            prediction_log_probability=log_p,
+            prediction_error=prediction.error,
+        )
+
+    def _log_probability(self, statistic: Floats, dimension: Indices, groups: Indices) -> Floats:
+        """Return log-probabilities of what is out as observations of the network without it."""
         if self.settings.known:
-            return float(log_chi_square(statistic / self.scales[group], dimension))
+            return log_chi_square(statistic / self.scales[groups], dimension)
         f = self.standing.degrees_of_freedom
         if not (f > 0 and self.standing.weighted_sum_of_squares > 0):
-            return 0.0
+            return np.zeros(len(statistic))
         s2 = self.standing.weighted_sum_of_squares / f
-        return float(log_fisher(statistic / dimension / s2, dimension, f))
+        return log_fisher(statistic / dimension / s2, dimension, f)
 
 
 _NOT_DETERMINED = "its point is no longer determined and has left the network"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -61,6 +62,30 @@ class Suspects:
     def rows(self, group: int) -> Indices:
         """Return the rows of a group."""
         return np.arange(self.row_starts[group], self.row_starts[group + 1])
+
+    @cached_property
+    def _by_point(self) -> tuple[Indices, Indices]:
+        order = np.argsort(self.points, kind="stable")
+        return order, self.points[order]
+
+    @cached_property
+    def _by_photo(self) -> tuple[Indices, Indices]:
+        order = np.argsort(self.photos, kind="stable")
+        return order, self.photos[order]
+
+    def on_point(self, point: int) -> Indices:
+        """Return the groups of a point, in their order."""
+        return _at(self._by_point, point)
+
+    def on_photo(self, photo: int) -> Indices:
+        """Return the groups of a photo, in their order."""
+        return _at(self._by_photo, photo)
+
+
+def _at(by: tuple[Indices, Indices], value: int) -> Indices:
+    order, sorted_values = by
+    first, last = np.searchsorted(sorted_values, [value, value + 1])
+    return np.asarray(order[first:last])
 
 
 @dataclass(eq=False)
