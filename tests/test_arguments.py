@@ -113,6 +113,10 @@ def good(tmp_path_factory):
     grid_deck = examples / "perspective_center" / "grid.deck"
     grid = perspective_center.read_deck(grid_deck)[0]
     problem = read_plain(examples / "stellar" / "plate.toml")
+    lens = photogram.Camera("brown", {"c": -152.74}, sd={"K1": 1e-8})
+    calibrated = photogram.adjust(
+        block.replace(cameras=[lens], photo_cameras=[0] * 3, principal_distances=None)
+    )
     points, places = np.array([[100.0, 200.0, 30.0]]), np.array([[0.0, 0.0, 1000.0]])
     resected = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 5.0], [0.0, 100.0, 3.0], [100.0, 100.0, 0.0]])
     seen = photogram.network.geometry.project(
@@ -136,6 +140,10 @@ def good(tmp_path_factory):
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},
             "first_values": {"block": block},
+            "compare": {"results": {"one": calibrated, "two": calibrated}},
+            "eliminate_terms": {"block": calibrated.block},
+            "score_test": {"result": calibrated, "names": ["K3"]},
+            "terms_test": {"result": calibrated, "names": ["K1"]},
             "group_sums": {"result": photogram.adjust(block)},
             "hints": {"block": block},
             "orient": {"stations": stations},

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
     from photogram.adjustment.components import variance_components
+    from photogram.adjustment.elimination import eliminate_terms
     from photogram.adjustment.first_values import FirstValues, first_values
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
     from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
+    from photogram.results.model_tests import compare, score_test, terms_test
     from photogram.results.result import Result
     from photogram.results.variance_function import VarianceFunction
 
@@ -64,6 +66,8 @@ __all__ = [
     "__version__",
     "adjust",
     "check",
+    "compare",
+    "eliminate_terms",
     "first_values",
     "group_sums",
     "hints",
@@ -71,7 +75,9 @@ __all__ = [
     "plan",
     "predict",
     "resect",
+    "score_test",
     "simulate",
+    "terms_test",
     "variance_components",
     "variance_function",
 ]
@@ -106,6 +112,10 @@ _HOMES = {
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
     "check": "checks.checking",
+    "compare": "results.model_tests",
+    "eliminate_terms": "adjustment.elimination",
+    "score_test": "results.model_tests",
+    "terms_test": "results.model_tests",
     "first_values": "adjustment.first_values",
     "group_sums": "results.group_sums",
     "hints": "adjustment.hints",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from photogram.cli.components import COMPONENTS, Components, estimated, shown_components
 from photogram.cli.console import print_sections
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, out_option
@@ -86,6 +87,7 @@ def collection(
     covariance: Annotated[
         bool, typer.Option("--covariance/--no-covariance", help="Compute covariances and redundancy numbers.")
     ] = True,
+    components: Components = None,
     ordering: Ordering = OrderingName.AUTO,
     threads: Threads = None,
     quiet: Quiet = False,
@@ -104,6 +106,8 @@ def collection(
         packing = problem.suffix if problem.suffix in PACKED else ""
         photos, found = recognised(problem)
         names = [] if out is None else [out / "report.txt", out / f"adjusted{found.suffix}{packing}"]
+        if components and out is not None:
+            names.append(out / COMPONENTS)
         job.writes(*names)
         photos = photos.replace(image_sd=sd)
         with job.status("adjusting") as status:
@@ -118,14 +122,17 @@ def collection(
                 threads=threads,
                 progress=shown(status, "cost", 0.5) if status is not None else None,
             )
+        estimates = estimated(job, photos, components, threads)
         written = {}
         if names:
             written[names[0]] = result.report().encode()
             written[names[1]] = to_bytes(result.adjusted(), packing, found.name)
+        if estimates is not None and out is not None:
+            written[out / COMPONENTS] = estimates.report().encode()
         if report is not None:
             written[report] = result.report().encode()
         if json is not None:
             written[json] = result.to_json()
-        sections = [("File", [f"{problem}: {found.title}"]), *summary(result)]
+        sections = [("File", [f"{problem}: {found.title}"]), *summary(result), *shown_components(estimates)]
         whole = (section for section in sections if section[1])
         job.finish(written, summary=lambda: print_sections(whole, "the report"), good=result.converged)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
+from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, shown_components
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, default_out, out_option
@@ -70,6 +71,15 @@ def giant(
             help="Stop by the percent criterion and the limit of iterations of COMMON; list as in 1987.",
         ),
     ] = False,
+    unit_variance: Annotated[
+        UnitVarianceName | None,
+        typer.Option(
+            help="What the variance of unit weight is based on; `redundancy`: on redundancy numbers, whatever"
+            " the weights of the stations. Default: as COMMON says.",
+            show_default=False,
+        ),
+    ] = None,
+    components: Components = None,
     ordering: Ordering = OrderingName.AUTO,
     air_refraction: Annotated[
         AirModel | None,
@@ -121,20 +131,23 @@ def giant(
             job.reads(directory)
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
-        job.writes(*(out / name for name in RESULTS))
+        job.writes(*(out / name for name in RESULTS), *([out / COMPONENTS] if components else []))
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         block = _refracted(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
         try:
-            result = _adjust(job, project, block, as_published, ordering, threads)
+            result = _adjust(job, project, block, as_published, unit_variance, ordering, threads)
         except AdjustmentError:
             # What was remarked on while reading is often the reason.
             for message in project.messages[:SHOWN]:
                 errors.print(escape(str(message)))
             raise
         written = _result_files(project, block, result, out, as_published)
+        found = estimated(job, block, components, threads)
+        if found is not None:
+            written[out / COMPONENTS] = found.report().encode()
         documents = {}
         if json is not None:
             documents[json] = result.to_json()
@@ -146,7 +159,7 @@ def giant(
         job.finish(
             written,
             documents,
-            summary=lambda: print_sections(summary(result), "report.txt"),
+            summary=lambda: print_sections(summary(result) + shown_components(found), "report.txt"),
             good=result.converged,
         )
 
@@ -190,6 +203,7 @@ def _adjust(
     project: Project,
     block: Block,
     as_published: bool,
+    unit_variance: UnitVarianceName | None,
     ordering: OrderingName,
     threads: int | None,
 ) -> Result:
@@ -200,7 +214,7 @@ def _adjust(
     with job.status("adjusting") as status:
         result = adjust(
             block,
-            unit_variance=common.unit_variance,
+            unit_variance=unit_variance.value if unit_variance else common.unit_variance,
             ordering=ordering.value,
             as_published=AsPublished(common.convergence_percent, common.max_iterations)
             if as_published

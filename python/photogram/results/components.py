@@ -16,7 +16,7 @@ from photogram.statistics.components import Component, Estimate
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["VarianceComponents"]
+__all__ = ["VarianceComponents", "component_lines", "statement"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,14 +120,15 @@ def _document(found: VarianceComponents) -> bytes:
 def _report(found: VarianceComponents) -> str:
     """Return the components as text: what to do first."""
     sections: list[Section] = [
-        ("Verdict", _verdict(found)),
+        ("Verdict", statement(found)),
         ("Variance components", component_lines(found)),
         ("Groups that were merged or held", list(found.estimate.messages)),
     ]
     return composed(headline("variance components"), sections)
 
 
-def _verdict(found: VarianceComponents) -> list[str]:
+def statement(found: VarianceComponents) -> list[str]:
+    """Return what to do, in sentences."""
     estimate = found.estimate
     if not estimate.converged:
         return ["the components have not converged: do not use them"]
