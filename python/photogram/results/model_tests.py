@@ -371,7 +371,7 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
 
 
 def _corrected(camera: Camera, measured: Floats) -> Floats:
-    """Return what the lens of a backward camera makes of measured positions: c (u1, u2) / u3 of their rays."""
+    """Return what the lens of a backward camera makes of measured positions: c (u1, u2) / u3 of rays."""
     u = camera.rays(measured)
     return np.asarray(camera.parameters["c"] * u[:, :2] / u[:, 2:])
 
