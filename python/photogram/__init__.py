@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
+    from photogram.adjustment.snooping import snoop
     from photogram.adjustment.variance_function import variance_function
     from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from photogram.results.iteration import Iteration
     from photogram.results.model_tests import compare, score_test, terms_test
     from photogram.results.result import Result
+    from photogram.results.snooped import Snooped
     from photogram.results.variance_function import VarianceFunction
 
 __all__ = [
@@ -60,6 +62,7 @@ __all__ = [
     "Resection",
     "Result",
     "Simulation",
+    "Snooped",
     "Spheroid",
     "VarianceComponents",
     "VarianceFunction",
@@ -77,6 +80,7 @@ __all__ = [
     "resect",
     "score_test",
     "simulate",
+    "snoop",
     "terms_test",
     "variance_components",
     "variance_function",
@@ -108,6 +112,7 @@ _HOMES = {
     "Resection": "adjustment.resection",
     "Result": "results.result",
     "Simulation": "network.simulation",
+    "Snooped": "results.snooped",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
@@ -124,6 +129,7 @@ _HOMES = {
     "predict": "adjustment.prediction",
     "resect": "adjustment.resection",
     "simulate": "network.simulation",
+    "snoop": "adjustment.snooping",
     "variance_components": "adjustment.components",
     "variance_function": "adjustment.variance_function",
 }

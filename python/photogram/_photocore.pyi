@@ -833,6 +833,35 @@ class NetworkTrial:
         none.
         """
 
+    def responses(self, suspects: list[int]) -> _Floats:
+        """Return the columns of R that belong to the rows of some suspects: (., M)."""
+
+    def most_moved(self, suspects: list[int]) -> list[tuple[str, int, int, float, float]]:
+        """Return, for each row of some suspects, the unknown that an error in it moves most.
+
+        Returns
+        -------
+        Kind (`photo`, `camera`, `unknown`, `point`), index and component of the unknown; by how much an error
+        of one standard deviation moves it, in its unit and in its standard deviations (a priori unit weight).
+        """
+
+    def influences(
+        self, covariances: BlockCovariances, partials: _Floats, of: list[tuple[str, int]]
+    ) -> _Floats:
+        """Return what errors of one standard deviation in every row do to functions of the unknowns.
+
+        Parameters
+        ----------
+        covariances
+            Of the same network at the same values, in the datum of what was held.
+        partials, of
+            As for `BlockCovariances.propagate`: (k, u).
+
+        Returns
+        -------
+        (k, M).
+        """
+
     def inseparable(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
         """Return pairs of suspects of one point whose tests are correlated by more than `limit`."""
 
@@ -1607,8 +1636,12 @@ def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
 
 _Station = tuple[float, float, float, float]
 """Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury)."""
-_CameraKind = tuple[float | None, bool, bool]
-"""Principal distance of the distorted image (None: scale first), Brown's decentering, common scale."""
+_CameraKind = tuple[float | None, bool, bool] | tuple[str, bool]
+"""Of plates: principal distance of the distorted image (None: scale first), Brown's decentering, common
+scale.
+
+Of another model (`camera_models`): its name, and whether fx is the principal distance of both axes.
+"""
 
 class StellarError(Exception):
     """The camera cannot be calibrated.
@@ -1663,7 +1696,8 @@ def plate_images(standard: _Floats, angles: _Floats, interior: _Floats, camera: 
     angles
         (3,) alpha, omega, kappa.
     interior
-        (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3.
+        (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3; of another model
+        its own parameters, then zeros: x counts right, y down.
     camera
         Its kind.
     """
