@@ -26,8 +26,8 @@ PACKAGES = (
     "photogram.stellar",
 )
 MADE_BY_THE_LIBRARY = {
-    "photogram": "FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection Result"
-    " Simulation VarianceComponents VarianceFunction",
+    "photogram": "Cleaned FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection"
+    " Result Simulation VarianceComponents VarianceFunction",
     "photogram.absolute_orientation": "Orientation",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
@@ -140,6 +140,7 @@ def good(tmp_path_factory):
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},
             "first_values": {"block": block},
+            "clean": {"network": block},
             "compare": {"results": {"one": calibrated, "two": calibrated}},
             "eliminate_terms": {"block": calibrated.block},
             "score_test": {"result": calibrated, "names": ["K3"]},

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.cleaning import Cleaned, clean
     from photogram.adjustment.components import variance_components
     from photogram.adjustment.elimination import eliminate_terms
     from photogram.adjustment.first_values import FirstValues, first_values
@@ -44,6 +45,7 @@ __all__ = [
     "Attitudes",
     "Block",
     "Camera",
+    "Cleaned",
     "FirstValues",
     "GroupSums",
     "InnerConstraints",
@@ -69,6 +71,7 @@ __all__ = [
     "__version__",
     "adjust",
     "check",
+    "clean",
     "compare",
     "eliminate_terms",
     "first_values",
@@ -117,6 +120,8 @@ _HOMES = {
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
     "check": "checks.checking",
+    "Cleaned": "adjustment.cleaning",
+    "clean": "adjustment.cleaning",
     "compare": "results.model_tests",
     "eliminate_terms": "adjustment.elimination",
     "score_test": "results.model_tests",
