@@ -220,6 +220,8 @@ def test_image_weights_wrong_by_four_are_corrected(simulated):
     assert images.interval[0] < 16 < images.interval[1]
     assert images.worth_changing
     assert "standard deviations of images are too small by a factor of 4." in found.report()
+    assert (found.verdict.code, found.verdict.exit) == ("weights-of-groups", 4)
+    assert "Standard deviations are wrong: those of images by about 4." in found.verdict.headline
     # Whatever the given weights are, the solution is that of the estimated ones.
     other = variance_components(simulated)
     assert found.network.image_sd == pytest.approx(other.network.image_sd, rel=0.01)
@@ -388,12 +390,10 @@ def test_gross_errors_and_weights_are_found_together():
     by_group = dict(zip(found.groups, found.factors.tolist(), strict=True))
     assert by_group["images"] == pytest.approx(9, rel=0.25)
     assert by_group["positions"] == 1.0
-    left = set(zip(found.result.block.image_photos.tolist(), found.result.block.image_points.tolist()))
-    out = {
-        row
-        for row, each in enumerate(zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True))
-        if each not in left
-    }
+    seen = found.result.block
+    left = set(zip(seen.image_photos.tolist(), seen.image_points.tolist(), strict=True))
+    given = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
+    out = {row for row, each in enumerate(given) if each not in left}
     assert set(bad.tolist()) <= out
     assert len(out) <= len(bad) + 1
     assert found.components["images"].interval[0] < 1 < found.components["images"].interval[1]

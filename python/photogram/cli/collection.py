@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.components import COMPONENTS, Components, estimated, shown_components
+from photogram.cli.components import COMPONENTS, Components, estimated, with_components
 from photogram.cli.console import print_sections
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Strict, Threads, out_option
@@ -134,10 +134,10 @@ def collection(
             written[report] = result.report().encode()
         if json is not None:
             written[json] = result.to_json()
-        sections = [("File", [f"{problem}: {found.title}"]), *summary(result), *shown_components(estimates)]
+        sections = [("File", [f"{problem}: {found.title}"]), *with_components(summary(result), estimates)]
         whole = (section for section in sections if section[1])
         job.finish(
             written,
             summary=lambda: print_sections(whole, "the report"),
-            code=result.verdict.exit_code(strict=strict),
+            code=(estimates or result).verdict.exit_code(strict=strict),
         )

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
     from photogram.show.sections import Section
 
-__all__ = ["COMPONENTS", "Components", "UnitVarianceName", "estimated", "shown_components"]
+__all__ = ["COMPONENTS", "Components", "UnitVarianceName", "estimated", "with_components"]
 
 COMPONENTS = "components.txt"
 """What goes to the output directory where variance components are asked for."""
@@ -70,10 +70,15 @@ def estimated(
         return variance_components(network, groups, threads=threads, progress=tell)
 
 
-def shown_components(found: VarianceComponents | None) -> list[Section]:
-    """Return what a summary says of components."""
+def with_components(sections: list[Section], found: VarianceComponents | None) -> list[Section]:
+    """Return a summary, whose first section is the verdict, with what components say in its place."""
     if found is None:
-        return []
+        return sections
     from photogram.results.components import component_lines, statement
+    from photogram.show.sections import verdict_section
 
-    return [("Variance components", [*statement(found), *component_lines(found)])]
+    own = [
+        verdict_section(found.verdict),
+        ("Variance components", [*statement(found), *component_lines(found)]),
+    ]
+    return [*own, *sections[1:]]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, shown_components
+from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
@@ -169,8 +169,8 @@ def giant(
         job.finish(
             written,
             documents,
-            summary=lambda: print_sections(summary(result) + shown_components(found), "report.txt"),
-            code=result.verdict.exit_code(strict=strict),
+            summary=lambda: print_sections(with_components(summary(result), found), "report.txt"),
+            code=(found or result).verdict.exit_code(strict=strict),
         )
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from photogram import _photocore
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
 from photogram.show.sections import Section, composed, headline
-from photogram.show.ways import Shown, columns_of, document_of, report_of
+from photogram.show.ways import Shown, columns_of, document_of, findings_of, report_of
 from photogram.statistics.components import Component, Estimate
+from photogram.statistics.findings import Component as Weights
+from photogram.statistics.findings import Findings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,6 +62,27 @@ class VarianceComponents(Shown):
     def table(self) -> pd.DataFrame:
         """Return the components as a data frame."""
         return self._table("component")
+
+
+@findings_of.register(VarianceComponents)
+def _findings(found: VarianceComponents) -> Findings:
+    """Return what the verdict on the given weights rests on: components and, with their weights, the tests.
+
+    Too optimistic weights would make gross errors of good observations. The global test is that of the given
+    weights.
+    """
+    estimated = [
+        Weights(
+            group=each.name,
+            factor=each.factor_of_sd,
+            interval=(math.sqrt(each.interval[0]), math.sqrt(each.interval[1])),
+            significant=each.worth_changing,
+        )
+        for each in found.components
+        if not each.held
+    ]
+    given = findings_of(found.first)
+    return replace(findings_of(found.result), global_test=given.global_test, components=estimated)
 
 
 @columns_of.register(VarianceComponents)

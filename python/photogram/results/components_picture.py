@@ -40,6 +40,8 @@ def _picture(found: VarianceComponents) -> bytes:
 
 def figure_of_components(found: VarianceComponents) -> Figure:
     """Draw factors of standard deviations with 95 percent intervals, held ones as circles."""
+    from matplotlib.ticker import LogLocator, NullFormatter  # takes long to import
+
     figure = new_figure(6.4, 1.6 + INCHES * len(found.components))
     axes = figure.add_subplot()
     for place, each in enumerate(found.components):
@@ -52,6 +54,9 @@ def figure_of_components(found: VarianceComponents) -> Figure:
     axes.axvline(1.0, color="grey", linewidth=0.8)
     axes.set_yticks(range(len(found.components)), [each.name for each in found.components])
     axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("factor of the given standard deviation, 95 percent; circles: held")
     axes.invert_yaxis()
     open_frame(axes)
