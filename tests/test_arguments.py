@@ -26,8 +26,8 @@ PACKAGES = (
     "photogram.stellar",
 )
 MADE_BY_THE_LIBRARY = {
-    "photogram": "FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection Result"
-    " Simulation VarianceComponents VarianceFunction",
+    "photogram": "Cleaned FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection"
+    " Result Simulation VarianceComponents VarianceFunction",
     "photogram.absolute_orientation": "Orientation",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
@@ -113,6 +113,10 @@ def good(tmp_path_factory):
     grid_deck = examples / "perspective_center" / "grid.deck"
     grid = perspective_center.read_deck(grid_deck)[0]
     problem = read_plain(examples / "stellar" / "plate.toml")
+    lens = photogram.Camera("brown", {"c": -152.74}, sd={"K1": 1e-8})
+    calibrated = photogram.adjust(
+        block.replace(cameras=[lens], photo_cameras=[0] * 3, principal_distances=None)
+    )
     points, places = np.array([[100.0, 200.0, 30.0]]), np.array([[0.0, 0.0, 1000.0]])
     resected = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 5.0], [0.0, 100.0, 3.0], [100.0, 100.0, 0.0]])
     seen = photogram.network.geometry.project(
@@ -137,6 +141,11 @@ def good(tmp_path_factory):
             "adjust": {"block": block},
             "check": {"network": block},
             "first_values": {"block": block},
+            "clean": {"network": block},
+            "compare": {"results": {"one": calibrated, "two": calibrated}},
+            "eliminate_terms": {"block": calibrated.block},
+            "score_test": {"result": calibrated, "names": ["K3"]},
+            "terms_test": {"result": calibrated, "names": ["K1"]},
             "group_sums": {"result": photogram.adjust(block)},
             "hints": {"block": block},
             "orient": {"stations": stations},

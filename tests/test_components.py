@@ -6,7 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Block, adjust, group_sums, simulate, variance_components, variance_function
+from photogram import (
+    Block,
+    adjust,
+    clean,
+    group_sums,
+    simulate,
+    variance_components,
+    variance_function,
+)
 from photogram.collection import simulate as simulate_collection
 from photogram.errors import InputError
 from photogram.results.group_sums import Probing
@@ -212,6 +220,8 @@ def test_image_weights_wrong_by_four_are_corrected(simulated):
     assert images.interval[0] < 16 < images.interval[1]
     assert images.worth_changing
     assert "standard deviations of images are too small by a factor of 4." in found.report()
+    assert (found.verdict.code, found.verdict.exit) == ("weights-of-groups", 4)
+    assert "Standard deviations are wrong: those of images by about 4." in found.verdict.headline
     # Whatever the given weights are, the solution is that of the estimated ones.
     other = variance_components(simulated)
     assert found.network.image_sd == pytest.approx(other.network.image_sd, rel=0.01)
@@ -358,3 +368,42 @@ def test_a_variance_that_grows_with_the_radius():
     assert parts.estimate.equality[2] < 1e-4
     assert all(each.interval[0] < found.factor(each.value) < each.interval[1] for each in found.bins)
     assert "variance = given variance x (a^2 + b^2 (radius" in found.report()
+
+
+def contaminated(factor):
+    """Return a block of image sds too small by a factor, with eight gross errors of 25 true sds."""
+    block = simulate(strips=3, photos_per_strip=5, points_per_photo=40, position_sd=0.5, seed=6).block
+    random = np.random.default_rng(8)
+    rays = np.bincount(block.image_points)
+    many = np.flatnonzero(rays[block.image_points] >= 4)
+    bad = random.choice(many, 8, replace=False)
+    xy = block.image_xy.copy()
+    xy[bad] += 0.25 * random.choice([-1, 1], (8, 2))
+    return block.replace(image_xy=xy, image_sd=block.image_sd / factor), bad
+
+
+def test_gross_errors_and_weights_are_found_together():
+    block, bad = contaminated(3.0)
+    found = clean(block)
+    assert found.settled
+    assert 1 <= found.rounds <= 3
+    by_group = dict(zip(found.groups, found.factors.tolist(), strict=True))
+    assert by_group["images"] == pytest.approx(9, rel=0.25)
+    assert by_group["positions"] == 1.0
+    seen = found.result.block
+    left = set(zip(seen.image_photos.tolist(), seen.image_points.tolist(), strict=True))
+    given = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
+    out = {row for row, each in enumerate(given) if each not in left}
+    assert set(bad.tolist()) <= out
+    assert len(out) <= len(bad) + 1
+    assert found.components["images"].interval[0] < 1 < found.components["images"].interval[1]
+    assert "standard deviations of images: multiplied by 3." in found.report()
+
+
+def test_weights_that_are_right_stay_when_gross_errors_are_out():
+    block, bad = contaminated(1.0)
+    found = clean(block)
+    assert found.rounds == 0
+    assert found.components is None
+    assert (found.factors == 1).all()
+    assert len(found.snooped.removed) in (len(bad), len(bad) + 1)

@@ -11,7 +11,9 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.cleaning import Cleaned, clean
     from photogram.adjustment.components import variance_components
+    from photogram.adjustment.elimination import eliminate_terms
     from photogram.adjustment.first_values import FirstValues, first_values
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
     from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
+    from photogram.results.model_tests import compare, score_test, terms_test
     from photogram.results.result import Result
     from photogram.results.snooped import Snooped
     from photogram.results.variance_function import VarianceFunction
@@ -42,6 +45,7 @@ __all__ = [
     "Attitudes",
     "Block",
     "Camera",
+    "Cleaned",
     "FirstValues",
     "GroupSums",
     "InnerConstraints",
@@ -67,6 +71,9 @@ __all__ = [
     "__version__",
     "adjust",
     "check",
+    "clean",
+    "compare",
+    "eliminate_terms",
     "first_values",
     "group_sums",
     "hints",
@@ -74,8 +81,10 @@ __all__ = [
     "plan",
     "predict",
     "resect",
+    "score_test",
     "simulate",
     "snoop",
+    "terms_test",
     "variance_components",
     "variance_function",
 ]
@@ -111,6 +120,12 @@ _HOMES = {
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
     "check": "checks.checking",
+    "Cleaned": "adjustment.cleaning",
+    "clean": "adjustment.cleaning",
+    "compare": "results.model_tests",
+    "eliminate_terms": "adjustment.elimination",
+    "score_test": "results.model_tests",
+    "terms_test": "results.model_tests",
     "first_values": "adjustment.first_values",
     "group_sums": "results.group_sums",
     "hints": "adjustment.hints",

@@ -1,16 +1,14 @@
-"""What verdicts on data snooping and on variance components rest on: the adjustment, and more."""
+"""What the verdict on data snooping rests on: that of the network without gross errors, and what is out."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
-from photogram.results.components import VarianceComponents
 from photogram.results.snooped import Snooped
 from photogram.show.ways import findings_of
-from photogram.statistics.findings import Findings, GroupFactor, Removed
+from photogram.statistics.findings import Findings, Removed
 
-__all__ = ["components_findings", "snooped_findings"]
+__all__ = ["snooped_findings"]
 
 
 @findings_of.register(Snooped)
@@ -31,19 +29,3 @@ def snooped_findings(found: Snooped) -> Findings:
         ),
         remarks=[*rest.remarks, *kept],
     )
-
-
-@findings_of.register(VarianceComponents)
-def components_findings(found: VarianceComponents) -> Findings:
-    """Return the findings on the network as it was given, and the components of its groups."""
-    factors = [
-        GroupFactor(
-            group=each.name,
-            factor=each.factor_of_sd,
-            interval=(math.sqrt(each.interval[0]), math.sqrt(each.interval[1])),
-            significant=each.worth_changing,
-        )
-        for each in found.components
-        if not each.held
-    ]
-    return replace(findings_of(found.first), components=factors)

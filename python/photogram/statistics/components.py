@@ -183,6 +183,12 @@ class Estimate:
     level: float
 
     @property
+    def limit(self) -> float:
+        """What the size of a test value of a component exceeds where it is significant."""
+        free = sum(not each.held for each in self.components)
+        return critical_normal(bonferroni(self.level, free))
+
+    @property
     def reference(self) -> float:
         """The component of all image coordinates together; 1 where there are none."""
         own = [each for each in self.components if each.images and each.redundancy > 0]
