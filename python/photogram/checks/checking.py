@@ -29,7 +29,7 @@ from photogram.checks.heights import two_ray_heights
 from photogram.checks.key_numbers import key_numbers
 from photogram.checks.lenses import half_pixel, lenses_put_right
 from photogram.checks.orientation import orientation, spare_explained
-from photogram.checks.positions import Wrong, observed_positions
+from photogram.checks.positions import Wrong, wrong_positions
 from photogram.checks.residuals import residuals
 from photogram.checks.stations import stations
 from photogram.checks.structure import structure_section
@@ -204,7 +204,7 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
         if found is None:
             break
         values = {"likelihood_ratio": found.judged.likelihood, "times_smaller": found.judged.fall}
-        level: Level = "grave" if found.judged.accepted else "look"
+        level: Level = "grave" if found.judged.explained else "look"
         section.findings.append(Finding(kind, level, found.text, values=values))
         if level == "look":
             break
@@ -224,8 +224,7 @@ def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | Wrong | 
     weighted = ((block.photo_position_sd > 0) & np.isfinite(block.photo_position_sd)).any()
     observed = weighted or any(isinstance(each, Position) for each in block.observations)
     if observed and doubtful(adjusted.tried(block), *kinds):
-        positions = observed_positions(block, adjusted)
-        wrong = None if positions is None else positions.explain()
+        wrong = wrong_positions(block, adjusted)
         if wrong is not None:
             return "observed-positions", wrong
     return "", None
