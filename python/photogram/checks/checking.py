@@ -44,6 +44,8 @@ __all__ = ["Manner", "check", "check_block", "check_of"]
 
 FINAL_STATIONS = 5.0
 """Stations count as adjusted when half the residuals are below so many standard deviations."""
+HARDLY = 10.0
+"""So many times the usual residual before the adjustment comes from coarse stations."""
 MOST_SETS = 5
 """Mistakes in the control as a whole that are put right one upon the other, at the most."""
 
@@ -175,6 +177,8 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
             misleading = {block.photo_ids[photo] for photo in on.tolist()}
             errors.findings = without(block, errors.findings, cleared)
             edited = _edited(oriented, suspects, manner, adjusted)
+    if edited.last is not None and edited.last.converged and edited.spread < HOPELESS:
+        errors.findings = _fitting(errors.findings, edited.last.block)
     # What the adjustment has explained or disproved.
     settled = {name for pair in edited.exchanged for name in pair} | set(edited.cleared)
     errors.findings = [
@@ -189,6 +193,18 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
             if section is not sets:
                 section.findings = [replace(each, level="look") for each in section.findings]
     return sections, edited.last
+
+
+def _fitting(findings: list[Finding], adjusted: Block) -> list[Finding]:
+    """Return findings, photos that are hardly bad and fit when adjusted being no more than looked at."""
+    return [
+        replace(each, level="look")
+        if each.kind == "bad-photo"
+        and each.values.get("times_usual", math.inf) < HARDLY
+        and {*each.photos} <= {*adjusted.photo_ids}
+        else each
+        for each in findings
+    ]
 
 
 def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) -> tuple[View, bool]:

@@ -6,6 +6,7 @@ before the block is adjusted anew, and the others are judged again.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from photogram.checks.predictions import (
     freed,
     tests_of_predictions,
 )
-from photogram.checks.rivals import rival_images
+from photogram.checks.rivals import ODDS, rival_images
 from photogram.checks.robust import critical, mad_sd
 from photogram.checks.views import View, kept_images
 from photogram.checks.words import small_unit
@@ -322,7 +323,9 @@ def _snoop(
         for suspect in suspects:
             finding = _finding(result, suspect, spread)
             if suspect.kind == "control":
-                control.setdefault(finding.points[0], []).append(finding)
+                control.setdefault(finding.points[0], []).append(
+                    _with_rivals(finding, result, suspect, spread)
+                )
             else:
                 section.findings.append(finding)
         block = _without(result, suspects)
@@ -429,6 +432,19 @@ def _finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     what = ("first", "second", "third")[suspect.axis % 3] + (" coordinate" if suspect.axis < 3 else " angle")
     text = f"the {what} of station {name} contradicts its standard deviation (test value {suspect.test:.1f})"
     return Finding("station-misfit", "look", text, [name], [], {"test_value": suspect.test})
+
+
+def _with_rivals(finding: Finding, result: Result, suspect: _Suspect, spread: float) -> Finding:
+    """Name the control whose error would leave nearly the same residuals: odds below 20."""
+    values = tests(result)["control"].max(axis=1) / spread
+    near = (suspect.test / spread) ** 2 - values**2 < 2 * math.log(ODDS)
+    near &= values > critical(int((values > 0).sum()))
+    near[suspect.row] = False
+    names = [result.block.point_ids[row] for row in np.flatnonzero(near).tolist()]
+    if not names:
+        return finding
+    text = f"{finding.text}; it may as well be control point {' or '.join(names)}"
+    return replace(finding, text=text, points=[*finding.points, *names])
 
 
 def _other_finding(result: Result, suspect: _Suspect) -> Finding:

@@ -174,7 +174,7 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
             f" {usual:.3f} {rays.unit} without it; look at its station (position, angles), the preprocessing"
             " of its plate, and whether the points under its name are its own"
         )
-        values = {f"median_residual_{rays.unit}": size}
+        values = {f"median_residual_{rays.unit}": size, "times_usual": size / usual}
         section.findings.append(Finding("bad-photo", "grave", text, [name], [], values))
     return rays, bad
 

@@ -13,6 +13,7 @@ parameter that is fitted besides costs ln f.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -61,7 +62,8 @@ class Judged:
 
 def likelihood(given: float, changed: float, degrees_of_freedom: float) -> float:
     """Return Lambda of a hypothesis that leaves `changed` in place of `given`."""
-    return degrees_of_freedom * math.log(given / changed)
+    least = sys.float_info.min
+    return degrees_of_freedom * (math.log(max(given, least)) - math.log(max(changed, least)))
 
 
 def judged(
@@ -108,4 +110,5 @@ def judged(
     if not (given > IMPROVEMENT * least or passes):
         return None
     equal = tuple(each for each in order if ratios[first] - ratios[each] <= RIVAL)
-    return Judged(equal, ratios[first], math.sqrt(given / least), f >= TESTED and ratios[first] > bound)
+    fall = math.sqrt(given / max(least, sys.float_info.min))
+    return Judged(equal, ratios[first], fall, f >= TESTED and ratios[first] > bound)
