@@ -29,7 +29,7 @@ from photogram.checks.heights import two_ray_heights
 from photogram.checks.key_numbers import key_numbers
 from photogram.checks.lenses import half_pixel, lenses_put_right
 from photogram.checks.orientation import orientation, spare_explained
-from photogram.checks.positions import Wrong, observed_positions
+from photogram.checks.positions import Wrong, wrong_positions
 from photogram.checks.residuals import residuals
 from photogram.checks.stations import stations
 from photogram.checks.structure import structure_section
@@ -44,6 +44,8 @@ __all__ = ["Manner", "check", "check_block", "check_of"]
 
 FINAL_STATIONS = 5.0
 """Stations count as adjusted when half the residuals are below so many standard deviations."""
+HARDLY = 10.0
+"""So many times the usual residual before the adjustment comes from coarse stations."""
 MOST_SETS = 5
 """Mistakes in the control as a whole that are put right one upon the other, at the most."""
 
@@ -175,6 +177,8 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
             misleading = {block.photo_ids[photo] for photo in on.tolist()}
             errors.findings = without(block, errors.findings, cleared)
             edited = _edited(oriented, suspects, manner, adjusted)
+    if edited.last is not None and edited.last.converged and edited.spread < HOPELESS:
+        errors.findings = _fitting(errors.findings, edited.last.block)
     # What the adjustment has explained or disproved.
     settled = {name for pair in edited.exchanged for name in pair} | set(edited.cleared)
     errors.findings = [
@@ -191,6 +195,18 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     return sections, edited.last
 
 
+def _fitting(findings: list[Finding], adjusted: Block) -> list[Finding]:
+    """Return findings, photos that are hardly bad and fit when adjusted being no more than looked at."""
+    return [
+        replace(each, level="look")
+        if each.kind == "bad-photo"
+        and each.values.get("times_usual", math.inf) < HARDLY
+        and {*each.photos} <= {*adjusted.photo_ids}
+        else each
+        for each in findings
+    ]
+
+
 def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) -> tuple[View, bool]:
     """Put right what is wrong with control, or with observed positions of photos, as a whole.
 
@@ -204,7 +220,7 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
         if found is None:
             break
         values = {"likelihood_ratio": found.judged.likelihood, "times_smaller": found.judged.fall}
-        level: Level = "grave" if found.judged.accepted else "look"
+        level: Level = "grave" if found.judged.explained else "look"
         section.findings.append(Finding(kind, level, found.text, values=values))
         if level == "look":
             break
@@ -224,8 +240,7 @@ def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | Wrong | 
     weighted = ((block.photo_position_sd > 0) & np.isfinite(block.photo_position_sd)).any()
     observed = weighted or any(isinstance(each, Position) for each in block.observations)
     if observed and doubtful(adjusted.tried(block), *kinds):
-        positions = observed_positions(block, adjusted)
-        wrong = None if positions is None else positions.explain()
+        wrong = wrong_positions(block, adjusted)
         if wrong is not None:
             return "observed-positions", wrong
     return "", None

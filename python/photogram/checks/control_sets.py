@@ -32,7 +32,7 @@ from photogram.network.rays import LocalAxes, local_axes
 from photogram.results.result import Result
 from photogram.statistics.likelihood import Judged, judged
 
-__all__ = ["Explained", "FreeModel", "doubtful", "explain", "free_model", "similarity_partials"]
+__all__ = ["Explained", "FreeModel", "doubtful", "explain", "free_model"]
 
 MOST = 60
 """Control points that are compared."""
@@ -235,7 +235,7 @@ class FreeModel:
         whole = np.kron(np.eye(len(turned)), similarity.scale * similarity.rotation)
         variances = ((self.per_unit * self.block.point_sd[self.points]).ravel()[rows]) ** 2
         own = (whole @ self.covariance @ whole.T)[np.ix_(rows, rows)] + np.diag(variances)
-        return (target - similarity.of(self.model)).ravel()[rows], similarity_partials(turned)[rows], own
+        return (target - similarity.of(self.model)).ravel()[rows], _similarity_partials(turned)[rows], own
 
     def _target(self, change: Change | None) -> Floats:
         """(k, 3) control as it was meant, in the axes."""
@@ -372,14 +372,14 @@ def _of_shape(covariance: Floats, model: Floats) -> Floats:
 
     A similarity is found anyhow; what the datum of the model says of it would only cost digits.
     """
-    basis, _ = np.linalg.qr(similarity_partials(model - model.mean(axis=0)))
+    basis, _ = np.linalg.qr(_similarity_partials(model - model.mean(axis=0)))
     across = np.eye(len(covariance)) - basis @ basis.T
     shape = across @ covariance @ across
     found: Floats = shape + np.trace(shape) / len(shape) * basis @ basis.T
     return found
 
 
-def similarity_partials(turned: Floats) -> Floats:
+def _similarity_partials(turned: Floats) -> Floats:
     """(3k, 7) partials of points, counted from their mean, by shift, scale and rotation."""
     design = np.zeros((len(turned), 3, 7))
     design[:, :, :3] = np.eye(3)
@@ -425,7 +425,7 @@ def explain(model: FreeModel) -> Explained | None:
     best = [sets[place] for place in verdict.best]
     if model.held.all(axis=1).sum() < FEWEST:
         # Nothing tells a mistake in all from one in some.
-        verdict = replace(verdict, accepted=False)
+        verdict = replace(verdict, explained=False)
     word = "probably" if verdict.accepted else "it cannot be told which" if len(best) > 1 else "possibly"
     text = f"{word}{':' if len(best) > 1 else ''} {'; or '.join(each.text for each in best)}"
     text += f": the control would miss the model of the photos by {verdict.fall:.3g} times less"

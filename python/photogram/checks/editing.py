@@ -6,6 +6,7 @@ before the block is adjusted anew, and the others are judged again.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from photogram.checks.predictions import (
     freed,
     tests_of_predictions,
 )
-from photogram.checks.rivals import rival_images
+from photogram.checks.rivals import ODDS, rival_images
 from photogram.checks.robust import critical, mad_sd
 from photogram.checks.views import View, kept_images
 from photogram.checks.words import small_unit
@@ -39,7 +40,8 @@ ROUNDS = 20
 TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
 """Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
 
-Precise control at the edge of a block has a redundancy of a thousandth; its test value still means something.
+Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth; its test
+value still means something.
 """
 COMPARABLE = 0.4
 """Of the largest test value of a round: what is smaller may be its consequence and is judged again."""
@@ -56,6 +58,8 @@ TWENTIETH = 1.96
 SURE = 1e-4
 """Chance that the largest test value of a good block is beyond what is grave."""
 SHOWN = 20
+RETURNS = 10
+"""Images that are tried anew when all blunders are out, at the most."""
 BESIDE = "beside images: "
 """Before the names of further kinds of observations."""
 
@@ -171,6 +175,8 @@ def _edited(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
             cleared = [block.point_ids[point] for point in left if block.point_ids[point] not in control]
     except AdjustmentError as error:
         return Edited(None, None, str(error), float("nan"), section)
+    if last.converged:
+        last = _returned(last, current, section, spread, adjusted)
     _list(last, spread, section)
     limit = _grave(last, spread)
     section.findings = _graded(section.findings, limit)
@@ -317,7 +323,9 @@ def _snoop(
         for suspect in suspects:
             finding = _finding(result, suspect, spread)
             if suspect.kind == "control":
-                control.setdefault(finding.points[0], []).append(finding)
+                control.setdefault(finding.points[0], []).append(
+                    _with_rivals(finding, result, suspect, spread)
+                )
             else:
                 section.findings.append(finding)
         block = _without(result, suspects)
@@ -334,7 +342,7 @@ def tests(result: Result) -> dict[str, Floats]:
     block = result.block
     images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
     others = {
-        name: np.where(kind.redundancy > TESTABLE, np.nan_to_num(np.abs(kind.standardized)), 0.0)
+        name: np.where(kind.redundancy > TESTABLE_PRIOR, np.nan_to_num(np.abs(kind.standardized)), 0.0)
         for name, kind in result.kinds.items()
     }
     return {
@@ -426,6 +434,19 @@ def _finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     return Finding("station-misfit", "look", text, [name], [], {"test_value": suspect.test})
 
 
+def _with_rivals(finding: Finding, result: Result, suspect: _Suspect, spread: float) -> Finding:
+    """Name the control whose error would leave nearly the same residuals: odds below 20."""
+    values = tests(result)["control"].max(axis=1) / spread
+    near = (suspect.test / spread) ** 2 - values**2 < 2 * math.log(ODDS)
+    near &= values > critical(int((values > 0).sum()))
+    near[suspect.row] = False
+    names = [result.block.point_ids[row] for row in np.flatnonzero(near).tolist()]
+    if not names:
+        return finding
+    text = f"{finding.text}; it may as well be control point {' or '.join(names)}"
+    return replace(finding, text=text, points=[*finding.points, *names])
+
+
 def _other_finding(result: Result, suspect: _Suspect) -> Finding:
     """Say that an observation beside images does not fit."""
     kind = _kind(result, suspect)
@@ -487,6 +508,38 @@ def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
             "axis": float(axis),
         },
     )
+
+
+def _returned(result: Result, whole: Block, section: Section, spread: float, adjusted: Adjuster) -> Result:
+    """Take back images that fit once all others are out: a blunder beside them made them look wrong.
+
+    They are tried one by one, the smallest test value first; the largest of all is the blunder itself.
+    """
+    blunders = sorted(
+        (each for each in section.findings if each.kind == "blunder"),
+        key=lambda each: each.values["test_value"],
+    )
+    for finding in blunders[:-1][:RETURNS]:
+        photo, point = whole.photo_ids.index(finding.photos[0]), whole.point_ids.index(finding.points[0])
+        row = int(np.flatnonzero((whole.image_photos == photo) & (whole.image_points == point))[0])
+        block = result.block
+        back = block.replace(
+            image_photos=np.append(block.image_photos, block.photo_ids.index(finding.photos[0])),
+            image_points=np.append(block.image_points, point),
+            image_xy=np.vstack([block.image_xy, whole.image_xy[[row]]]),
+            image_sd=np.vstack([block.image_sd, whole.image_sd[[row]]]),
+        )
+        tried = adjusted.tried(back)
+        if tried is None or not tried.converged or not tried.used_images[-1]:
+            continue
+        values = tests(tried)
+        limit = critical(sum(int((each > 0).sum()) for each in values.values())) * spread
+        others = values["image"][block.image_points.size :]
+        on_point = values["image"][tried.block.image_points == point]
+        if others.any() and on_point.max() < limit:
+            section.findings.remove(finding)
+            result = tried
+    return result
 
 
 def _grave(result: Result, spread: float) -> float:

@@ -44,6 +44,8 @@ IMAGE_KINDS = ("gross-error", "exchanged-points", "name-used-twice")
 """Findings on images, which the adjusted stations may disprove."""
 PARTED, FEWEST_OF_TWO = 0.1, 2
 """One name is of two points when so much is left of its residuals in two groups of so many rays or more."""
+AS_WELL = 3.0
+"""And so many times less than leaving out one ray leaves."""
 MOST_PHOTOS = 20
 MOST_ON_PHOTO = 30
 
@@ -172,7 +174,7 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
             f" {usual:.3f} {rays.unit} without it; look at its station (position, angles), the preprocessing"
             " of its plate, and whether the points under its name are its own"
         )
-        values = {f"median_residual_{rays.unit}": size}
+        values = {f"median_residual_{rays.unit}": size, "times_usual": size / usual}
         section.findings.append(Finding("bad-photo", "grave", text, [name], [], values))
     return rays, bad
 
@@ -239,6 +241,18 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
     left = [solver.without(point, rows, row) for row in rows.tolist()] if len(rows) > 2 else []
     unit = solver.rays.unit
     name, values = block.point_ids[point], {f"residual_{unit}": before, "departure_sd": departure}
+    parted = _parted(solver, point, rows, before) if len(rows) >= 2 * FEWEST_OF_TWO else None
+    if parted is not None and min(left) > AS_WELL * parted[2]:
+        one, other = (
+            " and ".join(block.photo_ids[photo] for photo in block.image_photos[each].tolist())
+            for each in parted[:2]
+        )
+        photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
+        text = (
+            f"the name {name} stands for two points: its rays of the photos {one} meet, and those of"
+            f" the photos {other}, but not with each other (they miss by {before:.3f} {unit})"
+        )
+        return Finding("name-used-twice", "grave", text, photos, [name], values), rows
     if left and min(left) < EXPLAINED * before:
         row = rows[[int(np.argmin(left))]]
         photo = block.photo_ids[int(block.image_photos[row[0]])]
@@ -251,17 +265,6 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
         proof: Level = "grave" if len(rows) > 3 or departure > CHANCE * BREAK else "look"
         return Finding("gross-error", proof, text, [photo], [name], values), row
     photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
-    parted = _parted(solver, point, rows, before) if len(rows) >= 2 * FEWEST_OF_TWO else None
-    if parted is not None:
-        one, other = (
-            " and ".join(block.photo_ids[photo] for photo in block.image_photos[each].tolist())
-            for each in parted
-        )
-        text = (
-            f"the name {name} stands for two points: its rays of the photos {one} meet, and those of"
-            f" {other}, but not with each other (they miss by {before:.3f} {unit})"
-        )
-        return Finding("name-used-twice", "grave", text, photos, [name], values), rows
     text = (
         f"point {name} does not fit (its rays miss by {before:.3f} {unit}), on one of the photos"
         f" {', '.join(photos)}: misidentified, or one name for two points?"
@@ -270,8 +273,10 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
     return Finding("gross-error", level, text, photos, [name], values), rows
 
 
-def _parted(solver: _Solver, point: int, rows: Indices, before: float) -> tuple[Indices, Indices] | None:
-    """Return the images of a point in two groups, each of which meets well by itself, if there are such."""
+def _parted(
+    solver: _Solver, point: int, rows: Indices, before: float
+) -> tuple[Indices, Indices, float] | None:
+    """Return the images of a point in two groups that meet well by themselves, and how far they miss then."""
     best, found = PARTED * before, None
     for pair in combinations(rows.tolist(), 2):
         position = solver.changed(point, rows[~np.isin(rows, pair)].tolist(), [])
@@ -285,7 +290,7 @@ def _parted(solver: _Solver, point: int, rows: Indices, before: float) -> tuple[
             solver.largest(other, solver.changed(point, one.tolist(), [])),
         )
         if left < best:
-            best, found = left, (one, other)
+            best, found = left, (one, other, left)
     return found
 
 

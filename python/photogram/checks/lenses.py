@@ -11,7 +11,6 @@ import numpy as np
 
 from photogram.checks.adjusting import Adjuster
 from photogram.checks.findings import Finding
-from photogram.checks.robust import mad_sd
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.results.result import Result
@@ -20,8 +19,6 @@ from photogram.statistics.likelihood import judged
 __all__ = ["half_pixel", "lenses_put_right"]
 
 RADIAL = re.compile(r"[Kk]([1-6])")
-ILL = 1.5
-"""Spread of the test values above which lenses that are given are doubted."""
 SIGNIFICANT = 5.0
 PITCH = (1e-3, 3e-2)
 """Sizes of a pixel that cameras have, millimetres."""
@@ -39,7 +36,7 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
     if not any(_given_terms(camera) for camera in block.cameras):
         return block
     first = adjusted.tried(block)
-    if first is not None and first.converged and mad_sd(first.standardized) < ILL:
+    if first is not None and first.converged and _fits(first):
         return block
     given = math.inf if first is None else first.sums_of_squares.total
     tried = [(text, changed, adjusted.tried(changed)) for text, changed in _hypotheses(block, adjusted)]
@@ -51,7 +48,9 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
     if not np.isfinite(left).any() or freedom < 1:
         return block
     # What cannot be adjusted as it is leaves more than anything that can be.
-    verdict = judged(min(given, 1e6 * max(each for each in left if math.isfinite(each))), left, freedom)
+    verdict = judged(
+        min(given, 1e6 * max(each for each in left if math.isfinite(each))), left, freedom, known_weight=True
+    )
     if verdict is None or not verdict.accepted:
         return block
     text, changed, _ = tried[verdict.best[0]]
@@ -59,6 +58,11 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
     said = f"probably {text}: residuals would be {verdict.fall:.3g} times smaller"
     findings.append(Finding("lens", "grave", said, values=values))
     return changed
+
+
+def _fits(result: Result) -> bool:
+    test = result.global_test
+    return test is not None and not test.rejected_high
 
 
 def _given_terms(camera: Camera) -> dict[str, int]:

@@ -1,70 +1,44 @@
-"""Observed positions of photos as a whole, against those that images and control give without them.
+"""Observed positions of photos as a whole: what is wrong with all of them has a form of its own.
 
-With C and A the projection centres and attitudes of an adjustment without observed positions, the residual of
-an observed position is v = observed - (C + A l), l its lever arm. What is wrong with all of them has a form:
+    feet for metres, exchanged axes                             the coordinates that were meant
+    heights above the ellipsoid for those above the geoid       C + A l + (0, 0, N)
+    another datum                                               C + A l + s
+    a wrong lever arm                                           C + A (l + d)
+    positions of another time                                   C + A l + tau dC/dt
 
-    heights above the ellipsoid for those above the geoid      v = (0, 0, N)
-    another datum                                              v = s
-    a wrong lever arm                                          v = A d
-    a time offset tau                                          v = tau dC/dt
-    feet for metres, exchanged axes                            v of the observed positions that were meant
-
-Each is fitted by least squares, and judged by its likelihood ratio; one more parameter must gain ln f more.
-Where images have no control, the model is first brought onto the observed positions by a similarity, which
-hides the first two.
+Each is tried: the block is adjusted with the coordinates that were meant, or with N, s, l or tau unknown, and
+judged by its likelihood ratio; a parameter more must gain ln f more.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
 
 from photogram.adjustment.hypotheses import FOOT
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.checks.adjusting import Adjuster
-from photogram.checks.control_sets import similarity_partials
-from photogram.checks.robust import mad_sd
 from photogram.network.block import Block
-from photogram.network.observations import Observation, Position
-from photogram.network.rays import LocalAxes, Rays
+from photogram.network.observations import Position
+from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
+from photogram.network.unknowns import LeverArm, Shift, Unknown
 from photogram.results.result import Result
 from photogram.statistics.likelihood import RIVAL, Judged, judged, likelihood
 
-__all__ = ["ObservedPositions", "Wrong", "observed_positions"]
+__all__ = ["Wrong", "wrong_positions"]
 
 FEWEST = 5
 """Observed positions that can be judged as a whole."""
-EQUAL = 0.1
+EQUAL = 0.15
 """Relative difference within which a lever arm is the given one with other signs or axes."""
-Meant = Callable[[Floats], Floats]
-"""Makes of (n, 3) coordinates as given those that were meant."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Hypothesis:
-    """What is wrong with all positions.
-
-    Attributes
-    ----------
-    kind
-        In a word or two.
-    text
-        In a sentence, of the k fitted parameters.
-    design
-        (3n, k) of what is fitted; k may be 0.
-    meant
-        What the given coordinates should be, before that.
-    """
-
-    kind: str
-    text: Callable[[Floats], str]
-    design: Floats
-    meant: Meant | None = None
+WORST = 1e6
+"""What cannot be adjusted as it is leaves so many times what the worst hypothesis does."""
+WHAT = "observed positions of the photos"
 
 
 @dataclass(frozen=True)
@@ -87,282 +61,205 @@ class Wrong:
     change: Callable[[Block], Block]
 
 
-@dataclass(frozen=True, eq=False)
-class ObservedPositions:
-    """Observed positions of n photos, and the photos as the rest of the network has them.
+@dataclass(frozen=True)
+class _Trial:
+    """A hypothesis: its words, the adjustment with it, its parameters, and the positions that were meant."""
 
-    Attributes
-    ----------
-    block
-        The block.
-    photos
-        (n,) its photos.
-    observed
-        (n, 3) positions as given, in the block's own coordinates.
-    places
-        Which of the block's observations each is; -1 where the position of the photo is weighted.
-    arms
-        (n, 3) lever arms in the axes of the photos.
-    times
-        (n,) seconds; all equal where none are given.
-    axes
-        Metric axes of the block.
-    centres, attitudes
-        (n, 3) and (n, 3, 3), photo to metric axes, without the observed positions.
-    deviations
-        (n, 3) of v, about.
-    free
-        Whether the model has a datum of its own.
+    kind: str
+    text: str
+    result: Result | None
+    parameters: int
+    meant: list[Position]
+
+    @property
+    def left(self) -> float:
+        """Omega; infinite where it cannot be adjusted."""
+        if self.result is None or not self.result.converged:
+            return math.inf
+        return self.result.sums_of_squares.total
+
+
+def wrong_positions(block: Block, adjusted: Adjuster) -> Wrong | None:
+    """Return what explains why the observed positions of a block do not fit, if something does.
+
+    Positions with shifts or drifts that are unknown are left to these.
     """
-
-    block: Block
-    photos: Indices
-    observed: Floats
-    places: list[int]
-    arms: Floats
-    times: Floats
-    axes: LocalAxes
-    centres: Floats
-    attitudes: Floats
-    deviations: Floats
-    free: bool
-
-    def residuals(self, meant: Meant | None = None) -> Floats:
-        """(n, 3) observed minus computed, in the metric axes."""
-        observed = self.observed if meant is None else meant(self.observed)
-        computed = self.centres + np.einsum("nij,nj->ni", self.attitudes, self.arms)
-        found: Floats = self.axes.positions(observed) - computed
-        return found
-
-    def explain(self) -> Wrong | None:
-        """Return what explains the residuals of all positions, if something does."""
-        hypotheses = self._hypotheses()
-        freedom = 3 * len(self.photos) - (7 if self.free else 0)
-        given, _ = self._left(None, np.zeros((3 * len(self.photos), 0)))
-        fitted = [self._left(each.meant, each.design) for each in hypotheses]
-        # A parameter more costs ln f.
-        left = [
-            omega * math.exp(each.design.shape[1] * math.log(freedom) / freedom)
-            for each, (omega, _) in zip(hypotheses, fitted, strict=True)
-        ]
-        by_kind = {each.kind: row for row, each in enumerate(hypotheses)}
-        for whole, part in (("shift", "geoid"),):
-            if whole in by_kind and part in by_kind:
-                one, other = by_kind[whole], by_kind[part]
-                if likelihood(left[other], left[one], freedom) < RIVAL:
-                    left[one] = math.inf
-        verdict = judged(given, left, freedom)
-        if verdict is None:
-            return None
-        best = [(hypotheses[row], fitted[row][1]) for row in verdict.best]
-        texts = "; or ".join(each.text(values) for each, values in best)
-        word = "probably" if len(best) == 1 else "it cannot be told which:"
-        text = f"{word} {texts}: observed positions would miss the photos by {verdict.fall:.3g} times less"
-        first, values = best[0]
-        return Wrong(first.kind, text, verdict, lambda block: self._put_right(block, first, values))
-
-    def _left(self, meant: Meant | None, design: Floats) -> tuple[float, Floats]:
-        """Return Omega and the parameters of a hypothesis."""
-        weights = 1 / self.deviations.ravel()
-        right = self.residuals(meant).ravel() * weights
-        nuisance = np.zeros((len(right), 0))
-        if self.free:
-            nuisance = similarity_partials(self.centres - self.centres.mean(axis=0))
-        whole = np.hstack([design, nuisance]) * weights[:, np.newaxis]
-        if not np.isfinite(right).all():
-            return math.inf, np.zeros(design.shape[1])
-        solved: Floats = np.zeros(0)
-        if whole.shape[1]:
-            solved = np.asarray(np.linalg.lstsq(whole, right, rcond=None)[0])
-        left = right - whole @ solved
-        return max(float(left @ left), np.finfo(np.float64).tiny), solved[: design.shape[1]]
-
-    def _hypotheses(self) -> list[_Hypothesis]:
-        count, unit = len(self.photos), self.block.linear_unit
-        none = np.zeros((3 * count, 0))
-
-        def said(text: str) -> Callable[[Floats], str]:
-            return lambda _values: text
-
-        def vector(values: Floats) -> str:
-            return f"({', '.join(f'{each:.3f}' for each in values)}) {unit}"
-
-        what = "observed positions of the photos"
-        found = [
-            _Hypothesis(
-                "feet in heights",
-                said(f"heights of the {what} are in feet, all else in metres"),
-                none,
-                lambda positions: positions * [1.0, 1.0, FOOT],
-            ),
-            _Hypothesis("lever arm", self._arm, self.attitudes.reshape(-1, 3)),
-        ]
-        velocities, per = self._velocities()
-        if np.isfinite(velocities).all():
-            found.append(
-                _Hypothesis(
-                    "time offset",
-                    lambda values: (
-                        f"the {what} are those of another time: {values[0]:.4f} {per} later along the flight"
-                    ),
-                    velocities.reshape(-1, 1),
-                )
-            )
-        if self.block.spheroid is None:
-            found += [
-                _Hypothesis(
-                    "feet", said(f"the {what} are in feet"), none, lambda positions: positions * FOOT
-                ),
-                _Hypothesis(
-                    "X and Y exchanged",
-                    said(f"X and Y of the {what} are exchanged"),
-                    none,
-                    lambda positions: positions[:, [1, 0, 2]],
-                ),
-            ]
-        if not self.free:
-            up = np.tile([[0.0], [0.0], [1.0]], (count, 1))
-            found += [
-                _Hypothesis(
-                    "geoid",
-                    lambda values: (
-                        f"heights of the {what} are {values[0]:.3f} {unit} above those of the control:"
-                        " ellipsoidal and orthometric heights are mixed"
-                    ),
-                    up,
-                ),
-                _Hypothesis(
-                    "shift",
-                    lambda values: f"the {what} are in another datum, shifted by {vector(values)}",
-                    np.tile(np.eye(3), (count, 1)),
-                ),
-            ]
-        return found
-
-    def _arm(self, change: Floats) -> str:
-        """Say what is wrong with the lever arm when it should have changed by so much."""
-        given, unit = np.median(self.arms, axis=0), self.block.linear_unit
-        meant = given + change
-        size = float(np.linalg.norm(given))
-        shown = f"({', '.join(f'{each:.3f}' for each in meant)}) {unit}"
-        if not size:
-            return f"the antenna has a lever arm of {shown}"
-        for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-            if np.linalg.norm(given[list(order)] * signs - meant) < EQUAL * size:
-                axes = "has other axes" if order != (0, 1, 2) else "has the wrong sign"
-                return f"the lever arm {axes}: it should be about {shown}"
-        return f"the lever arm is wrong: it should be about {shown}"
-
-    def _velocities(self) -> tuple[Floats, str]:
-        """(n, 3) along the flight, a second or a step from photo to photo; NaN where there is none."""
-        found = np.full(self.centres.shape, np.nan)
-        timed = bool(np.ptp(self.times) > 0)
-        for strip in strips_of(self.centres):
-            if len(strip) > 1:
-                steps = self.times[strip] if timed else np.arange(len(strip), dtype=np.float64)
-                if (np.diff(steps) > 0).all():
-                    found[strip] = np.gradient(self.centres[strip], steps, axis=0)
-        return found, "s" if timed else "steps from photo to photo"
-
-    def _put_right(self, block: Block, hypothesis: _Hypothesis, values: Floats) -> Block:
-        """Return the block with the observed positions that were meant."""
-        observed = self.observed if hypothesis.meant is None else hypothesis.meant(self.observed)
-        wrong = (hypothesis.design @ values).reshape(-1, 3) if len(values) else np.zeros(observed.shape)
-        meant = self.axes.from_local(self.axes.positions(observed) - wrong)
-        observations = list(block.observations)
-        weighted = block.photo_positions_observed
-        weighted = block.photo_positions.copy() if weighted is None else weighted.copy()
-        for row, place in enumerate(self.places):
-            if place < 0:
-                weighted[self.photos[row]] = meant[row]
-            else:
-                observations[place] = _moved(block.observations[place], meant[row])
-        return block.replace(photo_positions_observed=weighted, observations=observations)
+    given = _positions(block)
+    if len(given) < FEWEST:
+        return None
+    first = adjusted.tried(_with(block, given))
+    found = [*_coordinates(block, given, adjusted), *_unknown(block, given, adjusted)]
+    found += _later(block, given, adjusted)
+    found = [each for each in found if math.isfinite(each.left)]
+    by_kind = {each.kind: each for each in found}
+    freedom = next((each.result.degrees_of_freedom for each in found if each.result is not None), 0)
+    if not freedom:
+        return None
+    part = by_kind.get("geoid")
+    for whole in (by_kind.get("shift"), by_kind.get("lever arm")):
+        # A height is a part of these: they must be better by far.
+        if whole and part and likelihood(part.left, whole.left, freedom) < RIVAL + 2 * math.log(freedom):
+            found.remove(whole)
+    left = [each.left for each in found]
+    usable = first is not None and first.converged
+    before = first.sums_of_squares.total if first is not None and usable else WORST * max(left)
+    verdict = judged(before, left, freedom, parameters=[each.parameters for each in found], known_weight=True)
+    if verdict is None:
+        return None
+    best = [found[row] for row in verdict.best]
+    word = "probably" if len(best) == 1 else "it cannot be told which:"
+    text = f"{word} {'; or '.join(each.text for each in best)}"
+    text += f": residuals of the block would be {verdict.fall:.3g} times smaller"
+    meant = best[0].meant
+    return Wrong(best[0].kind, text, verdict, lambda own: _with(own, meant))
 
 
-def _moved(observation: Observation, position: Floats) -> Observation:
-    assert isinstance(observation, Position)
-    return Position(
-        observation.photo,
-        position,
-        covariance=observation.precision,
-        lever_arm=observation.lever_arm,
-        time=observation.time,
-    )
-
-
-def observed_positions(block: Block, adjusted: Adjuster) -> ObservedPositions | None:
-    """Return the observed positions of a block and what the rest of it says of them.
-
-    None where there are too few, or the rest cannot be adjusted. Positions with unknown lever arms, shifts or
-    drifts are left to these.
-    """
-    number = {name: row for row, name in enumerate(block.photo_ids)}
-    rows: list[int] = []
-    places: list[int] = []
-    values: list[Floats] = []
-    for place, each in enumerate(block.observations):
-        if isinstance(each, Position) and all(unknown is None for unknown in each.unknowns):
-            rows.append(number[each.photo])
-            places.append(place)
-            deviations = np.sqrt(np.diagonal(each.precision))
-            values.append(np.concatenate([each.observed, deviations]))
+def _positions(block: Block) -> list[Position]:
+    """Return observed positions, weighted ones of photos among them."""
+    found = [each for each in block.observations if isinstance(each, Position)]
+    if any(each.shift is not None or each.drift is not None for each in found):
+        return []
     sd = block.photo_position_sd
-    given = (
+    observed = (
         block.photo_positions if block.photo_positions_observed is None else block.photo_positions_observed
     )
-    per_unit = np.ones(3) if block.spheroid is None else np.array([block.spheroid.a, block.spheroid.a, 1.0])
     for row in np.flatnonzero((np.isfinite(sd) & (sd > 0)).all(axis=1)).tolist():
-        rows.append(row)
-        places.append(-1)
-        values.append(np.concatenate([given[row], np.zeros(4), sd[row] * per_unit]))
-    if len(rows) < FEWEST:
-        return None
-    kept = [each for each in block.observations if not isinstance(each, Position)]
-    loose = np.where(sd == 0, 0.0, np.inf)
-    rest = adjusted.otherwise(unit_variance="unity").tried(
-        block.replace(observations=kept, photo_position_sd=loose, photo_positions_observed=None)
-    )
-    if rest is None or not rest.converged:
-        return None
-    return _compared(block, rest, np.array(rows), places, np.array(values))
+        metres = sd[row].copy()
+        if block.spheroid is not None:
+            metres *= [block.spheroid.a * math.cos(observed[row, 1]), block.spheroid.a, 1.0]
+        found.append(Position(block.photo_ids[row], observed[row], sd=metres))
+    return found
 
 
-def _compared(
-    block: Block, rest: Result, photos: Indices, places: list[int], values: Floats
-) -> ObservedPositions:
-    placed = block.replace(
-        cameras=(),
-        photo_cameras=None,
-        principal_distances=np.ones(len(block.photo_ids)),
-        photo_positions=rest.photo_positions,
-        photo_attitudes=rest.photo_attitudes,
-        photo_position_sd=np.inf,
-        photo_attitude_sd=np.inf,
+def _with(block: Block, positions: Sequence[Position]) -> Block:
+    """Return a block with these observed positions in place of its own."""
+    sd = block.photo_position_sd
+    weighted = (np.isfinite(sd) & (sd > 0)).all(axis=1, keepdims=True)
+    others = [each for each in block.observations if not isinstance(each, Position)]
+    return block.replace(
+        photo_position_sd=np.where(weighted, np.inf, sd),
         photo_positions_observed=None,
-        photo_attitudes_observed=None,
-        observations=(),
-        mounts=(),
+        observations=[*others, *positions],
     )
-    rays = Rays.of(placed)
-    per_unit = np.ones(3) if block.spheroid is None else np.array([block.spheroid.a, block.spheroid.a, 1.0])
-    own = (
-        np.sqrt(np.maximum(np.diagonal(rest.photo_cofactors[photos], axis1=1, axis2=2)[:, :3], 0)) * per_unit
+
+
+def _changed(
+    position: Position, observed: Floats | None = None, arm: object = None, shift: Shift | None = None
+) -> Position:
+    return Position(
+        position.photo,
+        position.position if observed is None else observed,
+        covariance=position.precision,
+        lever_arm=position.lever_arm if arm is None else arm,  # type: ignore[arg-type]
+        shift=shift,
+        time=position.time,
     )
-    free = "constraints" in rest.datum.kind
-    size = max(mad_sd(rest.standardized), 1.0)
-    # What the datum adds to the deviations of a free model is no part of its shape.
-    deviations = np.hypot(values[:, 7:], 0.0 if free else size * own)
-    return ObservedPositions(
-        block,
-        photos,
-        values[:, :3],
-        places,
-        values[:, 3:6],
-        values[:, 6],
-        rays.axes,
-        rays.centres[photos],
-        rays.cameras[photos],
-        np.asarray(deviations),
-        free,
+
+
+def _coordinates(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
+    """Try other units and axes."""
+    hypotheses = [("feet in heights", f"heights of the {WHAT} are in feet, all else in metres", [0, 1, 2], 2)]
+    if block.spheroid is None:
+        hypotheses += [
+            ("feet", f"the {WHAT} are in feet, all else in metres", [0, 1, 2], 0),
+            ("X and Y exchanged", f"X and Y of the {WHAT} are exchanged", [1, 0, 2], 3),
+        ]
+    trials = []
+    for kind, text, order, first in hypotheses:
+        factors = np.where(np.arange(3) >= first, FOOT, 1.0)
+        meant = [_changed(each, np.asarray(each.position)[order] * factors) for each in given]
+        trials.append(_Trial(kind, text, adjusted.tried(_with(block, meant)), 0, meant))
+    return trials
+
+
+def _unknown(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
+    """Try what is unknown and common to all: a height, a shift, a lever arm."""
+    unit = block.linear_unit
+    arms = np.array([_arm(each) for each in given])
+    trials = []
+    unknowns: tuple[tuple[str, Unknown], ...] = (
+        ("geoid", Shift("of the heights", sd=[0.0, 0.0, np.inf])),
+        ("shift", Shift("of all", sd=np.inf)),
+        ("lever arm", LeverArm("of all", np.median(arms, axis=0), sd=np.inf)),
     )
+    for kind, unknown in unknowns:
+        if isinstance(unknown, Shift):
+            changed = [_changed(each, shift=unknown) for each in given]
+        else:
+            changed = [_changed(each, arm=unknown) for each in given]
+        result = adjusted.tried(_with(block, changed))
+        if result is None or not result.converged:
+            continue
+        (found,) = [each for each in result.unknowns if each.given is unknown]
+        value = np.asarray(found.position)
+        sd = np.sqrt(np.maximum(np.diagonal(found.cofactors), 0))
+        shown = f"({', '.join(f'{v:.3f} +- {s:.3f}' for v, s in zip(value, sd, strict=True))}) {unit}"
+        if kind == "geoid":
+            text = (
+                f"heights of the {WHAT} are {value[2]:.3f} {unit} above those of the control: ellipsoidal and"
+                " orthometric heights are mixed"
+            )
+        elif kind == "shift":
+            text = f"the {WHAT} are in another datum, shifted by {shown}"
+        else:
+            text = _said_of_arm(np.median(arms, axis=0), value, shown)
+        if isinstance(unknown, Shift):
+            fixed = Shift(unknown.name, value, sd=0.0)
+            meant = [_changed(each, shift=fixed) for each in given]
+        else:
+            meant = [_changed(each, arm=value) for each in given]
+        trials.append(_Trial(kind, text, result, 1 if kind == "geoid" else 3, meant))
+    return trials
+
+
+def _arm(position: Position) -> Floats:
+    arm = position.lever_arm
+    return np.asarray(position.observed[3:6]) if not isinstance(arm, LeverArm) else arm.position
+
+
+def _said_of_arm(given: Floats, meant: Floats, shown: str) -> str:
+    """Say what is wrong with a lever arm."""
+    size = float(np.linalg.norm(given))
+    if not size:
+        return f"the antenna has a lever arm of {shown}"
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        if np.linalg.norm(given[list(order)] * signs - meant) < EQUAL * size:
+            wrong = "the wrong sign" if order == (0, 1, 2) else "other axes"
+            return f"the lever arm has {wrong}: it should be about {shown}"
+    return f"the lever arm is wrong: it should be about {shown}"
+
+
+def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
+    """Try positions of another time: Omega is a parabola of it, whose least value three adjustments give."""
+    axes = local_axes(block)
+    number = {name: row for row, name in enumerate(block.photo_ids)}
+    centres = axes.positions(block.photo_positions)[[number[each.photo] for each in given]]
+    times = np.array([each.time for each in given])
+    velocities = np.full(centres.shape, np.nan)
+    timed = bool(np.ptp(times) > 0)
+    for strip in strips_of(centres):
+        steps = times[strip] if timed else np.arange(len(strip), dtype=np.float64)
+        if len(strip) > 1 and (np.diff(steps) > 0).all():
+            velocities[strip] = np.gradient(centres[strip], steps, axis=0)
+    if not np.isfinite(velocities).all():
+        return []
+
+    def earlier(tau: float) -> list[Position]:
+        places = axes.positions(np.array([each.observed[:3] for each in given])) - tau * velocities
+        return [_changed(each, place) for each, place in zip(given, axes.from_local(places), strict=True)]
+
+    def omega(tau: float) -> float:
+        result = adjusted.tried(_with(block, earlier(tau)))
+        return math.inf if result is None or not result.converged else result.sums_of_squares.total
+
+    step = float(np.median([np.sqrt(np.diagonal(each.precision)).max() for each in given]))
+    step *= 3 / float(np.median(np.linalg.norm(velocities, axis=1)))
+    before, here, after = omega(-step), omega(0.0), omega(step)
+    bend = before - 2 * here + after
+    if not (math.isfinite(bend) and bend > 0):
+        return []
+    tau = step * (before - after) / (2 * bend)
+    per = "s" if timed else "steps from photo to photo"
+    text = f"the {WHAT} are those of another time, {abs(tau):.4g} {per} {'later' if tau > 0 else 'earlier'}"
+    meant = earlier(tau)
+    return [_Trial("time offset", text, adjusted.tried(_with(block, meant)), 1, meant)]
