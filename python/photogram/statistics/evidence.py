@@ -195,9 +195,12 @@ class Evidence:
         if self.test is None:
             return "not-tested", f"Not tested as a whole ({self.found.untested}); no single test rejects"
         low, high = self.test.limits
+        how = "agree with the given standard deviations"
+        if self.test.rejected_high or self.test.rejected_low:
+            how = f"are {self.factor:.3g} times as large as expected: the test shows it, but it harms nobody"
         return (
             "accepted",
-            "Accepted: the residuals agree with the given standard deviations"
+            f"Accepted: the residuals {how}"
             f" (unit variance {self.test.variance:.4g}, expected {low:.3g} to {high:.3g})",
         )
 
