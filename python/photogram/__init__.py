@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
+    from photogram.adjustment.snooping import snoop
     from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
     from photogram.results.result import Result
+    from photogram.results.snooped import Snooped
 
 __all__ = [
     "AdjustmentError",
@@ -56,6 +58,7 @@ __all__ = [
     "Resection",
     "Result",
     "Simulation",
+    "Snooped",
     "Spheroid",
     "VarianceComponents",
     "__version__",
@@ -69,6 +72,7 @@ __all__ = [
     "predict",
     "resect",
     "simulate",
+    "snoop",
     "variance_components",
 ]
 
@@ -97,6 +101,7 @@ _HOMES = {
     "Resection": "adjustment.resection",
     "Result": "results.result",
     "Simulation": "network.simulation",
+    "Snooped": "results.snooped",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
@@ -109,6 +114,7 @@ _HOMES = {
     "predict": "adjustment.prediction",
     "resect": "adjustment.resection",
     "simulate": "network.simulation",
+    "snoop": "adjustment.snooping",
     "variance_components": "adjustment.components",
 }
 """The module of each name, loaded when it is first asked for.

@@ -833,6 +833,35 @@ class NetworkTrial:
         none.
         """
 
+    def responses(self, suspects: list[int]) -> _Floats:
+        """Return the columns of R that belong to the rows of some suspects: (., M)."""
+
+    def most_moved(self, suspects: list[int]) -> list[tuple[str, int, int, float, float]]:
+        """Return, for each row of some suspects, the unknown that an error in it moves most.
+
+        Returns
+        -------
+        Kind (`photo`, `camera`, `unknown`, `point`), index and component of the unknown; by how much an error
+        of one standard deviation moves it, in its unit and in its standard deviations (a priori unit weight).
+        """
+
+    def influences(
+        self, covariances: BlockCovariances, partials: _Floats, of: list[tuple[str, int]]
+    ) -> _Floats:
+        """Return what errors of one standard deviation in every row do to functions of the unknowns.
+
+        Parameters
+        ----------
+        covariances
+            Of the same network at the same values, in the datum of what was held.
+        partials, of
+            As for `BlockCovariances.propagate`: (k, u).
+
+        Returns
+        -------
+        (k, M).
+        """
+
     def inseparable(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
         """Return pairs of suspects of one point whose tests are correlated by more than `limit`."""
 

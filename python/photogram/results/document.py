@@ -64,6 +64,7 @@ def _document(result: Result) -> dict[str, Any]:
         "unit_variance": result.unit_variance,
         "variance_of_unit_weight": result.variance_of_unit_weight,
         "global_test": _global_test(result),
+        "verdict": result.verdict.document(),
         "covariance_scale": result.covariance_scale,
         "photos": _photos(result),
         **(

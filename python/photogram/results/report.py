@@ -10,17 +10,18 @@ import numpy as np
 
 from photogram.network.structuring import structure
 from photogram.results.calibration_report import calibration_sections
+from photogram.results.findings import axes, tested_observations
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
-from photogram.results.kinds import kind_lines, tested_kind
-from photogram.results.observed import image_lines, observed_lines, tested
+from photogram.results.kinds import kind_lines
+from photogram.results.observed import image_lines, observed_lines
 from photogram.results.result import Result
 from photogram.results.unknowns import unknown_lines
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
-from photogram.show.sections import Section, composed, headline, problems
+from photogram.show.sections import Section, composed, headline, problems, verdict_section
 from photogram.show.ways import report_of
 from photogram.statistics.limits import normal_limit
-from photogram.statistics.outliers import Observations, outliers
+from photogram.statistics.outliers import outliers
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
@@ -77,8 +78,9 @@ def report(result: Result) -> str:
 
 @np.errstate(over="ignore")
 def summary(result: Result) -> list[Section]:
-    """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
+    """Return what a reader wants first, as titled sections: verdict, problems, adjustment, residuals."""
     return [
+        verdict_section(result.verdict),
         ("Problems", problems_of(result)),
         ("Adjustment", _adjustment(result)),
         ("Residuals", _residuals(result)),
@@ -88,23 +90,9 @@ def summary(result: Result) -> list[Section]:
 
 def problems_of(result: Result) -> list[str]:
     """Return what keeps a reader from using the values: a failed test and outliers before other remarks."""
-    found = outliers(_tested(result), normal_limit, "standardized residuals")
+    found = outliers(tested_observations(result), normal_limit, "standardized residuals")
     messages = [*found, *result.messages]
     return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
-
-
-def _tested(result: Result) -> list[Observations]:
-    block = result.block
-    unknowns = (*_axes(result), "omega", "phi", "kappa")
-    of_unknowns = tested(
-        result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result)
-    )
-    return of_unknowns + [tested_kind(each) for each in result.kinds.values()]
-
-
-def _axes(result: Result) -> tuple[str, str, str]:
-    """Return what the coordinates are called."""
-    return ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
 
 
 def _adjustment(result: Result) -> list[str]:
@@ -112,7 +100,7 @@ def _adjustment(result: Result) -> list[str]:
     kinds = result.point_kinds[result.used_points].tolist()
     variance = result.variance_of_unit_weight
     held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
-    counts = zip(_axes(result), held.sum(axis=0), strict=True)
+    counts = zip(axes(result), held.sum(axis=0), strict=True)
     components = ", ".join(f"{axis} {count}" for axis, count in counts)
     basis = {
         "free": "cameras free",
@@ -265,12 +253,12 @@ def _difference_table(result: Result, differences: Floats) -> list[str]:
 
 
 def _control(result: Result) -> list[str]:
-    columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
+    columns = [f"{axis} {unit}" for axis, unit in zip(axes(result), _difference_units(result), strict=True)]
     return observed_lines("point", result.block.point_ids, columns, _outward(result), result.control)
 
 
 def _stations(result: Result) -> list[str]:
-    columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
+    columns = [f"{axis} {unit}" for axis, unit in zip(axes(result), _difference_units(result), strict=True)]
     columns += ["omega arcsec", "phi arcsec", "kappa arcsec"]
     outward = np.append(_outward(result), [1.0 / ARCSEC] * 3)
     return observed_lines("photo", result.block.photo_ids, columns, outward, result.stations)
@@ -384,7 +372,7 @@ def _difference_units(result: Result) -> tuple[str, str, str]:
 
 def _differences(result: Result, values: Iterable[float]) -> list[str]:
     outward = np.array(list(values)) * _outward(result)
-    triples = zip(_axes(result), outward, _difference_units(result), strict=True)
+    triples = zip(axes(result), outward, _difference_units(result), strict=True)
     return [f"{axis} {value:.5f} {unit}" for axis, value, unit in triples if math.isfinite(value)]
 
 

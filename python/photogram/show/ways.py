@@ -18,7 +18,7 @@ from photogram.statistics.verdict import Verdict, verdict
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Shown", "columns_of", "document_of", "findings_of", "picture_of", "report_of"]
+__all__ = ["Judged", "Shown", "columns_of", "document_of", "findings_of", "picture_of", "report_of"]
 
 
 @singledispatch
@@ -55,7 +55,16 @@ def _undefined(result: object, way: str) -> NoReturn:
     raise NotImplementedError(f"{type(result).__name__} has no {way}")
 
 
-class Shown:
+class Judged:
+    """What has a verdict."""
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the result can be used, and if not, what is wrong; see `docs/tests.md`."""
+        return verdict(findings_of(self))
+
+
+class Shown(Judged):
     """What has a report, a JSON document, and tables."""
 
     def report(self) -> str:
@@ -65,11 +74,6 @@ class Shown:
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
         return document_of(self)
-
-    @cached_property
-    def verdict(self) -> Verdict:
-        """Whether the result can be used, and if not, what is wrong; see `docs/tests.md`."""
-        return verdict(findings_of(self))
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return what the result says about one kind of thing as a data frame.

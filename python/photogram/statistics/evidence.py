@@ -211,13 +211,15 @@ class Evidence:
 
     def _by_what(self) -> list[str]:
         """Say which test decides on single observations."""
+        if not self.found.computed:
+            return ["single observations are not tested: redundancy numbers were not computed"]
         if not self.number:
             return []
         found = {each.statistic for each in self.found.observations if self._count(each)}
         what = " and ".join(meaning for statistic, meaning in STATISTICS.items() if statistic in found)
         return [
-            f"single observations are judged by {what}: level {self.found.level:g} for all {self.number} tests"
-            " together"
+            f"single observations are judged by {what}: level {self.found.level:g} for all"
+            f" {self.number} tests together"
         ]
 
     def tests(self) -> list[Test]:

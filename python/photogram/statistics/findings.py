@@ -62,7 +62,7 @@ class Tested:
         )
 
     def largest(self) -> tuple[int, ...] | None:
-        """Return the place of the least probable value, the first of equal ones; None where none is tested."""
+        """Return the place of the least probable value, the first of equal ones; None without values."""
         sizes = np.abs(self.values) if self._alike else -self.log_probability()
         sizes = np.where(np.isnan(sizes), -math.inf, sizes)
         if not sizes.size or sizes.max() == -math.inf:
@@ -218,15 +218,17 @@ class Findings:
     undetermined
         Unknowns that no observation determines.
     hints
-        Accepted hypotheses of what is wrong with the data, as sentences.
+        Accepted hypotheses of what is wrong with the data, as sentences ("probably ...").
+    spoiled
+        Why gross errors make the result unusable, where the program has found that itself; a sentence.
     doubtful
         Stars: exposures whose identification is doubtful or rejected.
     systematic, components, snooped
         What further computations have found, where they were made.
+    computed
+        Whether observations could be tested, that is, whether their redundancy numbers were computed.
     remarks
         Sentences that stand below the headline.
-    grave
-        Why the result cannot be used though it converged, in a sentence.
     snoop
         How gross errors are taken out with this program; nothing where it cannot.
     level
@@ -240,11 +242,12 @@ class Findings:
     untested: str = "no a-priori unit weight"
     undetermined: Sequence[str] = ()
     hints: Sequence[str] = ()
+    spoiled: str = ""
     doubtful: Sequence[str] = ()
     systematic: Sequence[Systematic] = ()
     components: Sequence[Component] = ()
     snooped: Snooped | None = None
+    computed: bool = True
     remarks: Sequence[str] = ()
-    grave: str = ""
     snoop: str = ""
     level: float = LEVEL

@@ -7,7 +7,7 @@ level and number of tests.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,10 +16,13 @@ from photogram.statistics.evidence import NAMED, Evidence, Test
 from photogram.statistics.findings import Findings
 from photogram.statistics.limits import NOTABLE_FACTOR
 
-__all__ = ["EXIT_NOT_CONVERGED", "EXIT_NOT_USABLE", "Test", "Verdict", "verdict"]
+__all__ = ["EXIT_NOT_CONVERGED", "EXIT_NOT_USABLE", "Test", "Verdict", "verdict", "worst"]
 
 EXIT_NOT_CONVERGED, EXIT_NOT_USABLE = 3, 4
 """How a command ends: figures that are no results; results that must not be used as they are."""
+
+_GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)
+"""Exit codes, the worst last."""
 
 LARGEST_FACTOR = 3.0
 """Standard deviations wrong by more than this are no matter of weights."""
@@ -97,6 +100,11 @@ def verdict(found: Findings) -> Verdict:
     )
 
 
+def worst(verdicts: Iterable[Verdict], *, strict: bool = False) -> int:
+    """Return the exit code of a command with several results: that of the worst."""
+    return max((each.exit_code(strict=strict) for each in verdicts), key=_GRAVITY.index, default=0)
+
+
 def _not_converged(e: Evidence) -> _Line | None:
     if e.found.status == "converged":
         return None
@@ -112,14 +120,12 @@ def _rank_defect(e: Evidence) -> _Line | None:
     return _Line("undetermined", f"Unknowns that no observation determines: {names}", EXIT_NOT_CONVERGED)
 
 
-def _grave(e: Evidence) -> _Line | None:
-    return _Line("grave", f"Not usable: {e.found.grave}", EXIT_NOT_USABLE) if e.found.grave else None
-
-
 def _hint(e: Evidence) -> _Line | None:
     if not e.found.hints:
         return None
-    return _Line("hint", f"Probably {'; '.join(e.found.hints)}", EXIT_NOT_USABLE)
+    first, *others = e.found.hints
+    text = "; ".join([f"{first[:1].upper()}{first[1:]}", *others])
+    return _Line("hint", text, EXIT_NOT_USABLE)
 
 
 def _identification(e: Evidence) -> _Line | None:
@@ -130,6 +136,8 @@ def _identification(e: Evidence) -> _Line | None:
 
 
 def _gross_errors(e: Evidence) -> _Line | None:
+    if e.found.spoiled:
+        return _Line("gross-errors", f"Gross errors: {e.found.spoiled}", EXIT_NOT_USABLE)
     if not e.high or e.found.snooped or not e.gross:
         return None
     if e.pattern and e.robust is not None and e.robust > 1.5:
@@ -190,7 +198,7 @@ def _model(e: Evidence) -> _Line | None:
 
 
 def _uncontrolled(e: Evidence) -> _Line | None:
-    if e.found.degrees_of_freedom >= 1 and e.number:
+    if e.found.degrees_of_freedom >= 1 and (e.number or not e.found.computed):
         return None
     reason = (
         "as many unknowns as observations" if e.found.degrees_of_freedom < 1 else "no observation has a test"
@@ -234,7 +242,6 @@ def _too_low(e: Evidence) -> _Line | None:
 _CONDITIONS: tuple[Callable[[Evidence], _Line | None], ...] = (
     _not_converged,
     _rank_defect,
-    _grave,
     _hint,
     _identification,
     _gross_errors,

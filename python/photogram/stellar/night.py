@@ -13,11 +13,12 @@ import numpy as np
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.show.angles import ARCSEC
+from photogram.statistics.verdict import LARGEST_FACTOR
 from photogram.stellar.lens_choice import LensFit, as_lens, compared_lenses
 from photogram.stellar.lens_tests import LensTest, test_scale, test_terms
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.night_run import Run, adjusted
-from photogram.stellar.nights import FACTOR, SIGNIFICANT, CalibratedNight, Night
+from photogram.stellar.nights import SIGNIFICANT, CalibratedNight, Night
 from photogram.stellar.places import Earth
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.stellar.still import stood_still
@@ -142,7 +143,7 @@ def _failed(result: CalibratedNight) -> list[Message]:
     test = result.test
     failed = test.problem() if test else None
     if test and failed:
-        texts.append(f"{failed}: do not use this camera" if test.factor > FACTOR else failed)
+        texts.append(f"{failed}: do not use this camera" if test.factor > LARGEST_FACTOR else failed)
         texts.append(
             f"the stars are found beyond doubt: sd_px is too small, or the lens {lens} does not"
             f" describe this camera (others are {listed([name for name in LENSES if name != lens])})"

@@ -43,6 +43,7 @@ def to_json(result: CalibratedNight) -> bytes:
             "stop": found.status,
             "converged": result.converged,
             "usable": result.usable,
+            "verdict": result.verdict.document(),
             "global_test": None
             if result.test is None
             else {

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.show.angles import ARCSEC
-from photogram.show.sections import Section, composed, headline
+from photogram.show.sections import Section, composed, headline, verdict_section
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE
 from photogram.stellar.nights import SIGNIFICANT, CalibratedNight
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
@@ -36,8 +36,9 @@ def report(result: CalibratedNight) -> str:
 
 
 def summary(result: CalibratedNight) -> list[Section]:
-    """Return what a reader wants first: problems, figures, the camera."""
+    """Return what a reader wants first: verdict, problems, figures, the camera."""
     return [
+        verdict_section(result.verdict),
         ("Problems", [str(message) for message in result.messages] or ["none"]),
         ("Adjustment", _adjustment(result)),
         ("Camera", _camera(result)),

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import Message, listed
+from photogram.show.ways import Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.inertial import InertialAttitude, inertial_attitude
@@ -24,15 +25,13 @@ from photogram.stellar.sky import Site
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.stellar.still import Standstill
 
-__all__ = ["FACTOR", "SIGNIFICANT", "CalibratedNight", "Night"]
+__all__ = ["SIGNIFICANT", "CalibratedNight", "Night"]
 
 
 CORRELATED = 0.95
 """Correlations above this are named."""
 SIGNIFICANT = 1.96
 """Distortion terms below this multiple of their mean error are named (5 % of error)."""
-FACTOR = 5.0
-"""Residuals that are larger than assumed by more than this make no camera."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +123,7 @@ class Night:
 
 
 @dataclass(frozen=True, eq=False)
-class CalibratedNight:
+class CalibratedNight(Judged):
     """A calibrated camera, and what happened to the images.
 
     Attributes
@@ -191,15 +190,12 @@ class CalibratedNight:
 
     @property
     def usable(self) -> bool:
-        """Whether the camera may be used.
+        """Whether the camera may be used: `verdict` says why not.
 
-        Not so when the adjustment has not converged, residuals are larger than assumed by a factor of
-        `FACTOR`, more exposures are left out than take part, or the
-        identification of an exposure is doubtful.
+        Not so when the adjustment has not converged, residuals are much larger than assumed, more exposures
+        are left out than take part, or the identification of an exposure is doubtful.
         """
-        test = self.test
-        beyond = test is not None and test.rejected_high and test.factor > FACTOR
-        return self.converged and not beyond and not self.mostly_left_out and not self.doubtful
+        return self.verdict.usable
 
     @property
     def probabilities(self) -> Floats:

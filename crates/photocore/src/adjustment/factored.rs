@@ -121,7 +121,10 @@ impl Factored {
     }
 
     /// Solves for right-hand sides over all unknowns, one after the other; so are the solutions.
-    pub(super) fn solve_for<M: Model>(
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn solve_for<M: Model>(
         &self,
         problem: &Problem<M>,
         rights: &[f64],

@@ -300,6 +300,12 @@ impl Covariances {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Vec<f64>, NetworkError> {
+        let functions = self.functions(partials, of)?;
+        self.of_functions(&functions, None, pool, watch)
+    }
+
+    /// Linear functions of the unknowns of what is named, a row of partials for each.
+    fn functions(&self, partials: &[f64], of: &[Of]) -> Result<Vec<Function>, NetworkError> {
         let unknowns = self.unknowns(of)?;
         if unknowns.is_empty() || !partials.len().is_multiple_of(unknowns.len()) {
             return Err(NetworkError::Partials { unknowns: unknowns.len(), numbers: partials.len() });
@@ -312,8 +318,25 @@ impl Covariances {
                 })
                 .collect()
         };
-        let functions: Vec<Function> = partials.chunks_exact(unknowns.len()).map(function).collect();
-        self.of_functions(&functions, None, pool, watch)
+        Ok(partials.chunks_exact(unknowns.len()).map(function).collect())
+    }
+
+    /// Q h of such functions h, over all unknowns, in the datum of what was held.
+    pub(super) fn solutions(
+        &self,
+        partials: &[f64],
+        of: &[Of],
+        pool: &ThreadPool,
+    ) -> Result<Vec<Vec<f64>>, NetworkError> {
+        let problem = &self.assembled.problem;
+        let solve = |function: &Function| {
+            let mut right = vec![0.0; problem.layout().unknowns()];
+            function.iter().for_each(|&(unknown, value)| right[unknown] += value);
+            let go_on = &mut |_| ControlFlow::Continue(());
+            let found = self.factored.solve_for(problem, &right, pool, go_on);
+            found.map_err(|error| NetworkError::new(error, &self.assembled))
+        };
+        self.functions(partials, of)?.iter().map(solve).collect()
     }
 
     fn of_functions(

@@ -21,11 +21,11 @@ use crate::normals::{GroupCofactors, LocalCofactors};
 /// A network tried without some of its observations.
 #[derive(Debug)]
 pub struct Trial {
-    assembled: Assembled,
+    pub(super) assembled: Assembled,
     options: adjustment::Options,
-    suspects: Vec<Suspect>,
+    pub(super) suspects: Vec<Suspect>,
     /// Where the rows of each suspect start, and its square block; one more at the end.
-    row_starts: Vec<usize>,
+    pub(super) row_starts: Vec<usize>,
     block_starts: Vec<usize>,
     /// Standard deviations as given: of the equations, of the unknowns.
     observation_sd: Vec<f64>,
@@ -286,7 +286,7 @@ impl Trial {
         }
     }
 
-    fn found(&self) -> Result<&Tried, NetworkError> {
+    pub(super) fn found(&self) -> Result<&Tried, NetworkError> {
         self.found.as_ref().ok_or(NetworkError::State)
     }
 
@@ -513,7 +513,7 @@ impl Trial {
     }
 
     /// The cofactors of the unknowns of a point or block.
-    fn cofactors_at(&self, found: &Tried, home: Home) -> DMatrix<f64> {
+    pub(super) fn cofactors_at(&self, found: &Tried, home: Home) -> DMatrix<f64> {
         let (model, kept) = (&self.assembled.problem.model, &found.cofactors.kept);
         let width = self.unknowns_at(home).len();
         let values = match home {

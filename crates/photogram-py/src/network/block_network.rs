@@ -29,14 +29,14 @@ pub struct BlockNetwork {
 /// Covariances of an adjusted block, from one factor.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct BlockCovariances {
-    covariances: Covariances,
+    pub(super) covariances: Covariances,
     images: usize,
 }
 
 /// Something that has cofactors: its kind and its index.
-type OfRow = (String, usize);
+pub(super) type OfRow = (String, usize);
 
-fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
+pub(super) fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
     let of = |(kind, index): OfRow| match kind.as_str() {
         "photo" => Ok(Of::Photo(index)),
         "step" => Ok(Of::PhotoStep(index)),

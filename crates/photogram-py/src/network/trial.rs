@@ -1,11 +1,12 @@
 //! A network tried without some of its observations.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use photocore::adjustment::Loss;
-use photocore::network::{NetworkError as Failure, Out, Standing, Subject, Trial};
+use photocore::network::{Moved, NetworkError as Failure, Out, Standing, Subject, Trial, UnknownOf};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::block_network::{BlockCovariances, OfRow, of_rows};
 use crate::arrays::table;
 use crate::options::named_loss;
 use crate::solution::status_name;
@@ -174,6 +175,50 @@ impl NetworkTrial {
     fn effects<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let found = watched(py, self.workers(), None, |pool, _| self.trial.effects(&suspects, pool))?;
         table(py, found.map_err(|error| (self.refused)(&error))?)
+    }
+
+    fn responses<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.responses(&suspects, pool))?;
+        let columns = found.map_err(|error| (self.refused)(&error))?;
+        let rows = self.trial.row_starts().last().copied().unwrap_or_default();
+        let count = columns.len() / rows.max(1);
+        PyArray1::from_vec(py, columns).reshape([count, rows])
+    }
+
+    fn most_moved(
+        &self,
+        py: Python<'_>,
+        suspects: Vec<usize>,
+    ) -> PyResult<Vec<(&'static str, usize, usize, f64, f64)>> {
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.most_moved(&suspects, pool))?;
+        let row = |moved: Moved| {
+            let (kind, index) = match moved.of {
+                UnknownOf::Photo(index) => ("photo", index),
+                UnknownOf::Camera(index) => ("camera", index),
+                UnknownOf::Common(index) => ("unknown", index),
+                UnknownOf::Point(index) => ("point", index),
+            };
+            (kind, index, moved.component, moved.effect, moved.in_sd)
+        };
+        Ok(found.map_err(|error| (self.refused)(&error))?.into_iter().map(row).collect())
+    }
+
+    fn influences<'py>(
+        &self,
+        py: Python<'py>,
+        covariances: &BlockCovariances,
+        partials: PyReadonlyArray2<'_, f64>,
+        of: Vec<OfRow>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let count = partials.as_array().nrows();
+        let partials: Vec<f64> = partials.as_array().iter().copied().collect();
+        let of = of_rows(of)?;
+        let found = watched(py, self.workers(), None, |pool, _| {
+            self.trial.influences(&covariances.covariances, &partials, &of, pool)
+        })?;
+        let influences = found.map_err(|error| (self.refused)(&error))?;
+        let rows = influences.len() / count.max(1);
+        PyArray1::from_vec(py, influences).reshape([count, rows])
     }
 
     fn inseparable(
