@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -70,10 +70,15 @@ class Night:
         Whether the roll of the approximate attitudes is known as well as their direction; else it may be any.
     field_error
         Share by which the principal distance of `camera` may be wrong.
+    blind
+        Smallest and largest horizontal field of view, radians, when neither attitudes nor the field of view
+        are known (`photogram.stellar.blind`); None where they are.
     tripod
         Whether the camera stood still on a tripod: its attitudes are tested to be one.
     confirmed
         Names of exposures that take part though their identification is doubtful.
+    nowhere
+        Exposures without an attitude, by their index, and why they have none: they are left out.
     title
         For the report.
     """
@@ -97,8 +102,10 @@ class Night:
     lenses: tuple[str, ...] = ()
     roll_known: bool = True
     field_error: float = STRETCH
+    blind: tuple[float, float] | None = None
     tripod: bool = False
     confirmed: tuple[str, ...] = ()
+    nowhere: Mapping[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.exposures or len(self.names) != len(self.exposures):
