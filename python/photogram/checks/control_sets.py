@@ -325,17 +325,16 @@ def _rotation(vector: Floats) -> Floats:
     return turned
 
 
-def doubtful(first: Result | None) -> bool:
-    """Whether control as a whole may be wrong: it does not converge with the images, or much does not fit."""
+def doubtful(first: Result | None, *kinds: str) -> bool:
+    """Whether all observations of some kinds may be wrong: an adjustment fails, or several do not fit."""
     if first is None or not first.converged:
         return True
     values = tests(first)
     size = max(mad_sd(first.standardized), np.finfo(np.float64).tiny)
     limit = critical(sum(int((each > 0).sum()) for each in values.values())) * size
-    held = np.isfinite(first.block.point_sd)
-    fixed = held & (first.block.point_sd == 0)
-    beyond = (values["control"] > limit).any(axis=1)
-    return bool(beyond.sum() >= MANY or (fixed.any() and size > MANY))
+    beyond = sum(int((values[kind] > limit).any(axis=1).sum()) for kind in kinds if kind in values)
+    fixed = "control" in kinds and bool((first.block.point_sd == 0).any())
+    return beyond >= MANY or (fixed and size > MANY)
 
 
 def free_model(block: Block, adjusted: Adjuster) -> FreeModel | None:
@@ -426,7 +425,7 @@ def explain(model: FreeModel) -> Explained | None:
     best = [sets[place] for place in verdict.best]
     if model.held.all(axis=1).sum() < FEWEST:
         # Nothing tells a mistake in all from one in some.
-        verdict = replace(verdict, accepted=False)
+        verdict = replace(verdict, explained=False)
     word = "probably" if verdict.accepted else "it cannot be told which" if len(best) > 1 else "possibly"
     text = f"{word}{':' if len(best) > 1 else ''} {'; or '.join(each.text for each in best)}"
     text += f": the control would miss the model of the photos by {verdict.fall:.3g} times less"

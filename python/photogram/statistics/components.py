@@ -183,6 +183,12 @@ class Estimate:
     level: float
 
     @property
+    def limit(self) -> float:
+        """What the size of a test value of a component exceeds where it is significant."""
+        free = sum(not each.held for each in self.components)
+        return critical_normal(bonferroni(self.level, free))
+
+    @property
     def reference(self) -> float:
         """The component of all image coordinates together; 1 where there are none."""
         own = [each for each in self.components if each.images and each.redundancy > 0]
@@ -300,7 +306,7 @@ class _Run:
                 names = [self.groups.names[g] for g in pool]
                 name = parent if len(pool) == len(siblings) or "other" in parent else f"others of {parent}"
                 self.messages.append(
-                    f"{listed(names)}: merged, each has too little redundancy for itself: {name}"
+                    f"{listed(names)}: merged into {name}, each has too little redundancy for itself"
                 )
                 pools |= dict.fromkeys(pool, (name, pool))
         units: list[tuple[str, list[int]]] = []
@@ -432,7 +438,8 @@ class _Run:
         """Test whether all free components are equal.
 
         The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2: twice its
-        difference between the equal components and the estimated ones is the integral of q_g - r_g along the line.
+        difference between the equal components and the estimated ones is the integral of q_g - r_g along
+        the line.
         """
         free = self.free
         if len(free) < 2 or not self.converged:
