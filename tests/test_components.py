@@ -397,7 +397,7 @@ def test_gross_errors_and_weights_are_found_together():
     assert set(bad.tolist()) <= out
     assert len(out) <= len(bad) + 1
     assert found.components["images"].interval[0] < 1 < found.components["images"].interval[1]
-    assert "standard deviations of images: multiplied by 3." in found.report()
+    assert "standard deviations of images: multiplied by 2.88" in found.report()
 
 
 def test_weights_that_are_right_stay_when_gross_errors_are_out():
