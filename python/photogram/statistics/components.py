@@ -413,8 +413,8 @@ class _Run:
             component, deviation = factor * by_helmert[place], factor * deviations[place]
             said[unit] = (
                 f"the residuals of {name} are smaller than any positive variance explains (component"
-                f" {component:.2g} +- {deviation:.2g}): held at the lower bound of {LOWER_BOUND:g} of the given"
-                " variance"
+                f" {component:.2g} +- {deviation:.2g}): held at the lower bound of {LOWER_BOUND:g} of the"
+                " given variance"
             )
             self.factors[members] = 1.0
         # With its own variance, and the weights that the others have by now, it may hardly be checked at all.
