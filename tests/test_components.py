@@ -15,9 +15,10 @@ from photogram import (
     variance_components,
     variance_function,
 )
+from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
 from photogram.errors import InputError
-from photogram.results.group_sums import Probing
+from photogram.results.group_sums import Probing, factored
 from photogram.statistics.components import GroupsOf, balanced, estimate, helmert_step
 from shared_data import SHARED
 
@@ -397,7 +398,7 @@ def test_gross_errors_and_weights_are_found_together():
     assert set(bad.tolist()) <= out
     assert len(out) <= len(bad) + 1
     assert found.components["images"].interval[0] < 1 < found.components["images"].interval[1]
-    assert "standard deviations of images: multiplied by 3." in found.report()
+    assert "standard deviations of images: multiplied by 2.88" in found.report()
 
 
 def test_weights_that_are_right_stay_when_gross_errors_are_out():
@@ -407,3 +408,19 @@ def test_weights_that_are_right_stay_when_gross_errors_are_out():
     assert found.components is None
     assert (found.factors == 1).all()
     assert len(found.snooped.removed) in (len(bad), len(bad) + 1)
+
+
+def test_what_errors_leave_is_a_projection():
+    """Test that of images alone R is symmetric and idempotent, with the degrees of freedom as its trace."""
+    collection = simulate_collection(photos=4, points=25, noise=0.5, seed=2).collection
+    result = adjust_collection(collection)
+    core = factored(result)
+    m = len(collection.image_xy)
+    r = core.project_images(np.eye(2 * m).reshape(-1, m, 2), threads=1, progress=None).reshape(2 * m, 2 * m)
+    assert r == pytest.approx(r.T, abs=1e-8)
+    assert r @ r == pytest.approx(r, abs=1e-8)
+    assert np.trace(r) == pytest.approx(result.degrees_of_freedom, abs=1e-6)
+    assert np.diag(r) == pytest.approx(result.redundancy.ravel(), abs=1e-7)
+    standardized = (result.residuals / collection.image_sd).ravel()
+    # The residuals lie in its range, but for what is not linear.
+    assert r @ standardized == pytest.approx(standardized, abs=1e-2)
