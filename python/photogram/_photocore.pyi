@@ -873,8 +873,9 @@ class BlockState:
     ----------
     unknowns
         Adjusted, in the order of the core.
-    held, collapsed
-        Unknowns held for a datum; points left out because they ran into a station.
+    held, collapsed, loose
+        Unknowns held for a datum; points left out because they ran into a station or their rays do not
+        determine them; photos left out because their images do not.
     ordering
         The name of the ordering in force.
     datum
@@ -891,12 +892,20 @@ class BlockState:
         unknowns: list[float],
         held: list[int],
         collapsed: list[int],
+        loose: list[int],
         ordering: str,
         datum: tuple[str, list[int], list[int], bool] | None,
     ) -> BlockState: ...
     def __getnewargs__(
         self,
-    ) -> tuple[list[float], list[int], list[int], str, tuple[str, list[int], list[int], bool] | None]: ...
+    ) -> tuple[
+        list[float],
+        list[int],
+        list[int],
+        list[int],
+        str,
+        tuple[str, list[int], list[int], bool] | None,
+    ]: ...
 
 @final
 class BlockCovariances:
@@ -1111,10 +1120,24 @@ class BlockSolution(_NetworkSolution):
         """Indices of the images beyond where the lens of their camera is one-to-one, ascending."""
 
     @property
+    def loose_photos(self) -> list[int]:
+        """Indices of the photos that stay as they are because their images do not determine them."""
+
+    @property
+    def weak_points(self) -> list[tuple[int, float, float]]:
+        """Points on nearly parallel rays, or at a station's own place.
+
+        For each its index, the largest of its standard deviations over the smallest (in any directions;
+        infinite where rounding has taken the smallest, NaN without cofactors) and its distance from the
+        nearest station that sees it, in the median of these distances.
+        """
+
+    @property
     def weak(self) -> list[tuple[int, int]]:
         """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
 
-        The sum of squares stood still all the same. Empty where the adjustment ended otherwise.
+        The sum of squares stood still all the same, or the iterations ran out. Empty where the adjustment
+        ended otherwise.
         """
 
     @property
@@ -2034,6 +2057,10 @@ class CollectionSolution(_NetworkSolution):
     @property
     def collapsed(self) -> list[int]:
         """Indices of the points that ran into a station and were left out."""
+
+    @property
+    def not_determined(self) -> list[int]:
+        """Indices of the points that were left out because their rays do not determine them."""
 
     @property
     def sum_of_squares(self) -> float:

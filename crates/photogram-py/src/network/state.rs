@@ -27,8 +27,8 @@ fn row_of(datum: &NetworkDatum) -> DatumRow {
     (name.to_owned(), points, photos, scale)
 }
 
-/// Adjusted unknowns, those held, points left out, ordering, datum.
-type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, String, Option<DatumRow>);
+/// Adjusted unknowns, those held, points and photos left out, ordering, datum.
+type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, Vec<usize>, String, Option<DatumRow>);
 
 /// Where an adjustment has ended.
 #[pyclass(frozen, module = "photogram._photocore")]
@@ -43,16 +43,17 @@ impl BlockState {
         unknowns: Vec<f64>,
         held: Vec<usize>,
         collapsed: Vec<usize>,
+        loose: Vec<usize>,
         ordering: &str,
         datum: Option<DatumRow>,
     ) -> PyResult<Self> {
         let (ordering, datum) = (named_ordering(ordering)?, datum.map(datum_of).transpose()?);
-        Ok(Self { state: State { unknowns, held, collapsed, ordering, datum } })
+        Ok(Self { state: State { unknowns, held, collapsed, loose, ordering, datum } })
     }
 
     /// So that results are copied and sent to other processes.
     fn __getnewargs__(&self) -> StateRow {
-        let State { unknowns, held, collapsed, ordering, datum } = self.state.clone();
-        (unknowns, held, collapsed, ordering.name().to_owned(), datum.as_ref().map(row_of))
+        let State { unknowns, held, collapsed, loose, ordering, datum } = self.state.clone();
+        (unknowns, held, collapsed, loose, ordering.name().to_owned(), datum.as_ref().map(row_of))
     }
 }

@@ -8,7 +8,7 @@ use super::projections::{
     Central, DivisionByRadius, Equidistant, Equisolid as EquisolidRays, ExtendedUnified, FieldOfView,
     RayProjection, Seen, Stereographic as StereographicRays,
 };
-use super::radial_tangential::{Bent, RadialTangential};
+use super::radial_tangential::{Bent, RadialTangential, Terms};
 use super::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
@@ -49,6 +49,22 @@ impl Role {
             Self::Skew | Self::Own(_) | Self::N(_) | Self::D(_) | Self::T(_) | Self::S(_) => Unit::One,
         }
     }
+}
+
+/// The terms of a lens that some parameters are of.
+const fn terms(roles: &[Role]) -> Terms {
+    let mut terms = Terms { powers: [0, 0], prism: false };
+    let mut i = 0;
+    while i < roles.len() {
+        match roles[i] {
+            Role::N(power) if power > terms.powers[0] => terms.powers[0] = power,
+            Role::D(power) if power > terms.powers[1] => terms.powers[1] = power,
+            Role::S(_) => terms.prism = true,
+            _ => {}
+        }
+        i += 1;
+    }
+    terms
 }
 
 /// What a camera is made of: image = (fx a + shear b + x0, fy b + y0) of the bent a, b.
@@ -96,9 +112,9 @@ impl Parts {
 
     /// The place that a lens bends, and what it is then.
     #[inline(always)]
-    fn bend(&self, ab: [f64; 2], staged: bool) -> Bending {
+    fn bend(&self, ab: [f64; 2], staged: bool, terms: Terms) -> Bending {
         if !staged {
-            let bent = self.lens.bend(ab);
+            let bent = self.lens.bend_by(ab, terms);
             return Bending {
                 first: bent,
                 last: bent,
@@ -107,8 +123,10 @@ impl Parts {
             };
         }
         let straight = RadialFactor::polynomial(&[]);
-        let first = RadialTangential { tangential: [0.0; 2], prism: [[0.0; 2]; 2], ..self.lens }.bend(ab);
-        let last = RadialTangential { radial: straight, ..self.lens }.bend(first.xy);
+        let first = RadialTangential { tangential: [0.0; 2], prism: [[0.0; 2]; 2], ..self.lens };
+        let first = first.bend_by(ab, Terms { prism: false, ..terms });
+        let last = RadialTangential { radial: straight, ..self.lens };
+        let last = last.bend_by(first.xy, Terms { powers: [0, 0], ..terms });
         let (to, from) = (last.by_place, first.by_place);
         let by_place = [0, 1].map(|i| [0, 1].map(|k| to[i][0] * from[0][k] + to[i][1] * from[1][k]));
         Bending { first, last, by_first: to, by_place }
@@ -167,6 +185,7 @@ trait Table<const N: usize>: Copy {
     type Projection: RayProjection;
     const STAGED: bool;
     const ROLES: [Role; N];
+    const TERMS: Terms = terms(&Self::ROLES);
 
     fn values(&self) -> &[f64; N];
 
@@ -179,14 +198,14 @@ trait Table<const N: usize>: Copy {
     fn place(&self, u: &Vector3) -> [f64; 2] {
         let parts = self.parts();
         let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
-        parts.image(parts.bend(seen.ab, Self::STAGED).last.xy)
+        parts.image(parts.bend(seen.ab, Self::STAGED, Self::TERMS).last.xy)
     }
 
     #[inline(always)]
     fn with_partials(&self, u: &Vector3) -> Image<[f64; N]> {
         let parts = self.parts();
         let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
-        let bending = parts.bend(seen.ab, Self::STAGED);
+        let bending = parts.bend(seen.ab, Self::STAGED, Self::TERMS);
         let by_ray = [0, 1, 2]
             .map(|k| parts.moved(super::inverse::times(&bending.by_place, seen.by_ray.map(|row| row[k]))));
         let by_u = |row: usize| Vector3::new(by_ray[0][row], -by_ray[1][row], -by_ray[2][row]);
@@ -200,7 +219,7 @@ trait Table<const N: usize>: Copy {
         let b = (y - parts.origin[1]) / parts.focal[1];
         let a = (x - parts.origin[0] - parts.shear * b) / parts.focal[0];
         let ab = from_radial(&parts.lens.radial, [a, b], |place| {
-            let bending = parts.bend(place, Self::STAGED);
+            let bending = parts.bend(place, Self::STAGED, Self::TERMS);
             (bending.last.xy, bending.by_place)
         })?;
         let [x, y, z] = Self::Projection::ray(ab, parts.own)?;
