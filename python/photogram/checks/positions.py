@@ -28,7 +28,7 @@ from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.network.unknowns import LeverArm, Shift, Unknown
 from photogram.results.result import Result
-from photogram.statistics.likelihood import RIVAL, Judged, judged, likelihood
+from photogram.statistics.likelihood import RIVAL, TESTED, Judged, judged, likelihood
 
 __all__ = ["Wrong", "wrong_positions"]
 
@@ -93,7 +93,7 @@ def wrong_positions(block: Block, adjusted: Adjuster) -> Wrong | None:
     found = [each for each in found if math.isfinite(each.left)]
     by_kind = {each.kind: each for each in found}
     freedom = next((each.result.degrees_of_freedom for each in found if each.result is not None), 0)
-    if not freedom:
+    if freedom < TESTED:
         return None
     part = by_kind.get("geoid")
     for whole in (by_kind.get("shift"), by_kind.get("lever arm")):
