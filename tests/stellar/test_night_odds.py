@@ -210,7 +210,7 @@ def test_the_command_writes_tables_and_yaml(folder):
         "camera.yaml",
         "camera-ros.yaml",
         "exposures.csv",
-        "images.csv",
+        "star-images.csv",
     }
     assert (
         (out / "exposures.csv").read_text().startswith("exposure,utc,images,identified,left_out,by_chance,")

@@ -186,7 +186,7 @@ def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path
         out / "report.txt": report(result).encode(),
         out / "camera.json": result.camera.to_json(),
         out / "exposures.csv": exposure_table(result).to_csv(index=False).encode(),
-        out / "images.csv": image_table(result).to_csv(index=False).encode(),
+        out / "star-images.csv": image_table(result).to_csv(index=False).encode(),
     }
     if result.camera.lens in WITH_YAML:
         made[out / "camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
