@@ -257,18 +257,18 @@ def test_a_round_trip_gives_the_same_adjustment(example, tmp_path):
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
-        ("images.csv", "DJI_0101,t02", "DJI_0101,t03", ["images.csv", "record", "already"]),
-        ("images.csv", "DJI_0101,t02", "DJI_0101,", ["images.csv", "record 4", "column point", "empty"]),
-        ("images.csv", "DJI_0101,t02", "DJI_0101,NaN", ["record 4", "column point", "no name"]),
-        ("images.csv", "DJI_0101,t02", "DJI_0101,T02", ["images.csv", "column point", "case alone"]),
-        ("images.csv", "DJI_0101,t02", "dji_0101,t02", ["record 4", "column photo"]),
+        ("images.csv", "DJI_0101,t03", "DJI_0101,t04", ["images.csv", "record", "already"]),
+        ("images.csv", "DJI_0101,t03", "DJI_0101,", ["images.csv", "record 5", "column point", "empty"]),
+        ("images.csv", "DJI_0101,t03", "DJI_0101,NaN", ["record 5", "column point", "no name"]),
+        ("images.csv", "DJI_0101,t03", "DJI_0101,T03", ["images.csv", "column point", "case alone"]),
+        ("images.csv", "DJI_0101,t03", "dji_0101,t03", ["record 5", "column photo"]),
         (
             "images.csv",
-            "DJI_0101,t02,",
-            "DJI_0101,t02,x",
-            ["record 4", "column column", "is not a number", "|DJI_0101,t02,x"],
+            "DJI_0101,t03,",
+            "DJI_0101,t03,x",
+            ["record 5", "column column", "is not a number", "|DJI_0101,t03,x"],
         ),
-        ("images.csv", "DJI_0101,t02,", "DJI_0101,t02,nan,", ["record 4"]),
+        ("images.csv", "DJI_0101,t03,", "DJI_0101,t03,nan,", ["record 5"]),
         ("images.csv", "photo,point,column,row", "photo,point,colum,row", ["record 2", "missing"]),
         ("photos.csv", "DJI_0102,", "DJI_0101,", ["photos.csv", "record 5", "twice"]),
         ("photos.csv", "DJI_0102,drone", "DJI_0102,phone", ["record 5", "column camera", "phone"]),
@@ -294,7 +294,7 @@ def test_a_fault_is_named_with_file_row_and_column(example, file, old, new, word
 
 
 def test_names_that_differ_by_blanks_inside_are_an_error(example):
-    text = (example / "images.csv").read_text().replace("t02", "t 2").replace("t03", "t  2")
+    text = (example / "images.csv").read_text().replace("t01", "t 2").replace("t03", "t  2")
     (example / "images.csv").write_text(text)
     with pytest.raises(InputError, match="differs from 't 2' by blanks or case alone"):
         formats.read(example)

@@ -12,13 +12,13 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.images import from_corner
 from photogram.formats.intersection import intersected
+from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
-from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.settings import bare_settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.plain.writing import attitude_matrices
-from photogram.formats.project import Frame, Options, Project
-from photogram.io.delimited import ColumnTable, read_columns
+from photogram.formats.project import Frame, Project
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 
@@ -26,21 +26,6 @@ __all__ = ["deviations", "self_calibrated", "with_control", "with_images", "with
 
 SIMILAR = 10.0
 """How much better control must fit a model after a similarity for the model to be carried over."""
-_PIXELS = {
-    "image": "photo",
-    "file": "photo",
-    "filename": "photo",
-    "name": "point",
-    "id": "point",
-    "target": "point",
-    "track": "point",
-    "marker": "point",
-    "x": "column",
-    "u": "column",
-    "col": "column",
-    "y": "row",
-    "v": "row",
-}
 
 
 def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
@@ -121,21 +106,6 @@ def _named(name: str, wanted: set[str]) -> str:
     return "f" if own in ("fx", "fy") and "f" in wanted else ""
 
 
-def pixel_table(path: Path) -> ColumnTable:
-    """Read a table of image measurements under all usual names of its columns."""
-    names = {"photo", "point", "column", "row"}
-    table = read_columns(
-        path,
-        known=names,
-        numbers={"column", "row", "sd", "sd_column", "sd_row"},
-        spelling=lambda name: _PIXELS.get(name, name),
-    )
-    if "photo" in table and "point" not in table and "column" in table:
-        raise table.head.error("the column point is missing")
-    table.require("photo", "point", "column", "row")
-    return table
-
-
 def with_images(project: Project, path: Path, pixel_origin: str | None) -> Project:
     """Return a project with further image measurements: columns and rows of points in photos, pixels.
 
@@ -155,11 +125,7 @@ def with_images(project: Project, path: Path, pixel_origin: str | None) -> Proje
     new = [name for name in names.names if name not in known]
     known |= {name: len(block.point_ids) + k for k, name in enumerate(new)}
     points = np.array([known[name] for name in names.names], dtype=np.int64)[names.rows]
-    corner = np.column_stack([table.numbers("column"), table.numbers("row")]) + (
-        0.5 if pixel_origin == "center" else 0.0
-    )
-    if np.isnan(corner).any():
-        raise table.error(int(np.argwhere(np.isnan(corner))[0][0]), "column or row is empty")
+    corner = corner_of(table, pixel_origin)
     xy = corner.copy()
     for row, camera in enumerate(block.cameras):
         own = block.photo_cameras[photos] == row
@@ -203,22 +169,8 @@ def with_control(
     InputError
         A table at fault; none of its points has an image.
     """
-    settings = Settings(
-        path=path,
-        name="",
-        frame=project.frame,
-        options=Options(),
-        length=project.block.linear_unit,
-        angle="deg",
-        image="px",
-        image_y="down",
-        pixel_origin="corner",
-        attitude="omega_phi_kappa",
-        rotation="object_to_photo",
-        photo="y_up",
-        sd=sd,
-        tables={"control": path},
-        crs={"control": crs} if crs else {},
+    settings = bare_settings(
+        path, {"control": path}, frame=project.frame, length=project.block.linear_unit, sd=sd, crs=crs
     )
     tables = Tables(settings, [])
     table = tables.read("control")

@@ -21,6 +21,10 @@ FORMATS: dict[str, Format] = {
         "plain",
         "colmap",
         "colmap_text",
+        "bundler",
+        "bal",
+        "pixels",
+        "giant",
     )
 }
 """By name, in the order in which help lists them."""
