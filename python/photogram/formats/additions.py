@@ -10,6 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.control_lists import ControlList, read_control_list
 from photogram.formats.images import from_corner
 from photogram.formats.intersection import intersected
 from photogram.formats.pixels import corner_of, pixel_table
@@ -19,6 +20,7 @@ from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.plain.writing import attitude_matrices
 from photogram.formats.project import Frame, Project
+from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 
@@ -118,6 +120,11 @@ def with_images(project: Project, path: Path, pixel_origin: str | None) -> Proje
     if block.image_unit != "px":
         raise InputError("further images are in pixels, and the cameras of the project in mm", file=path)
     table = pixel_table(path)
+    return _with_table(project, path, table, pixel_origin)
+
+
+def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: str | None) -> Project:
+    block = project.block
     assert block.photo_cameras is not None
     photos = indices_of(table, "photo", {name: row for row, name in enumerate(block.photo_ids)}, "photo")
     names = table.names("point")
@@ -148,6 +155,28 @@ def with_images(project: Project, path: Path, pixel_origin: str | None) -> Proje
     return project.replace(block=larger, starts=np.vstack([project.starts, fill]))
 
 
+def _known_photos(project: Project, given: ControlList) -> ColumnTable:
+    """Return the measurements on photos of the project; underscores stand for blanks there."""
+    exact = set(project.block.photo_ids)
+    plain: dict[str, list[str]] = {}
+    for name in project.block.photo_ids:
+        plain.setdefault("_".join(name.split()), []).append(name)
+    table = given.images
+    names = [
+        name if name in exact else plain[name][0] if len(plain.get(name, ())) == 1 else ""
+        for name in table.texts("photo")
+    ]
+    rows = [row for row, name in enumerate(names) if name]
+    if len(rows) < len(names):
+        lost = sorted({own for own, name in zip(table.texts("photo"), names, strict=True) if not name})
+        given.messages.append(
+            Message(f"measurements on other photos are left out: {listed(lost, 3)}", table.path)
+        )
+    cells = {column: [table.cells[column][row] for row in rows] for column in table.columns}
+    cells["photo"] = [names[row] for row in rows]
+    return replace(table, cells=cells, count=len(rows), records=[table.records[row] for row in rows])
+
+
 def with_control(
     project: Project, path: Path, sd: Mapping[str, tuple[float, ...]], crs: str | None
 ) -> Project:
@@ -173,8 +202,15 @@ def with_control(
         path, {"control": path}, frame=project.frame, length=project.block.linear_unit, sd=sd, crs=crs
     )
     tables = Tables(settings, [])
-    table = tables.read("control")
-    assert table is not None
+    listed_control = read_control_list(path, project)
+    if listed_control is None:
+        table = tables.read("control")
+        assert table is not None
+    else:
+        table = listed_control.control
+        settings = replace(settings, crs={"control": crs or listed_control.crs})
+        tables = Tables(settings, listed_control.messages)
+        project = _with_table(project, path, _known_photos(project, listed_control), None)
     transform = Transform(settings, tables.messages)
     given = read_control(tables, table, transform)
     block = project.block

@@ -21,6 +21,7 @@ FORMATS: dict[str, Format] = {
         "plain",
         "colmap",
         "colmap_text",
+        "opensfm",
         "bundler",
         "bal",
         "pixels",
