@@ -28,7 +28,7 @@ from photogram.cli.projects import (
 
 __all__ = ["convert"]
 
-WRITABLE = "plain, colmap, colmap_text, opensfm, bundler, bal, pixels, giant"
+WRITABLE = "plain, colmap, colmap_text, opensfm, blocks_exchange, bundler, bal, pixels, giant"
 
 
 @with_job

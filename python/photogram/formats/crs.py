@@ -19,7 +19,7 @@ from photogram.formats.project import Frame
 if TYPE_CHECKING:
     import pyproj
 
-__all__ = ["amid", "east_north_up", "from_frame", "geocentric", "to_frame"]
+__all__ = ["amid", "east_north_up", "enu_origin", "from_frame", "geocentric", "to_frame", "turn_to_frame"]
 
 GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
 ROUND = 1e-4
@@ -236,3 +236,17 @@ def _remarks(crs: str) -> list[str]:
             f"{crs} has the northing or latitude first: x was read as easting or longitude all the same"
         )
     return remarks
+
+
+def turn_to_frame(crs: str, xyz: Floats, frame: Frame) -> Floats:
+    """Return (n, 3, 3) what carries attitudes relative to the local axes of a system into a frame.
+
+    Raises
+    ------
+    InputError
+        A frame that is not topocentric, or as for :func:`geocentric`.
+    """
+    if frame.kind != "topocentric" or frame.origin is None:
+        raise InputError(f"attitudes of {crs} cannot be carried into a frame that is {frame}")
+    found: Floats = east_north_up(frame.origin) @ _axes(crs, xyz, geocentric(crs, xyz)).transpose(0, 2, 1)
+    return found

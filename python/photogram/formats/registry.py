@@ -22,6 +22,7 @@ FORMATS: dict[str, Format] = {
         "colmap",
         "colmap_text",
         "opensfm",
+        "blocks_exchange",
         "bundler",
         "bal",
         "pixels",
