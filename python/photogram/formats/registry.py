@@ -23,6 +23,7 @@ FORMATS: dict[str, Format] = {
         "colmap_text",
         "opensfm",
         "blocks_exchange",
+        "agisoft",
         "bundler",
         "bal",
         "pixels",
@@ -75,6 +76,9 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     with turned(f"reading {path}"):
         try:
             return chosen.read(path, wishes or Wishes())
+        except InputError as error:
+            # What refuses arrays or systems of coordinates does not know where they came from.
+            raise (error if error.file else InputError(error.message, file=path)) from None
         except PhotogramError:
             raise
         except (ArithmeticError, LookupError, ValueError) as error:
