@@ -1,19 +1,23 @@
 """Simulated nights that are hard to identify: how many end right, refused, or wrong.
 
-    python benches/star_nights.py [NIGHTS] [FIRST_SEED]
+    python benches/star_nights.py [EXPOSURES] [FIRST_SEED] [PROCESSES]
 
-Every night has two to six exposures of stars to magnitude 6 of the Hipparcos catalogue. The catalogue that
-is given is zero to three magnitudes deeper, every third field of view is up to 10 % wrong, 30 % of the images
-are of no star, a tenth of the stars is missing, attitudes are up to 1.5 degrees wrong or, in every fifth
-night, up to 8. Some exposures are of another part of the sky than is said. A night ends
+Every night has two to six exposures of stars to magnitude 6 of the Hipparcos catalogue; nights are made
+until there are so many exposures. The catalogue that is given is zero to three magnitudes deeper, every third
+field of view is up to 10 % wrong (half of these nights say so), 30 % of the images are of no star, a tenth of
+the stars is missing, attitudes are up to 1.5 degrees wrong or, in every fifth night, up to 8. The roll of
+every second night is unknown, and it says so, but for every tenth of them. Some exposures are of another part
+of the sky than is said. A night ends
 
     right       every exposure that takes part has its own stars, and the camera is that of the night
-    refused     an error or exit code 3: nothing that could be taken for a camera
+    named       an error, or a message that the camera must not be used: nothing that could be taken for one
     wrong       anything else
 """
 
 from __future__ import annotations
 
+import itertools
+import multiprocessing
 import sys
 from collections import Counter
 from dataclasses import dataclass
@@ -25,6 +29,7 @@ from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
+from photogram.stellar.matching import STRETCH
 from photogram.stellar.night import CalibratedNight, Night, calibrate_night
 from photogram.stellar.places import apparent_places, sidereal_time
 from photogram.stellar.pointing import attitude_of
@@ -33,6 +38,10 @@ from photogram.stellar.skies import Exposure, project_sky
 FAINTEST, FALSE, MISSED, SD = 6.0, 0.30, 0.10, 0.1
 WIDTH, HEIGHT = 6000.0, 4000.0
 SITE = Site(np.radians(47.05), np.radians(-8.31), 480.0, Air(278.15, 718.0), aberration=0.3192 * ARCSEC)
+TOLD = 0.13
+"""Share by which nights say their principal distance may be wrong: 10 % of an angle are more."""
+FAR = 6.0
+"""Mean errors by which a right camera may be off at most, of nine parameters in thousands of nights."""
 AWAY = 0.15
 """Probability that an exposure is of another part of the sky."""
 
@@ -46,6 +55,7 @@ class Sky:
     stars: dict[str, np.ndarray]
     depth: float
     field_error: float
+    roll: str
 
 
 def make(seed: int) -> Sky:
@@ -61,6 +71,7 @@ def make(seed: int) -> Sky:
     values[4:] = generator.normal((-0.08, 0.05, 0.0, 0, 0), (0.03, 0.03, 0.01, 3e-4, 3e-4))
     truth = BrownCamera(values, np.zeros((9, 9)))
     largest = 8.0 if seed % 5 == 4 else 1.5
+    roll = "known" if seed % 2 == 0 else "unknown, not said" if seed % 20 == 19 else "unknown"
     exposures, stars = [], {}
     for number in range(int(generator.integers(2, 7))):
         utc = f"2024-{generator.integers(1, 13):02d}-05T2{generator.integers(0, 4)}:{10 + number}:00"
@@ -69,8 +80,11 @@ def make(seed: int) -> Sky:
         shown = angles + generator.uniform(-0.7, 0.7, 3) * largest / [np.cos(np.radians(angles[1])), 1, 1]
         if generator.uniform() < AWAY:
             shown[0] += generator.uniform(60, 300)
+        if roll != "known":
+            shown[2] = generator.uniform(-180, 180)
         exposures.append(Exposure(exposure.utc, exposure.xy, attitude_of(*np.radians(shown))))
         stars[f"{number}"] = right
+    # The share of the field of view; every second of these nights says that it may be as much.
     error = float(generator.uniform(-0.1, 0.1)) if seed % 3 == 2 else float(generator.normal(0, 2e-3))
     night = Night(
         site=SITE,
@@ -81,8 +95,10 @@ def make(seed: int) -> Sky:
         names=tuple(stars),
         pixel_sd=SD,
         attitude_error=np.radians(largest),
+        roll_known=roll != "unknown",
+        field_error=TOLD if seed % 6 == 5 else STRETCH,
     )
-    return Sky(night, values, stars, depth, error)
+    return Sky(night, values, stars, depth, error, roll)
 
 
 def _expose(
@@ -103,12 +119,12 @@ def _expose(
     return Exposure(utc, xy[order], attitude), right
 
 
-def verdict(sky: Sky) -> tuple[str, str]:
-    """Calibrate a night; return how it ends, and more about it."""
+def verdict(sky: Sky) -> tuple[str, str, int]:
+    """Calibrate a night; return how it ends, more about it, and how many exposures take part."""
     try:
         result = calibrate_night(sky.night)
     except (InputError, AdjustmentError) as error:
-        return "refused", str(error)
+        return "named", str(error), 0
     falsely = [name for name, share in _shares(sky, result).items() if share < 0.9]
     off = (result.camera.values - sky.camera) / np.sqrt(np.diag(result.camera.covariance))
     about = (
@@ -116,8 +132,10 @@ def verdict(sky: Sky) -> tuple[str, str]:
         f" {result.calibration.mean_error:.3f}, camera within {np.abs(off).max():.1f} mean errors"
     )
     if not result.usable:
-        return "refused", about
-    return ("wrong", f"{about}; false: {falsely}") if falsely or np.abs(off).max() > 6 else ("right", about)
+        return "named", f"{about}; {result.messages[0]}", len(result.names)
+    if falsely or np.abs(off).max() > FAR:
+        return "wrong", f"{about}; false: {falsely}", len(result.names)
+    return "right", about, len(result.names)
 
 
 def _shares(sky: Sky, result: CalibratedNight) -> dict[str, float]:
@@ -129,24 +147,37 @@ def _shares(sky: Sky, result: CalibratedNight) -> dict[str, float]:
     return shares
 
 
-def main(nights: int, first: int) -> None:
-    """Print how so many nights end, those that do not end right one by one."""
+def one(seed: int) -> tuple[int, str, str, int, str, int]:
+    """Return how the night of a seed ends."""
+    sky = make(seed)
+    end, about, taken = verdict(sky)
+    given_as = (
+        f"catalogue {sky.depth:.1f} mag deeper, field {100 * sky.field_error:+.1f} %, roll {sky.roll},"
+        f" attitudes within {np.degrees(sky.night.attitude_error):.1f} degrees"
+    )
+    return seed, end, about, taken, given_as, len(sky.night.names)
+
+
+def main(exposures: int, first: int, processes: int) -> None:
+    """Print how the nights end, those that do not end right one by one."""
     ends: Counter[str] = Counter()
-    taken = given = 0
-    for seed in range(first, first + nights):
-        sky = make(seed)
-        end, about = verdict(sky)
-        ends[end] += 1
-        if end == "right":
-            taken += int(about.split()[0])
-        given += len(sky.night.names)
-        if end != "right":
-            given_as = f"catalogue {sky.depth:.1f} mag deeper, field {100 * sky.field_error:+.1f} %"
-            print(f"night {seed}: {end}; {given_as}: {about}")
-    print(f"{nights} nights: " + ", ".join(f"{ends[end]} {end}" for end in ("right", "refused", "wrong")))
+    taken = given = nights = 0
+    with multiprocessing.Pool(processes) as pool:
+        for seed, end, about, used, given_as, count in pool.imap(one, itertools.count(first)):
+            ends[end] += 1
+            taken, given, nights = taken + used * (end == "right"), given + count, nights + 1
+            if end != "right":
+                print(f"night {seed}: {end}; {given_as}: {about}", flush=True)
+            if given >= exposures:
+                pool.terminate()
+                break
+    print(
+        f"{given} exposures, {nights} nights: "
+        + ", ".join(f"{ends[end]} {end}" for end in ("right", "named", "wrong"))
+    )
     print(f"exposures in the nights that end right, of all given: {taken} of {given}")
 
 
 if __name__ == "__main__":
-    numbers = [int(word) for word in sys.argv[1:3]]
-    main(*(numbers + [100, 0][len(numbers) :]))
+    numbers = [int(word) for word in sys.argv[1:4]]
+    main(*(numbers + [400, 0, 1][len(numbers) :]))

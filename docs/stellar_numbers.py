@@ -37,7 +37,7 @@ def night() -> CalibratedNight:
 
 def adjustment_lines() -> list[str]:
     """Show the figures of the packaged plate."""
-    (_, problems), (_, figures) = summary(plate())
+    _, (_, problems), (_, figures) = summary(plate())
     # The digits of sums that vanish, and the last ones of parts of a minimum, are noise.
     noisy = ("sums of", "weighted sum of squares, plate", "weighted sum of squares, stars")
     return [*problems, "", *(line for line in figures if not line.startswith(noisy))]
@@ -75,7 +75,7 @@ def refraction_lines() -> list[str]:
 
 def night_lines() -> list[str]:
     """Show the figures and the camera of the packaged night."""
-    _, (_, figures), (_, camera) = night_summary(night())
+    *_, (_, figures), (_, camera) = night_summary(night())
     return [*figures, "", *camera]
 
 

@@ -26,7 +26,8 @@ PACKAGES = (
     "photogram.stellar",
 )
 MADE_BY_THE_LIBRARY = {
-    "photogram": "FirstValues Iteration Message Orientation Plan Pose Progress Resection Result Simulation",
+    "photogram": "FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection Result"
+    " Simulation VarianceComponents",
     "photogram.absolute_orientation": "Orientation",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
@@ -135,8 +136,10 @@ def good(tmp_path_factory):
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},
             "first_values": {"block": block},
+            "group_sums": {"result": photogram.adjust(block)},
             "hints": {"block": block},
             "orient": {"stations": stations},
+            "variance_components": {"network": block, "max_steps": 3},
             "plan": {"patterns": {"one": block}},
             "predict": {"block": block},
             "resect": {"object_points": resected, "image_xy": seen, "principal_distance": -150.0},

@@ -195,7 +195,7 @@ def test_tables_that_cannot_be(tables):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"unit_variance": "two"}, "unit_variance is one of free, constrained, unity, not 'two'"),
+        ({"unit_variance": "two"}, "unit_variance is one of free, constrained, unity, redundancy, not 'two'"),
         (
             {"ordering": "random"},
             "ordering is one of auto, input, rcm, amd, dissection, graph-dissection, not 'random'",

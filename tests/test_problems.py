@@ -136,7 +136,8 @@ def project(run, tmp_path):
 def test_giant_says_that_the_global_test_fails(run, project):
     done = run("giant", project)
     assert done.exit_code == 0, done.output
-    assert done.output.startswith("Problems\n  none")
+    assert done.output.startswith("Verdict\n  Accepted")
+    assert "Problems\n  none" in done.output
     block = read_project(project).to_block()
     control = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))[0]
     positions = block.point_positions.copy()
@@ -144,7 +145,9 @@ def test_giant_says_that_the_global_test_fails(run, project):
     wrong = project.with_name("wrong")
     write_project(Project.from_block(block.replace(point_positions=positions)), wrong)
     done = run("giant", wrong)
-    lines = done.output.splitlines()
+    assert done.exit_code == 4
+    assert done.output.startswith("Verdict\n  Gross errors likely: 1) ")
+    lines = done.output[done.output.index("Problems\n") :].splitlines()
     assert lines[1].strip().startswith("the global test fails")
     for kind in ("image coordinates", "components of control"):
         assert any(f" {kind} have standardized residuals beyond" in line for line in lines[2:4]), kind

@@ -11,10 +11,13 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.components import variance_components
     from photogram.adjustment.first_values import FirstValues, first_values
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
+    from photogram.adjustment.snooping import snoop
+    from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
@@ -25,8 +28,11 @@ if TYPE_CHECKING:
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
     from photogram.planning import Plan, plan
+    from photogram.results.components import VarianceComponents
+    from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
     from photogram.results.result import Result
+    from photogram.results.snooped import Snooped
 
 __all__ = [
     "AdjustmentError",
@@ -35,6 +41,7 @@ __all__ = [
     "Block",
     "Camera",
     "FirstValues",
+    "GroupSums",
     "InnerConstraints",
     "InputError",
     "Iteration",
@@ -51,16 +58,22 @@ __all__ = [
     "Resection",
     "Result",
     "Simulation",
+    "Snooped",
     "Spheroid",
+    "VarianceComponents",
     "__version__",
     "adjust",
+    "check",
     "first_values",
+    "group_sums",
     "hints",
     "orient",
     "plan",
     "predict",
     "resect",
     "simulate",
+    "snoop",
+    "variance_components",
 ]
 
 _HOMES = {
@@ -69,7 +82,9 @@ _HOMES = {
     "Attitudes": "network.attitudes",
     "Block": "network.block",
     "Camera": "network.cameras",
+    "VarianceComponents": "results.components",
     "FirstValues": "adjustment.first_values",
+    "GroupSums": "results.group_sums",
     "InnerConstraints": "network.datum",
     "InputError": "errors",
     "Iteration": "results.iteration",
@@ -86,16 +101,21 @@ _HOMES = {
     "Resection": "adjustment.resection",
     "Result": "results.result",
     "Simulation": "network.simulation",
+    "Snooped": "results.snooped",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "check": "checks.checking",
     "first_values": "adjustment.first_values",
+    "group_sums": "results.group_sums",
     "hints": "adjustment.hints",
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",
     "resect": "adjustment.resection",
     "simulate": "network.simulation",
+    "snoop": "adjustment.snooping",
+    "variance_components": "adjustment.components",
 }
 """The module of each name, loaded when it is first asked for.
 

@@ -103,6 +103,71 @@ def fisher_limit(probability: float, first: float, second: float) -> float:
     NaN for arguments that cannot be.
     """
 
+def log_chi_square(x: _Floats, dof: _Floats) -> _Floats:
+    """Logarithms of the probabilities that chi-square variables exceed values.
+
+    Parameters
+    ----------
+    x
+        (n,) not negative.
+    dof
+        (n,) degrees of freedom, positive.
+
+    Returns
+    -------
+    (n,) natural logarithms, also where the probability is less than the smallest number; NaN for arguments
+    outside these ranges.
+    """
+
+def log_fisher(x: _Floats, first: _Floats, second: _Floats) -> _Floats:
+    """Logarithms of the probabilities that Fisher's variables exceed values.
+
+    Parameters
+    ----------
+    x
+        (n,) not negative.
+    first, second
+        (n,) degrees of freedom, positive.
+
+    Returns
+    -------
+    (n,) natural logarithms, also where the probability is less than the smallest number; NaN for arguments
+    outside these ranges.
+    """
+
+def noncentral_chi_square(x: float, dof: float, noncentrality: float) -> float:
+    """Probability that a noncentral chi-square variable exceeds `x`; NaN for arguments that cannot be."""
+
+def noncentral_fisher(x: float, first: float, second: float, noncentrality: float) -> float:
+    """Probability that a noncentral F variable exceeds `x`; NaN for arguments that cannot be.
+
+    With `second` infinite it is that of the noncentral chi-square variable over `first`.
+    """
+
+def detectable_noncentrality(level: float, power: float, first: float, second: float) -> float:
+    """Return the noncentrality (Baarda's lambda0) at which a test is significant with a given probability.
+
+    Parameters
+    ----------
+    level
+        Of the test: probability that it rejects where nothing is wrong.
+    power
+        Probability that it does where something is; more than the level.
+    first, second
+        Degrees of freedom of the F test; with `second` infinite of the chi-square test.
+
+    Returns
+    -------
+    NaN for arguments outside these ranges.
+    """
+
+def level_of_equal_power(noncentrality: float, power: float, dof: float) -> tuple[float, float]:
+    """Return level and critical value of the chi-square test that finds a noncentrality with a given power.
+
+    With the noncentrality of one test for all others it is Baarda's B-method. NaN for arguments that cannot
+    be.
+    """
+
 def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str, str]]]:
     """Return the models of cameras, `CAMERAS`, by their names.
 
@@ -575,7 +640,7 @@ def block_network(
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     unit_variance
-        `free`, `constrained` or `unity` (GIANT guide, Appendix E).
+        `free`, `constrained` or `unity` (GIANT guide, Appendix E), or `redundancy`.
     minimum
         Photo whose pose is held where nothing else gives a datum, and for the scale a photo and the number of
         its coordinate; None leaves either to the core.
@@ -612,8 +677,13 @@ class BlockNetwork:
         datum: tuple[str, list[int], list[int], bool] | None,
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        start: BlockState | None = None,
     ) -> BlockSolution:
-        """Adjust it; a free one may be taken to the datum of inner constraints."""
+        """Adjust it; a free one may be taken to the datum of inner constraints.
+
+        Or, without such a datum, adjust it from where an adjustment of it has ended, perhaps with other
+        weights: in the order of that, and without the points that had run into a station there.
+        """
 
     def in_datum(
         self,
@@ -634,11 +704,166 @@ class BlockNetwork:
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended, in the datum that it was taken to."""
 
+    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where the adjustment has ended."""
+
     def resistance(self, state: BlockState, *, threads: int) -> list[tuple[str, float]]:
         """Return what keeps the block from moving as a whole: kinds of observations.
 
         With each the greatest share of what a motion changes in them that remains when all unknowns move.
         """
+
+@final
+class NetworkTrial:
+    """A network tried without some of its observations; the symbolic analysis is done once.
+
+    Its *suspects* are the G groups of observations that may hold a gross error together: images in their
+    order, then the control of points, positions and attitudes of photos, observations beside images, and what
+    was observed of cameras and common unknowns. Each has rows, M in all, which stand one suspect after the
+    other; so do square blocks. What is out has weight zero.
+
+    Of all methods, errors are those of the adjustment: BlockError or CollectionError, of the kind
+    `undetermined points` or `undetermined photos` where what is out takes their last support.
+    """
+
+    @property
+    def subjects(self) -> tuple[NDArray[np.uint8], _Indices]:
+        """(G,) kinds, and which image, point, photo, observation, camera or common unknown.
+
+        Kinds are 0 image, 1 control, 2 position, 3 attitude, 4 observation, 5 camera, 6 common unknown.
+        """
+
+    @property
+    def row_starts(self) -> _Indices:
+        """(G + 1,) where the rows of each suspect start."""
+
+    @property
+    def components(self) -> _Indices:
+        """(M,) the component that each row is."""
+
+    @property
+    def deviations(self) -> _Floats:
+        """(M,) standard deviations a priori, in the units of the observations."""
+
+    def stand(self, held: list[int]) -> tuple[str, int, float, int, list[int]]:
+        """Take the network as it stands, with everything in it; return how it stands, as `adjust`.
+
+        Parameters
+        ----------
+        held
+            Unknowns that were held for a datum.
+        """
+
+    def adjust(
+        self,
+        rows: NDArray[np.bool_],
+        points: list[int],
+        photos: list[int],
+        *,
+        tolerance: float | None,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> tuple[str, int, float, int, list[int]]:
+        """Adjust without what is out, from where the last trial has ended.
+
+        Parameters
+        ----------
+        rows
+            (M,) which rows are out.
+        points, photos
+            Those that are out with all that was observed of them: they stay where they are.
+        tolerance
+            When to stop, as the options of the network count it; theirs when None.
+
+        Returns
+        -------
+        Status, iterations, weighted sum of squares, degrees of freedom, points that ran into a station.
+        """
+
+    def resist(
+        self,
+        loss: str,
+        scale: float,
+        *,
+        iterations: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> _Floats:
+        """Adjust with a robust loss from where the last trial has ended, and stay there.
+
+        Returns
+        -------
+        (G,) factors by which it has changed weights.
+        """
+
+    def tests(self) -> dict[str, NDArray[Any]]:
+        """Test every suspect that takes part.
+
+        Returns
+        -------
+        `active` (G,) whether any row of it takes part; `rank` (G,) directions in which an error shows;
+        `statistic` (G,) T, by which the sum of squares falls without it; `least` (G,) the smallest redundancy
+        of a direction that shows; `shared` (G,) h of the bound of correlations with others; `residual` (M,)
+        of unit weight; `cofactors` the square blocks of R; `error`, `error_sd` (M,) the estimated error and
+        its standard deviation (a priori unit weight), in the units of the observations. NaN for what is out.
+        """
+
+    def predictions(
+        self, suspects: list[int]
+    ) -> list[tuple[float, list[int], list[float], list[float]] | None]:
+        """Test what is out of some suspects against what the rest predicts.
+
+        Returns
+        -------
+        For each: the statistic, chi-square with as many degrees of freedom as rows are out; these rows;
+        observed minus predicted of each, and its standard deviation. None where nothing is out, or its point
+        or photo is.
+        """
+
+    def on_points(self, points: list[int]) -> list[tuple[list[int], _Floats, _Floats]]:
+        """Return all observations of points together: suspects, residuals of unit weight, and R.
+
+        Nothing for points that observations beside images touch.
+        """
+
+    def effects(self, suspects: list[int]) -> _Floats:
+        """Return what an error of one standard deviation in each row of some suspects moves.
+
+        Returns
+        -------
+        (., 9): the three coordinates of the own point, the six numbers of the own photo; NaN where there is
+        none.
+        """
+
+    def responses(self, suspects: list[int]) -> _Floats:
+        """Return the columns of R that belong to the rows of some suspects: (., M)."""
+
+    def most_moved(self, suspects: list[int]) -> list[tuple[str, int, int, float, float]]:
+        """Return, for each row of some suspects, the unknown that an error in it moves most.
+
+        Returns
+        -------
+        Kind (`photo`, `camera`, `unknown`, `point`), index and component of the unknown; by how much an error
+        of one standard deviation moves it, in its unit and in its standard deviations (a priori unit weight).
+        """
+
+    def influences(
+        self, covariances: BlockCovariances, partials: _Floats, of: list[tuple[str, int]]
+    ) -> _Floats:
+        """Return what errors of one standard deviation in every row do to functions of the unknowns.
+
+        Parameters
+        ----------
+        covariances
+            Of the same network at the same values, in the datum of what was held.
+        partials, of
+            As for `BlockCovariances.propagate`: (k, u).
+
+        Returns
+        -------
+        (k, M).
+        """
+
+    def inseparable(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
+        """Return pairs of suspects of one point whose tests are correlated by more than `limit`."""
 
 @final
 class BlockState:
@@ -701,6 +926,56 @@ class BlockCovariances:
     ) -> _Floats:
         """Return J Q J^T, for (m, k) partials J of m functions of the k unknowns of what is named."""
 
+    def group_squares(
+        self,
+        groups: tuple[int, _Indices, _Indices, _Indices, list[int], list[int], list[int]],
+        *,
+        classes: int | None,
+        exact: int,
+        vectors: int,
+        seed: int,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> tuple[list[int], _Floats, list[bool]]:
+        """Return sums of R_ij^2 over groups, R taking errors of observations to residuals, both in their sd.
+
+        Parameters
+        ----------
+        groups
+            Number g of groups; then the group of each observation, -1 for none: (m, 2) of x and y of images,
+            (n, 3) of components of points, (P, 6) of unknowns of poses, of every camera, common unknown, and
+            other observation.
+        classes
+            None: all of them. A number: only those within each group, whose columns groups share that leave
+            the same rest by it; what is between such groups is added.
+        exact, vectors, seed
+            Groups of so many observations at the most, and all that have no more than there are vectors, are
+            taken column by column; others with so many vectors of random signs (Hutchinson 1990). Same seed,
+            same bits, for any number of threads.
+
+        Returns
+        -------
+        equations
+            (g + 1,) observations of each group and of none; empty with classes.
+        squares
+            (g + 1) * g sums, row by row, of i in the group of the row (the last row: in none) and j in that
+            of the column; with classes (g,) sums of i and j in each group.
+        exact
+            (g,) which columns were taken column by column; empty with classes.
+        """
+
+    def project_images(
+        self,
+        columns: _Floats,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> _Floats:
+        """Return (k, m, 2) what k columns of errors of all images leave as their residuals, both in their sd.
+
+        That is R z for each column z; images that took no part have neither.
+        """
+
 class _NetworkSolution:
     """What adjusted blocks and collections have alike, in the order of photos (P), points (n), images (m).
 
@@ -712,6 +987,10 @@ class _NetworkSolution:
     @property
     def status(self) -> str:
         """`converged`, `not converged` or `diverged`."""
+
+    @property
+    def state(self) -> BlockState:
+        """Where the adjustment has ended."""
 
     @property
     def initial_sum_of_squares(self) -> float:
@@ -846,10 +1125,6 @@ class BlockSolution(_NetworkSolution):
         """
 
     @property
-    def state(self) -> BlockState:
-        """Where the adjustment has ended."""
-
-    @property
     def lost_digits(self) -> float:
         """About how large a part of the variances rounding may be in the datum that it was taken to."""
 
@@ -882,6 +1157,10 @@ class BlockSolution(_NetworkSolution):
     @property
     def sums_of_squares(self) -> tuple[float, float, float, float]:
         """Weighted sums of squares: camera, ground, plates, observations beside images."""
+
+    @property
+    def redundancies(self) -> tuple[float, float, float, float] | None:
+        """Sums of the redundancy numbers of the same; None without covariances."""
 
     @property
     def adjusted_observations(
@@ -1357,8 +1636,12 @@ def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
 
 _Station = tuple[float, float, float, float]
 """Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury)."""
-_CameraKind = tuple[float | None, bool, bool]
-"""Principal distance of the distorted image (None: scale first), Brown's decentering, common scale."""
+_CameraKind = tuple[float | None, bool, bool] | tuple[str, bool]
+"""Of plates: principal distance of the distorted image (None: scale first), Brown's decentering, common
+scale.
+
+Of another model (`camera_models`): its name, and whether fx is the principal distance of both axes.
+"""
 
 class StellarError(Exception):
     """The camera cannot be calibrated.
@@ -1413,7 +1696,8 @@ def plate_images(standard: _Floats, angles: _Floats, interior: _Floats, camera: 
     angles
         (3,) alpha, omega, kappa.
     interior
-        (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3.
+        (13,) epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3; of another model
+        its own parameters, then zeros: x counts right, y down.
     camera
         Its kind.
     """
@@ -1650,7 +1934,7 @@ def collection_images(camera: str, photo_parameters: _Floats, points: _Floats) -
         An argument of another shape, length or choice; the message names it.
     """
 
-def adjust_collection(
+def collection_network(
     camera: str,
     photo_parameters: _Floats,
     photo_sd: _Floats,
@@ -1666,11 +1950,9 @@ def adjust_collection(
     covariance: bool,
     loss: tuple[str, float] | None,
     ordering: str,
-    threads: int,
     memory: int | None,
-    progress: Callable[[str, int, int, IterationRow | None], None] | None,
-) -> CollectionSolution:
-    """Adjust a collection of photos by Levenberg-Marquardt steps.
+) -> CollectionNetwork:
+    """Return a collection of photos as it is adjusted by Levenberg-Marquardt steps.
 
     Parameters
     ----------
@@ -1695,21 +1977,43 @@ def adjust_collection(
         Robust loss of the image points, `huber` or `cauchy`, and its scale in standard deviations a priori.
     ordering
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
-    threads
-        Number of threads, no more than four for each processor; 0 leaves it to the core: small work stays on
-        the calling thread, larger work has all processors.
     memory
         Bytes that the adjustment may take; None for any number.
-    progress
-        See :class:`BlockNetwork`.
 
     Raises
     ------
-    CollectionError
-        A collection that cannot be adjusted.
     ValueError
         An argument of another shape, length or choice; the message names it.
     """
+
+@final
+class CollectionNetwork:
+    """A collection with the options of its adjustment; arguments as of :class:`BlockNetwork`.
+
+    Its methods raise CollectionError for a collection that cannot be adjusted, and ValueError for images that
+    name photos or points that are not there.
+    """
+
+    def adjust(
+        self,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        start: BlockState | None = None,
+    ) -> CollectionSolution:
+        """Adjust it, perhaps from where an adjustment of it with other weights has ended."""
+
+    def covariances(
+        self,
+        state: BlockState,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+    ) -> BlockCovariances:
+        """Factor the normal equations where the adjustment has ended."""
+
+    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where the adjustment has ended."""
 
 @final
 class CollectionSolution(_NetworkSolution):

@@ -205,7 +205,8 @@ def test_no_file_is_taken_for_a_good_one(run, tmp_path):
         *("absolute-orientation", "stations.csv", "--points", "points.csv"),
         *("--json", "result.json", "--out", "o"),
     )
-    assert result.exit_code == 3
+    assert result.exit_code == 4
+    assert result.output.startswith("Verdict\n  Probably X and Y of station 0 are exchanged")
     assert "probably X and Y of station 0 are exchanged" in result.output
     assert "no points were transformed" in result.output
     assert {path.name for path in tmp_path.iterdir()} == {*("stations.csv", "points.csv", "result.json", "o")}

@@ -188,7 +188,7 @@ def test_the_command_withholds_what_outliers_spoil(run, tmp_path, exchanged):
     document = tmp_path / "all.json"
     out = tmp_path / "out"
     result = run(*exchanged, "--out", out, "--json", document)
-    assert refused(result, 3)
+    assert refused(result, 4)
     assert "are labels exchanged?" in result.output
     assert "the correction is withheld: outliers make it unusable" in result.output
     assert [path.name for path in out.iterdir()] == ["listing.txt"]

@@ -78,8 +78,9 @@ def test_the_failed_global_test_comes_first_and_the_camera_is_not_usable(folder)
     file = folder / "night.toml"
     file.write_text(file.read_text().replace("sd_px = 0.1", "sd_px = 0.01"))
     run = CliRunner().invoke(app, ["stellar-camera", "exposures", str(file), "--out", str(folder / "out")])
-    assert run.exit_code == 3
+    assert run.exit_code == 4
     text = (folder / "out" / "report.txt").read_text()
+    assert "Weights too optimistic: standard deviations are too small by about 10.2" in text
     problems = text.split("Problems\n--------\n")[1].splitlines()
     assert problems[0].startswith("the global test fails: residuals are 10.2 times larger")
     assert problems[0].endswith("do not use this camera")

@@ -214,7 +214,7 @@ def test_attitudes_are_those_of_the_mean_pole(night):
     )
     # The matrix of the attitude zero reflects the first coordinate.
     seen_again = _photocore.plate_images(
-        np.column_stack([m / q, n / q]) * [-1, 1], np.zeros(3), camera.common[:13], (1.0, True, False)
+        np.column_stack([m / q, n / q]) * [-1, 1], np.zeros(3), camera.common[:13], camera.kind
     )
     assert len(seen) > 80
     # A pole of 67 arcsec is three pixels; a thousandth of a pixel is 0.02 arcsec.

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram.stellar.matching import match
+from photogram.stellar.matching import Search, match
 from photogram.stellar.odds import ACCEPTED, chance, expected_false
 
 NIGHTS = runpy.run_path(str(Path(__file__).parents[2] / "benches" / "star_nights.py"))
@@ -50,7 +50,7 @@ def test_fields_of_no_star_in_common_are_not_matched():
     for images, stars, radius, tolerance in [(100, 400, 157, 8), (40, 900, 157, 12), (60, 300, 1265, 8)] * 8:
         measured = generator.uniform((0, 0), FRAME, (images, 2))
         predicted = generator.uniform(-radius, np.array(FRAME) + radius, (stars, 2))
-        found = match(measured, predicted, frame=FRAME, radius=radius, tolerance=tolerance)
+        found = match(measured, predicted, Search(FRAME, radius), tolerance=tolerance)
         assert not found.accepted
         expected.append(found.expected)
     # Of 24 fields, E below a tenth comes up in two or three at most where E is what it says.
@@ -61,7 +61,7 @@ def test_fields_of_no_star_in_common_are_not_matched():
 def test_a_crowded_field_is_not_counted():
     generator = np.random.default_rng(13)
     measured = generator.uniform((0, 0), FRAME, (200, 2))
-    found = match(measured, measured.copy(), frame=FRAME, radius=157.0, tolerance=120.0)
+    found = match(measured, measured.copy(), Search(FRAME, 157.0), tolerance=120.0)
     assert found.crowded
     assert not found.accepted
 
@@ -70,7 +70,7 @@ def test_a_crowded_field_is_not_counted():
 def test_no_simulated_night_ends_wrong(seed):
     """`benches/star_nights.py` runs hundreds."""
     sky = NIGHTS["make"](seed)
-    end, about = NIGHTS["verdict"](sky)
+    end, about, _ = NIGHTS["verdict"](sky)
     assert end != "wrong", about
     if abs(sky.field_error) < 0.01:
         assert end == "right", about

@@ -118,7 +118,7 @@ fn partials_are_exact() {
     for form in [Form::ScaleFirst, Form::DistortionFirst(0.31)] {
         for decentering in [Decentering::Polar, Decentering::Cartesian] {
             for common_scale in [false, true] {
-                let kind = Kind { form, decentering, common_scale };
+                let kind = Kind { lens: None, form, decentering, common_scale };
                 for time in [1.0, 1.35, 1.7] {
                     check_partials(kind, &values(decentering), time);
                 }
@@ -153,7 +153,8 @@ fn check_partials(kind: Kind, values: &[f64; 22], time: f64) {
 /// Directions of images lead back to the images.
 #[test]
 fn a_direction_comes_back() {
-    let kind = Kind { form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: false };
+    let kind =
+        Kind { lens: None, form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: false };
     let mut calibration = calibration(kind, &values(kind.decentering), 1.2);
     calibration.images[0].xy = [-0.07, 0.05];
     calibration.stars[0].place = calibration.directions().unwrap()[0];
@@ -204,7 +205,8 @@ proptest! {
 
 #[test]
 fn the_camera_sees_nothing_behind_it() {
-    let kind = Kind { form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: false };
+    let kind =
+        Kind { lens: None, form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: false };
     let mut interior = [0.0; 13];
     interior[3] = 0.3;
     interior[4] = 0.3;

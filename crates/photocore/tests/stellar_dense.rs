@@ -56,7 +56,12 @@ fn night(held: bool) -> Calibration {
     let free = [1, 2, 3, 4, 7].map(|k| 3 * ATTITUDES + k);
     let mut calibration = Calibration {
         station: Station::new(LATITUDE, 0.32 * ARCSEC, Air::new(285.0, 755.0)),
-        kind: Kind { form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: false },
+        kind: Kind {
+            lens: None,
+            form: Form::ScaleFirst,
+            decentering: Decentering::Polar,
+            common_scale: false,
+        },
         pointings: (0..ATTITUDES).map(|k| [0.05 * noise(200 + k), 0.04 * noise(300 + k), k as f64]).collect(),
         common: common(),
         fixed: (0..3 * ATTITUDES + COMMON).map(|k| k >= 3 * ATTITUDES && !free.contains(&k)).collect(),

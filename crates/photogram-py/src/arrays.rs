@@ -52,6 +52,21 @@ pub fn indices(name: &str, array: &PyReadonlyArrayDyn<'_, i64>) -> PyResult<Vec<
     }
 }
 
+/// The rows of an (n, N) array of the numbers of groups; negative ones, of what is in none, as the largest number.
+pub fn group_rows<const N: usize>(
+    name: &str,
+    array: &PyReadonlyArrayDyn<'_, i64>,
+) -> PyResult<Vec<[usize; N]>> {
+    let number = |&group: &i64| usize::try_from(group).unwrap_or(usize::MAX);
+    match array.shape() {
+        [_, columns] if *columns == N => {
+            let numbers: Vec<usize> = array.as_array().iter().map(number).collect();
+            Ok(numbers.as_chunks().0.to_vec())
+        }
+        shape => Err(wrong_shape(name, &format!("(n, {N})"), shape)),
+    }
+}
+
 /// Rows as an (n, N) array.
 pub fn table<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
     let count = rows.len();

@@ -2,10 +2,10 @@
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop, Watch};
-use photocore::geometry::{Air, Station, pointing, pointing_angles};
+use photocore::geometry::{Air, Camera as Lens, Station, pointing, pointing_angles};
 use photocore::programs::stellar::{
-    Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Observations, Options, Rows,
-    Star, StellarError as Failure, Tested, Tolerances, Weights,
+    Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, INTERIOR, Image, Kind, Observations,
+    Options, Rows, Star, StellarError as Failure, Tested, Tolerances, Weights,
 };
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{check_lengths, from_rows, indices, matrices, numbers, row_major, rows, squares, table};
+use crate::options::unknown;
 use crate::solution::{iteration_row, status_name};
 use crate::work::{Workers, watched};
 
@@ -40,8 +41,16 @@ type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Indices<'py> = PyReadonlyArrayDyn<'py, i64>;
 /// Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury).
 type Place = (f64, f64, f64, f64);
-/// Reference principal distance (none: scale first), Brown's decentering, common scale.
-type CameraKind = (Option<f64>, bool, bool);
+/// What is not estimated of a camera.
+#[derive(FromPyObject)]
+enum CameraKind {
+    /// Of plates: reference principal distance (none: scale first), Brown's decentering, common scale.
+    #[pyo3(transparent)]
+    Plate((Option<f64>, bool, bool)),
+    /// Of another model: its name, common scale.
+    #[pyo3(transparent)]
+    Lens((String, bool)),
+}
 
 /// Attitude, standard coordinates, plate coordinates and weight of the axis.
 type AxisRow = (usize, [f64; 2], [f64; 2], [[f64; 2]; 2]);
@@ -50,12 +59,32 @@ fn station((latitude, aberration, temperature, pressure): Place) -> Station {
     Station::new(latitude, aberration, Air::new(temperature, pressure))
 }
 
-fn kind((reference, cartesian, common_scale): CameraKind) -> Kind {
-    Kind {
+fn kind(camera: CameraKind) -> PyResult<Kind> {
+    let plate = |reference: Option<f64>, cartesian, common_scale| Kind {
+        lens: None,
         form: reference.map_or(Form::ScaleFirst, Form::DistortionFirst),
         decentering: if cartesian { Decentering::Cartesian } else { Decentering::Polar },
         common_scale,
+    };
+    match camera {
+        CameraKind::Plate((reference, cartesian, common_scale)) => {
+            Ok(plate(reference, cartesian, common_scale))
+        }
+        CameraKind::Lens((model, common_scale)) => {
+            let facts = Lens::model(&model).ok_or_else(|| unknown("camera", &model))?;
+            let lens = crate::camera::named(&model, &vec![0.0; facts.parameters.len()])?;
+            Ok(Kind { lens: Some(lens), ..plate(None, false, common_scale) })
+        }
     }
+}
+
+/// A camera of plates or of another model; it must have room for the parameters of the latter.
+fn camera_of(camera: CameraKind, interior: &Array<'_>) -> PyResult<Camera> {
+    let kind = kind(camera)?;
+    if kind.lens.is_some_and(|lens| lens.parameter_names().len() > INTERIOR) {
+        return Err(failure(&Failure::Lens));
+    }
+    Ok(Camera::new(kind, fixed_size("interior", interior)?))
 }
 
 fn fixed_size<const N: usize>(name: &str, array: &Array<'_>) -> PyResult<[f64; N]> {
@@ -129,7 +158,7 @@ fn plate_images<'py>(
     interior: Array<'py>,
     camera: CameraKind,
 ) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
-    let camera = Camera::new(kind(camera), fixed_size("interior", &interior)?);
+    let camera = camera_of(camera, &interior)?;
     let attitude = Attitude::new(fixed_size("angles", &angles)?);
     let standard: Vec<[f64; 2]> = rows("standard", &standard)?;
     table(py, standard.iter().map(|&standard| camera.linearize(&attitude, standard).xy).collect())
@@ -146,7 +175,7 @@ fn plate_directions<'py>(
     tolerance: f64,
     passes: usize,
 ) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
-    let camera = Camera::new(kind(camera), fixed_size("interior", &interior)?);
+    let camera = camera_of(camera, &interior)?;
     let attitude = Attitude::new(fixed_size("angles", &angles)?);
     let xy: Vec<[f64; 2]> = rows("xy", &xy)?;
     let direction = |&xy: &[f64; 2]| {
@@ -234,7 +263,7 @@ impl StellarProblem {
         Ok(Self {
             calibration: Calibration {
                 station: self::station(station),
-                kind: kind(camera),
+                kind: kind(camera)?,
                 pointings: rows("pointings", &pointings)?,
                 common: fixed_size("common", &common)?,
                 fixed,
@@ -419,9 +448,11 @@ fn failure(error: &Failure) -> PyErr {
             ("undetermined", parameters)
         }
         Failure::Weight(_) => ("weight", vec![]),
-        Failure::Index(_) | Failure::Layout(_) | Failure::Interrupted | Failure::OutOfMemory(_) => {
-            ("input", vec![])
-        }
+        Failure::Index(_)
+        | Failure::Lens
+        | Failure::Layout(_)
+        | Failure::Interrupted
+        | Failure::OutOfMemory(_) => ("input", vec![]),
     };
     StellarError::new_err((kind, error.to_string(), indices))
 }

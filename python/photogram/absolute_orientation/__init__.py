@@ -1,6 +1,12 @@
 """Absolute orientation: the similarity between a model and its control (C&GS Technical Bulletin 19, 1962)."""
 
-from photogram.absolute_orientation import document, plot, report, tables  # noqa: F401  (the ways to show a result)
+from photogram.absolute_orientation import (  # noqa: F401  (the ways to show a result)
+    document,
+    findings,
+    plot,
+    report,
+    tables,
+)
 from photogram.absolute_orientation.adjust import orient
 from photogram.absolute_orientation.cards import read_cards
 from photogram.absolute_orientation.csv_files import read_csv

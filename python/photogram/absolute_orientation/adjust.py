@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.absolute_orientation.hints import Fit, find, undecided
+from photogram.absolute_orientation.hints import Fit, find, undecided, unit_of
 from photogram.absolute_orientation.orientation import Orientation, Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
@@ -151,7 +151,7 @@ def orient(
 
     def fit(changed: Floats) -> Fit | None:
         try:
-            found = solve(changed, method="rigorous", start="auto", max_iterations=TRIAL_ITERATIONS)
+            found = solve(changed, method="rigorous", start="closed-form", max_iterations=TRIAL_ITERATIONS)
         except _photocore.SimilarityError:
             return None
         usable = found.status == "converged" and np.isfinite(found.sum_of_squares)
@@ -185,7 +185,7 @@ def _doubts(
         hints = find(
             [result.stations.ids[row] for row in rows.tolist()],
             control,
-            solution.misclosures,
+            result.similarity.transform(model)[0],
             sum_of_squares=solution.sum_of_squares,
             rounding=rounding,
             degrees_of_freedom=result.degrees_of_freedom,
@@ -204,6 +204,10 @@ def _doubts(
         here = Fit(solution.sum_of_squares, float(result.similarity.rotation[2, 2]))
         if open_question := undecided(control, here, rounding, fit):
             messages.append(Message(open_question))
+    covariance = result.similarity.tangent_covariance
+    deviation = math.nan if covariance is None else math.sqrt(float(covariance[3, 3]))
+    if remark := unit_of(result.similarity.scale, deviation):
+        messages.append(Message(remark))
     return messages, grave
 
 

@@ -83,6 +83,7 @@ def _head(result: Orientation) -> dict[str, Any]:
         "known_coordinates": result.known,
         "weighted_sum_of_squares": result.weighted_sum_of_squares,
         "global_test": _global_test(result.test),
+        "verdict": result.verdict.document(),
         "test": {
             "of": "standardized" if result.decided_by_w else "studentized",
             "limit": result.limit if np.isfinite(result.limit) else None,

@@ -10,32 +10,34 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.statistics.likelihood import judged
 
-__all__ = ["Fit", "Hint", "find", "undecided"]
+__all__ = ["Fit", "Hint", "Trial", "find", "trials", "undecided", "unit_of"]
 
 
 FOOT = 0.3048
-IMPROVEMENT = 25.0
-"""The sum of squares must fall by this factor at least: residuals to a fifth."""
-CHANCE = 1e-4
-"""Probability that any of the hypotheses tried is accepted by chance, about."""
-RIVAL = 10.0
-"""And all others must be less likely by this difference of f ln Omega."""
-TESTED = 4
-"""Degrees of freedom from which a hypothesis can be accepted and not only be possible."""
 STATIONS = 60
 """Stations that are tried one by one, at the most."""
 WORK = 20_000
 """Of many stations fewer are tried, so that about as many are oriented anew altogether, but always a few."""
 FEW = 6
+PAIRS = 60
+"""Pairs of stations that are exchanged on trial, at the most: of more, those that are nearest each other's
+places."""
 MOST = 5
 """Hypotheses accepted one upon the other, at the most."""
 AS_WELL = 4.0
 """A mirror image fits as well when its sum of squares is at most this multiple."""
+SAME_SCALE = 1e-3
+"""Relative difference from a foot within which a scale is said to be that of feet and metres."""
+SCALE_DEVIATIONS = 3.0
+ROUNDING = 1e-5
+"""And what coordinates of a few digits leave of it."""
 
 UNITS = {
     FOOT: "in feet where {rest} is in metres",
@@ -64,7 +66,9 @@ Orient = Callable[[Floats], Fit | None]
 
 
 @dataclass(frozen=True, eq=False)
-class _Trial:
+class Trial:
+    """A hypothesis and the sum of squares that it leaves."""
+
     text: str
     control: Floats
     sum_of_squares: float
@@ -73,7 +77,7 @@ class _Trial:
 def find(
     names: list[str],
     control: Floats,
-    residuals: Floats,
+    placed: Floats,
     *,
     sum_of_squares: float,
     rounding: float,
@@ -84,8 +88,9 @@ def find(
 
     Parameters
     ----------
-    names, control, residuals
-        n identifiers, (n, 3) control coordinates that take part, NaN elsewhere, and their residuals.
+    names, control, placed
+        n identifiers, (n, 3) control coordinates that take part, NaN elsewhere, and where the orientation as
+        it is places the model.
     sum_of_squares, degrees_of_freedom
         Of the orientation as it is.
     rounding
@@ -96,35 +101,31 @@ def find(
     hints: list[Hint] = []
     now = sum_of_squares
     while len(hints) < MOST:
-        trials = [
-            _Trial(text, changed, max(fit.sum_of_squares, rounding))
-            for text, changed in _hypotheses(names, control, residuals)
-            if (fit := orient(changed)) is not None
-        ]
-        trials.sort(key=lambda trial: trial.sum_of_squares)
-        if not trials or not now > IMPROVEMENT * trials[0].sum_of_squares:
+        tried = trials(names, control, placed, rounding, orient)
+        verdict = judged(now, [trial.sum_of_squares for trial in tried], degrees_of_freedom)
+        if verdict is None:
             break
-        best = trials[0]
-
-        def likelihood(ratio: float) -> float:
-            return degrees_of_freedom * math.log(ratio)
-
-        sure = (
-            degrees_of_freedom >= TESTED
-            and likelihood(now / best.sum_of_squares) > 2 * math.log(len(trials) / CHANCE)
-            and all(likelihood(trial.sum_of_squares / best.sum_of_squares) > RIVAL for trial in trials[1:2])
-        )
-        fall = math.sqrt(now / best.sum_of_squares)
-        word = "probably" if sure else "possibly"
-        hints.append(Hint(f"{word} {best.text}: residuals would be {fall:.3g} times smaller", sure))
-        if not sure:
+        best = [tried[place] for place in verdict.best]
+        word = "probably" if verdict.accepted else "possibly"
+        what = "; or ".join(each.text for each in best)
+        text = f"{word} {what}: residuals would be {verdict.fall:.3g} times smaller"
+        hints.append(Hint(text, verdict.accepted))
+        if not verdict.accepted:
             break
-        control, now = best.control, best.sum_of_squares
+        control, now = best[0].control, best[0].sum_of_squares
     return hints
 
 
-def _hypotheses(names: list[str], control: Floats, residuals: Floats) -> Iterator[tuple[str, Floats]]:
-    """Return hypotheses with the control changed by each; those of the whole set come first."""
+def trials(names: list[str], control: Floats, placed: Floats, rounding: float, orient: Orient) -> list[Trial]:
+    """Orient the model anew with every hypothesis; those of the whole set come first. See :func:`find`."""
+    return [
+        Trial(text, changed, max(fit.sum_of_squares, rounding))
+        for text, changed in _hypotheses(names, control, placed)
+        if (fit := orient(changed)) is not None
+    ]
+
+
+def _hypotheses(names: list[str], control: Floats, placed: Floats) -> Iterator[tuple[str, Floats]]:
     yield (
         "the control is a mirror image of the model (X and Y exchanged, or an axis reversed, in one of them)",
         control * [1.0, 1.0, -1.0],
@@ -132,7 +133,11 @@ def _hypotheses(names: list[str], control: Floats, residuals: Floats) -> Iterato
     for factor, unit in UNITS.items():
         elevations = unit.format(rest="the plan")
         yield f"the elevations of the control are {elevations}", control * [1.0, 1.0, factor]
-    for row in _suspects(control, residuals):
+    rest = UNITS[FOOT].format(rest="the rest")
+    yield f"X of the control is {rest}", control * [FOOT, 1.0, 1.0]
+    yield f"Y of the control is {rest}", control * [1.0, FOOT, 1.0]
+    suspects = _suspects(control, control - placed)
+    for row in suspects:
         changes: list[tuple[str, Floats]] = []
         if np.isfinite(control[row, :2]).all():
             changes.append((f"X and Y of station {names[row]} are exchanged", control[row, [1, 0, 2]]))
@@ -143,6 +148,24 @@ def _hypotheses(names: list[str], control: Floats, residuals: Floats) -> Iterato
             whole = control.copy()
             whole[row] = changed
             yield text, whole
+    for one, other in _pairs(control, placed, suspects):
+        whole = control.copy()
+        whole[[one, other]] = control[[other, one]]
+        yield f"the coordinates of stations {names[one]} and {names[other]} are exchanged", whole
+
+
+def _pairs(control: Floats, placed: Floats, suspects: list[int]) -> list[tuple[int, int]]:
+    """Return pairs of stations with the same known coordinates, those first that come nearest each other."""
+    known = np.isfinite(control)
+    pairs = [(one, other) for one, other in combinations(suspects, 2) if (known[one] == known[other]).all()]
+
+    def apart(pair: tuple[int, int]) -> float:
+        """Sum of squared distances when they are exchanged, less that as they are."""
+        own, swapped = control[list(pair)], control[list(pair[::-1])]
+        at = placed[list(pair)]
+        return float(np.nansum((at - swapped) ** 2) - np.nansum((at - own) ** 2))
+
+    return sorted(pairs, key=apart)[:PAIRS]
 
 
 def _suspects(control: Floats, residuals: Floats) -> list[int]:
@@ -158,6 +181,28 @@ def _suspects(control: Floats, residuals: Floats) -> list[int]:
     size = np.nansum(np.abs(residuals), axis=1)
     worst = (np.argsort(-values)[: tried // 2].tolist() for values in (distance, size))
     return sorted({row for rows in worst for row in rows})
+
+
+def unit_of(scale: float, sd: float) -> str | None:
+    """Return a remark where a scale is that of feet and metres: nothing else in the data can tell these.
+
+    Parameters
+    ----------
+    scale, sd
+        Of the similarity x = s A X + B, model units per ground unit, and its standard deviation; NaN where
+        it is not known.
+    """
+    for factor, units in (
+        (FOOT, "in feet, the model in metres"),
+        (1 / FOOT, "in metres, the model in feet"),
+    ):
+        near = abs(math.log(scale / factor))
+        if near <= SAME_SCALE and not near > max(SCALE_DEVIATIONS * sd / scale, ROUNDING):
+            return (
+                f"the scale is {scale:.6f}, as of control {units}: where both should be in one unit, one of"
+                " them is not"
+            )
+    return None
 
 
 def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> str | None:

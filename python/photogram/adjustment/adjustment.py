@@ -33,14 +33,20 @@ from photogram.results.datum import datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
 from photogram.results.result import Result
 
-__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "teller"]
+__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "adjusted_again", "teller"]
 
-UnitVariance = Literal["free", "constrained", "unity"]
+UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 
 
 NOTABLE_RISE = 1e-3
 """Percent; less is rounding."""
+
+
+ROUNDING = 1e-9
+"""A sum of redundancy numbers below this is none."""
+SMALL_GROUP, VECTORS = 200, 32
+"""Weighted unknowns of photos up to which sums over them are exact, and vectors of random signs beyond."""
 
 
 @dataclass(frozen=True)
@@ -107,8 +113,9 @@ def adjust(
         The block.
     unit_variance
         What the variance of unit weight is based on (GIANT guide, Appendix E): every weighted quantity
-        (`constrained`), image coordinates and ground control only (`free`), or 1 (`unity`). Covariances are
-        scaled by it.
+        (`constrained`), image coordinates and ground control only (`free`), or 1 (`unity`); or on the
+        redundancy numbers of image coordinates, control and observations beside images (`redundancy`), right
+        whatever the weights of photos are (docs/weights.md). Covariances are scaled by it.
     max_iterations
         Iterations at the most. When None, 50 without a loss, and 200 with one: reweighting takes more of
         them.
@@ -174,6 +181,8 @@ def adjust(
     _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, progress)
     processors = core_threads(threads)
     row = loss_row(loss, scale)
+    if unit_variance == "redundancy" and not covariance:
+        raise InputError("unit_variance='redundancy' needs redundancy numbers: covariance=True")
     if row and as_published:
         raise InputError("the 1987 program has no robust loss: as_published or loss")
     check_cameras(block)
@@ -204,22 +213,79 @@ def adjust(
             raise refused(block, network, None, error) from None
         raise hinted(_named(block, *error.args), block) from None
     with turned("the adjusted block"):
-        return with_hints(_result(block, solution, options, inner, as_published))
+        freedom = _freedom(block, network, solution, options)
+        return with_hints(_result(block, solution, options, freedom, inner, as_published))
+
+
+def adjusted_again(
+    block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
+) -> Result:
+    """Adjust a block, of which only weights have changed, from where an adjustment of it has ended.
+
+    Parameters
+    ----------
+    block
+        The block.
+    options, start
+        Those of the former result, and where it ended: its `options` and `state`.
+    threads
+        As of :func:`adjust`.
+    """
+    network = block_network(block, options)
+    try:
+        solution = network.adjust(datum=None, threads=core_threads(threads), progress=None, start=start)
+    except _photocore.BlockError as error:
+        raise _named(block, *error.args) from None
+    return _result(block, solution, options, _freedom(block, network, solution, options))
+
+
+def _freedom(
+    block: Block,
+    network: _photocore.BlockNetwork,
+    solution: _photocore.BlockSolution,
+    options: CoreOptions,
+) -> float:
+    """Return the degrees of freedom of the unit variance: counted, or r^2 / s (Satterthwaite).
+
+    s is the sum of R_ij^2 among what is measured; all of R sums to r there, so that only what is between it
+    and the weighted unknowns of photos and cameras is to be found.
+    """
+    if options.unit_variance != "redundancy" or solution.redundancies is None:
+        return solution.degrees_of_freedom
+    camera, *measured = solution.redundancies
+    r = sum(measured)
+    if not (r > ROUNDING and camera > ROUNDING):
+        return r
+    covariances = network.covariances(solution.state, threads=0, progress=None)
+    photos = (
+        1,
+        np.full(block.image_xy.shape, -1),
+        np.full(block.point_sd.shape, -1),
+        np.zeros((len(block.photo_ids), 6), dtype=np.int64),
+        [0] * len(block.core_cameras()[0]),
+        [0] * len(block.unknowns),
+        [-1] * len(block.observations),
+    )
+    _, found, _ = covariances.group_squares(
+        photos, classes=None, exact=SMALL_GROUP, vectors=VECTORS, seed=1, threads=0, progress=None
+    )
+    return float(r * r / max(r - found[1], ROUNDING))
 
 
 def _result(
     block: Block,
     solution: _photocore.BlockSolution,
     options: CoreOptions,
-    inner: DatumRow | None,
-    as_published: AsPublished | None,
+    freedom: float,
+    inner: DatumRow | None = None,
+    as_published: AsPublished | None = None,
 ) -> Result:
     datum = datum_of(block, solution, inner)
     messages = datum_messages(block, datum, solution.point_rays) + _messages(block, solution)
     messages += remark(options.loss, solution.image_weights)
     if as_published:
         messages += _rises([Iteration(*row) for row in solution.iterations])
-    return Result.from_solution(block, solution, options, datum, messages)
+    return Result.from_solution(block, solution, options, datum, messages, freedom)
 
 
 def teller(

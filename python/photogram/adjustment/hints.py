@@ -6,8 +6,9 @@ The verdict is the ratio of the misfit m of images under a hypothesis to that as
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -64,14 +65,26 @@ class Verdict:
         Of the hypotheses.
     text
         The hint.
+    change
+        Makes of a block what the first hypothesis says was meant.
+    exact
+        Whether that is exactly what was meant.
+    photos
+        Photos that it is about; none for all.
     """
 
-    def __init__(self, passing: list[tuple[float, Hypothesis]], given: float, photos: str) -> None:
+    def __init__(
+        self, passing: list[tuple[float, Hypothesis]], given: float, photos: Sequence[str] = ()
+    ) -> None:
         passing.sort(key=lambda each: each[0])
         least = passing[0][0]
         best = [each for misfit, each in passing if misfit <= AS_GOOD * least]
+        # One mistake may be right in several forms.
+        best = list({each.text: each for each in reversed(best)}.values())[::-1]
         self.names = [each.name for each in best]
-        where = f" (on {photos})" if photos else ""
+        self.change, self.exact = best[0].change, best[0].exact
+        self.photos = photos
+        where = f" (on photo{'s' if len(photos) > 1 else ''} {listed(list(photos))})" if photos else ""
         fall = f"images would miss their places by {least:.2g} of their spread and not by {given:.2g}"
         if len(best) == 1:
             self.text = f"probably {best[0].text}{where}: {fall}"
@@ -165,7 +178,7 @@ def verdicts(block: Block) -> list[Verdict]:
     chosen = spread(photos, MOST)
     looked = view(block, chosen)
     passing = _passing(looked, chosen)
-    return [Verdict(passing, float(np.median(misfits(looked, chosen))), "")] if passing else []
+    return [Verdict(passing, float(np.median(misfits(looked, chosen))))] if passing else []
 
 
 def _passing(looked: Block, photos: Indices) -> list[tuple[float, Hypothesis]]:
@@ -173,7 +186,7 @@ def _passing(looked: Block, photos: Indices) -> list[tuple[float, Hypothesis]]:
     seen = regressions(looked, photos)
     passing: dict[str, tuple[float, Hypothesis]] = {}
     for hypothesis in hypotheses(looked, seen):
-        left = misfits(hypothesis.block, photos)
+        left = misfits(hypothesis.change(looked), photos)
         ratio, median = left / seen.misfit, float(np.median(left))
         limit = PASSES_ROUGH if median > ROUGH else PASSES
         each = (ratio < EACH) | (np.maximum(left, seen.misfit) < SUSPICION)
@@ -192,11 +205,12 @@ def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
         return []
     passing = []
     for hypothesis in hypotheses(looked):
-        left = control_misfit(hypothesis.block)
+        meant = hypothesis.change(looked)
+        left = control_misfit(meant)
         fits = left < given * (PASSES_ROUGH if left > ROUGH else PASSES) and left < SUSPICION
-        if fits and np.median(misfits(hypothesis.block, photos)) < SUSPICION:
+        if fits and np.median(misfits(meant, photos)) < SUSPICION:
             passing.append((left, hypothesis))
-    return [Verdict(passing, given, "")] if passing else []
+    return [Verdict(passing, given)] if passing else []
 
 
 def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
@@ -206,22 +220,23 @@ def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
         own = np.array([photo])
         looked = view(block, own)
         given = float(misfits(looked, own)[0])
-        of_photo = looked.image_photos == photo
         passing = []
         for name, (turn, text) in TURNS.items():
-            turned = np.where(
-                of_photo[:, np.newaxis], looked.image_xy @ np.array(turn, dtype=np.float64), looked.image_xy
-            )
-            changed = looked.replace(image_xy=turned)
-            left = float(misfits(changed, own)[0])
+            change = partial(_turned, photo=block.photo_ids[photo], turn=np.array(turn, dtype=np.float64))
+            left = float(misfits(change(looked), own)[0])
             if left < PASSES * given and left < SUSPICION:
-                passing.append((left, Hypothesis(name, text, changed)))
+                passing.append((left, Hypothesis(name, text, change)))
         if passing:
             names = tuple(sorted(each.name for _, each in passing))
             by_names.setdefault(names, (passing, given, []))[2].append(block.photo_ids[photo])
     for passing, given, photo_ids in by_names.values():
-        where = f"photos {listed(photo_ids)}" if len(photo_ids) > 1 else f"photo {photo_ids[0]}"
-        yield Verdict(passing, given, where)
+        yield Verdict(passing, given, photo_ids)
+
+
+def _turned(block: Block, photo: str, turn: Floats) -> Block:
+    """Return a block with the images of one photo turned or mirrored."""
+    own = (block.image_photos == block.photo_ids.index(photo))[:, np.newaxis]
+    return block.replace(image_xy=np.where(own, block.image_xy @ turn, block.image_xy))
 
 
 def _latitudes(block: Block) -> list[Message]:

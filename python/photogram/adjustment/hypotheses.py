@@ -1,9 +1,10 @@
-"""What may be wrong with given data, each as the block that would have been meant."""
+"""What may be wrong with given data, each as what makes of a block the one that would have been meant."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,16 @@ from photogram.arguments.types import Floats
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 
-__all__ = ["FOOT", "TURNS", "Hypothesis", "attitude_readings", "hypotheses", "image_hypothesis"]
+__all__ = [
+    "FOOT",
+    "TURNS",
+    "Change",
+    "Hypothesis",
+    "attitude_readings",
+    "hypotheses",
+    "image_hypothesis",
+    "read_as",
+]
 
 FOOT = 0.3048
 """Metres; the survey foot differs by two millionths."""
@@ -58,6 +68,10 @@ _EXPLAINED = 0.2
 """e, what a regression leaves, at the most."""
 
 
+Change = Callable[[Block], Block]
+"""Makes of a block as given the one that was meant."""
+
+
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A mistake that may have been made.
@@ -68,33 +82,36 @@ class Hypothesis:
         In a word or two.
     text
         In a sentence, without its full stop.
-    block
-        What was meant.
+    change
+        Makes of a block, or of a part of its photos, what was meant.
+    exact
+        Whether that is exactly what was meant: a size of pixels and an origin are only known about.
     """
 
     name: str
     text: str
-    block: Block
+    change: Change
+    exact: bool = True
 
 
 def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
     """Propose mistakes for a block; `seen` says how its images and their predictions differ."""
-    yield from _turned(block)
+    for name, (turn, text) in TURNS.items():
+        # predicted = V' observed
+        yield Hypothesis(name, text, partial(_of_images, shift=np.zeros(2), linear=np.array(turn, float)))
     composed = None if seen is None else image_hypothesis(block, seen)
     if composed is not None:
         yield composed
     else:
         yield from _of_format(block)
-    yield from _attitudes(block)
+    for name, (text, _) in attitude_readings(block).items():
+        yield Hypothesis(name, text, partial(read_as, name=name))
     yield from _positions(block)
 
 
-def _turned(block: Block) -> Iterator[Hypothesis]:
-    for name, (turn, text) in TURNS.items():
-        # predicted = V' observed
-        yield Hypothesis(
-            name, text, block.replace(image_xy=block.image_xy @ np.array(turn, dtype=np.float64))
-        )
+def _of_images(block: Block, shift: Floats, linear: Floats) -> Block:
+    """Return a block with images counted from another origin and in other axes."""
+    return block.replace(image_xy=(block.image_xy - shift) @ linear)
 
 
 def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
@@ -111,8 +128,8 @@ def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
     scaled, shifted = abs(scale - 1) > _SCALED, np.abs(shift).max() > _SHIFTED * half
     if not alike or not (scaled or shifted) or not given_points(block).any():
         return None
-    meant = block.image_xy - (shift if shifted else 0.0)
-    meant = meant @ turn / (scale if scaled else 1.0)
+    back = np.zeros(2) if not shifted else shift
+    linear = turn / (scale if scaled else 1.0)
     names, parts = [], []
     if scaled and max(scale, 1 / scale) >= PIXELS:
         names.append("unit")
@@ -138,7 +155,9 @@ def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
         if np.array_equal(turn, matrix):
             names.append(name)
             parts.append(text)
-    return Hypothesis(", ".join(names), "; ".join(parts), block.replace(image_xy=meant))
+    return Hypothesis(
+        ", ".join(names), "; ".join(parts), partial(_of_images, shift=back, linear=linear), exact=False
+    )
 
 
 def _of_format(block: Block) -> Iterator[Hypothesis]:
@@ -154,14 +173,15 @@ def _of_format(block: Block) -> Iterator[Hypothesis]:
         scales = np.geomspace(half / (_WIDEST * distance), _FINEST * half / distance, _SCALES)
     shift = middle if corner else np.zeros(2)
     for turn, sense in (([1.0, 1.0], ""), ([1.0, -1.0], ", and y is counted down, not up")):
-        meant = (block.image_xy - shift) * turn
         names = ["unit"] * pixels + ["origin"] * corner + ["y down"] * bool(sense)
         where = "a corner and not the middle of the format"
         for scale in scales.tolist():
             unit = f"images are pixels (of about {1 / scale:.2g} mm)" if pixels else "images are"
             counted = f"{', ' if pixels else ' '}counted from {where}" if corner else ""
             text = unit + counted + sense
-            yield Hypothesis(", ".join(names), text, block.replace(image_xy=meant / scale))
+            linear = np.diag(turn) / scale
+            change = partial(_of_images, shift=shift, linear=linear)
+            yield Hypothesis(", ".join(names), text, change, exact=False)
 
 
 def attitude_readings(block: Block) -> dict[str, tuple[str, Floats]]:
@@ -195,70 +215,100 @@ def attitude_readings(block: Block) -> dict[str, tuple[str, Floats]]:
         "sign of phi": ("phi has the wrong sign", read(own, flipped)),
         "sign of kappa": ("kappa has the wrong sign, as yaw has", read(own, numbers * [1.0, 1.0, -1.0])),
     }
+    matrices = read(own, numbers)
+    forms: tuple[Representation, ...] = ("quaternion", "quaternion_to_vision")
+    for form in forms:
+        known = Attitudes(matrices).values(form)
+        for given, said, order in (("x, y, z, w", "w, x, y, z", -1), ("w, x, y, z", "x, y, z, w", 1)):
+            # The numbers as they were read, then as they were meant: both have length 1.
+            text = f"quaternions were given in the order {given} and read as {said}"
+            found[f"{form} {given}"] = text, read(form, np.roll(known, -order, axis=1))
     if np.abs(numbers).max() > _BEYOND:
         del found["radians for degrees"]
     return found
 
 
-def _with_matrices(block: Block, matrices: Floats) -> Block:
+def read_as(block: Block, name: str) -> Block:
+    """Return a block whose attitudes are read in another way; see :func:`attitude_readings`."""
+    _, matrices = attitude_readings(block)[name]
     form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
     return block.replace(photo_attitudes=Attitudes(matrices).values(form))
 
 
-def _attitudes(block: Block) -> Iterator[Hypothesis]:
-    for name, (text, matrices) in attitude_readings(block).items():
-        yield Hypothesis(name, text, _with_matrices(block, matrices))
+def _scaled(block: Block, photos: Floats | None = None, points: Floats | None = None) -> Block:
+    """Return a block with the axes of its positions scaled."""
+    if points is not None:
+        return block.replace(point_positions=block.point_positions * points)
+    observed = block.photo_positions_observed
+    if photos is None:
+        return block
+    return block.replace(
+        photo_positions=block.photo_positions * photos,
+        photo_positions_observed=None if observed is None else observed * photos,
+    )
+
+
+def _exchanged(block: Block, *, points: bool) -> Block:
+    """Return a block with the first two coordinates of photos or of points exchanged."""
+    order = [1, 0, 2]
+    if points:
+        return block.replace(
+            point_positions=block.point_positions[:, order], point_sd=block.point_sd[:, order]
+        )
+    observed = block.photo_positions_observed
+    return block.replace(
+        photo_positions=block.photo_positions[:, order],
+        photo_position_sd=block.photo_position_sd[:, order],
+        photo_positions_observed=None if observed is None else observed[:, order],
+    )
+
+
+def _centres(block: Block, axes: Floats) -> Block:
+    """Return a block whose positions are C = -R't of translations t; R = F A', F' = `axes`."""
+    turned = block.photo_positions @ axes
+    return block.replace(photo_positions=-np.einsum("pji,pj->pi", _to_photo(block), turned))
 
 
 def _positions(block: Block) -> Iterator[Hypothesis]:
-    positions, points = block.photo_positions, block.point_positions
     known = bool(given_points(block).any())
-
-    def moved(name: str, text: str, of_photos: Floats, of_points: Floats | None = None) -> Hypothesis:
-        own = points if of_points is None else of_points
-        return Hypothesis(name, text, block.replace(photo_positions=of_photos, point_positions=own))
-
-    unit = block.linear_unit
-    heights = [1.0, 1.0, FOOT]
-    yield moved(
-        "feet in heights of photos",
-        "heights of the photos are in feet, all else in metres",
-        positions * heights,
-    )
-    if known:
-        yield moved(
-            "feet in heights of points",
-            "heights of the points are in feet, all else in metres",
-            positions,
-            points * heights,
-        )
-    if block.spheroid is not None:
-        yield from _geographic(block, moved)
+    geographic = block.spheroid is not None
+    for what, own in (("photos", True), ("points", False)):
+        if not (own or known):
+            continue
+        others = "points" if own else "photos"
+        # Several at once, then single axes.
+        for name, axes, text in (
+            (f"feet in heights of {what}", (2,), f"heights of the {what} are in feet, all else in metres"),
+            (
+                f"feet in positions of {what}" if own else "feet in points",
+                (0, 1, 2),
+                f"positions of the {what} are in feet, those of the {others} in metres"
+                f" (in {block.linear_unit} here)",
+            ),
+            (f"feet in X of {what}", (0,), f"X of the {what} are in feet, all else in metres"),
+            (f"feet in Y of {what}", (1,), f"Y of the {what} are in feet, all else in metres"),
+        ):
+            if not geographic or axes == (2,):
+                factor: Floats = np.where(np.isin(np.arange(3), axes), FOOT, 1.0)
+                change = partial(_scaled, photos=factor) if own else partial(_scaled, points=factor)
+                yield Hypothesis(name, text, change)
+    if geographic:
+        yield from _geographic(block)
         return
-    yield moved("X and Y of photos", "X and Y of the photos are exchanged", positions[:, [1, 0, 2]])
-    rotation = _to_photo(block)
+    yield Hypothesis(
+        "X and Y of photos", "X and Y of the photos are exchanged", partial(_exchanged, points=False)
+    )
     # R = F A' in the axes of computer vision, A' in those of the photo
-    for axes, of_axes in (("x right, y down, z forward", _TO_VISION), ("x right, y up, z back", np.eye(3))):
-        yield moved(
+    for said, of_axes in (("x right, y down, z forward", _TO_VISION), ("x right, y up, z back", np.eye(3))):
+        yield Hypothesis(
             "t for C",
-            f"positions of the photos are translations t of x = R X + t ({axes}), not projection centres"
+            f"positions of the photos are translations t of x = R X + t ({said}), not projection centres"
             " C = -R't",
-            -np.einsum("pji,pj->pi", rotation, positions @ of_axes),
+            partial(_centres, axes=of_axes),
         )
     if known:
-        yield moved(
-            "feet in positions of photos",
-            f"positions of the photos are in feet, those of the points in metres (in {unit} here)",
-            positions * FOOT,
-        )
-        yield moved(
-            "feet in points",
-            f"positions of the points are in feet, those of the photos in metres (in {unit} here)",
-            positions,
-            points * FOOT,
-        )
-        yield moved(
-            "X and Y of points", "X and Y of the points are exchanged", positions, points[:, [1, 0, 2]]
+        yield Hypothesis(
+            "X and Y of points", "X and Y of the points are exchanged", partial(_exchanged, points=True)
         )
 
 
@@ -269,13 +319,9 @@ def _to_photo(block: Block) -> Floats:
     return matrices
 
 
-def _geographic(block: Block, moved: Callable[..., Hypothesis]) -> Iterator[Hypothesis]:
-    exchanged = [1, 0, 2]
-    for name, photos, points in (
-        ("photos", block.photo_positions[:, exchanged], None),
-        ("points", block.photo_positions, block.point_positions[:, exchanged]),
-    ):
-        changed = photos if points is None else points
-        if not (np.abs(changed[:, 1]) > _HALF_TURN).any():
-            text = f"longitude and latitude of the {name} are exchanged"
-            yield moved(f"longitude and latitude of {name}", text, photos, points)
+def _geographic(block: Block) -> Iterator[Hypothesis]:
+    for what, positions in (("photos", block.photo_positions), ("points", block.point_positions)):
+        if not (np.abs(positions[:, 0]) > _HALF_TURN).any():
+            text = f"longitude and latitude of the {what} are exchanged"
+            change = partial(_exchanged, points=what == "points")
+            yield Hypothesis(f"longitude and latitude of {what}", text, change)

@@ -6,15 +6,13 @@ before the block is adjusted anew, and the others are judged again.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from photogram.adjustment.adjustment import adjust
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.checks.findings import Finding, Section
+from photogram.checks.adjusting import Adjuster
+from photogram.checks.findings import Finding, Level, Section
 from photogram.checks.gross import Suspects
 from photogram.checks.predictions import (
     exchange,
@@ -23,15 +21,18 @@ from photogram.checks.predictions import (
     freed,
     tests_of_predictions,
 )
+from photogram.checks.rivals import rival_images
 from photogram.checks.robust import critical, mad_sd
+from photogram.checks.views import kept_images
+from photogram.checks.words import small_unit
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
 from photogram.network.rays import Rays
+from photogram.results.kinds import ObservedKind
 from photogram.results.result import Result
+from photogram.show.angles import ARCSEC
 
 __all__ = ["Edited", "edit"]
-
-Adjust = Callable[[Block], Result]
 
 ROUNDS = 20
 """Adjustments at the most."""
@@ -51,7 +52,11 @@ EXCHANGES = 5
 LOOSE = 0.01
 """Standard deviation of control that strains no block, as a part of the flying height."""
 BLUNDER = 3.0
+SURE = 1e-4
+"""Chance that the largest test value of a good block is beyond what is grave."""
 SHOWN = 20
+BESIDE = "beside images: "
+"""Before the names of further kinds of observations."""
 
 
 @dataclass
@@ -97,9 +102,10 @@ class _Suspect:
     row: int
     axis: int
     test: float
+    grave: bool
 
 
-def edit(block: Block, suspects: Suspects, **options: Any) -> Edited:
+def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
     """Adjust a block and take out what does not fit, the largest of a neighbourhood at a time.
 
     Control points that agree with each other's predictions are exchanged back, and all is done anew.
@@ -111,19 +117,34 @@ def edit(block: Block, suspects: Suspects, **options: Any) -> Edited:
     suspects
         Gross errors known already. Images are left out from the beginning, photos when the block does not fit
         with them; control is left out until its prediction has judged it.
-    options
-        Of :func:`photogram.adjust`.
+    adjusted
+        Adjusts.
     """
+    found = _edited(block, suspects, adjusted)
+    if not suspects.control.any() or not found.control:
+        return found
+    # What is left out together takes the redundancy that tells it from other control.
+    none = np.zeros_like(suspects.control)
+    plain = _edited(block, replace(suspects, control=none), adjusted)
+    usable = plain.last is not None and plain.last.converged and plain.spread < HOPELESS
+    if not usable or _named(plain) >= _named(found):
+        return found
+    left = [block.point_ids[point] for point in np.flatnonzero(suspects.control).tolist()]
+    return replace(plain, cleared=[name for name in left if name not in plain.control])
+
+
+def _named(edited: Edited) -> int:
+    """Return how many observations an adjustment did without."""
+    return len(edited.section.findings) + sum(len(each) for each in edited.control.values())
+
+
+def _edited(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
     section = blunder_section()
-
-    def adjusted(changed: Block) -> Result:
-        return adjust(changed, **options)
-
     current = kept_images(block, ~suspects.images)
     left = np.flatnonzero(suspects.control)
     exchanged: list[tuple[str, str]] = []
     try:
-        first = _as_it_is(current, adjusted) if left.size else None
+        first = adjusted.tried(current) if left.size else None
         while True:
             section = blunder_section()
             start, fewer = _first(freed(current, left), suspects.photos, adjusted, section)
@@ -158,15 +179,7 @@ def _names(block: Block, pair: tuple[int, int]) -> tuple[str, str]:
     return block.point_ids[pair[0]], block.point_ids[pair[1]]
 
 
-def _as_it_is(block: Block, adjusted: Adjust) -> Result | None:
-    """Adjust with all control, for the record."""
-    try:
-        return adjusted(block)
-    except AdjustmentError:
-        return None
-
-
-def _gross_control(block: Block, adjusted: Adjust) -> Indices:
+def _gross_control(block: Block, adjusted: Adjuster) -> Indices:
     """Return the control points without which a block that does not converge does so with loose control.
 
     With standard deviations of a hundredth of the flying height, control strains no block, and what is wrong
@@ -190,7 +203,7 @@ def _gross_control(block: Block, adjusted: Adjust) -> Indices:
 
 
 def _exchanged(
-    result: Result, given: Block, points: Indices, spread: float, adjusted: Adjust
+    result: Result, given: Block, points: Indices, spread: float, adjusted: Adjuster
 ) -> tuple[int, int] | None:
     """Find two of some doubtful control points that are exchanged."""
     points = points[np.isfinite(given.point_sd[points]).any(axis=1) & result.used_points[points]]
@@ -209,17 +222,21 @@ def _judged(
     given: Block,
     points: Indices,
     spread: float,
-    adjusted: Adjust,
+    adjusted: Adjuster,
     section: Section,
     control: dict[str, list[Finding]],
 ) -> tuple[Result, float]:
     """Hold what agrees with its prediction of the control that was left out, and report the rest."""
     errors, tests = tests_of_predictions(result, given, points, spread)
-    limit = critical(int(np.isfinite(given.point_sd).sum()))
+    count = int(np.isfinite(given.point_sd).sum())
+    limit, sure = critical(count), critical(count, SURE)
     point_sd = result.block.point_sd.copy()
     for row, error, test in zip(points.tolist(), errors, np.abs(tests), strict=True):
         for axis in np.flatnonzero(test > limit).tolist():
-            finding = _control_finding(given, row, axis, float(error[axis]), float(test[axis]) * spread)
+            value = float(test[axis])
+            finding = _control_finding(
+                given, row, axis, float(error[axis]), value * spread, grave=value > sure
+            )
             control.setdefault(given.point_ids[row], []).append(finding)
         fits = test <= limit
         point_sd[row, fits] = given.point_sd[row, fits]
@@ -240,12 +257,6 @@ def blunder_section() -> Section:
     )
 
 
-def kept_images(block: Block, kept: Bools) -> Block:
-    """Return a block with some of its images."""
-    names = ("image_photos", "image_points", "image_xy", "image_sd")
-    return block.replace(**{name: getattr(block, name)[kept] for name in names})
-
-
 def without_photos(block: Block, photos: Bools) -> Block:
     """Return a block without some of its photos and their images."""
     fewer = kept_images(block, ~photos[block.image_photos])
@@ -256,16 +267,21 @@ def without_photos(block: Block, photos: Bools) -> Block:
         "principal_distances",
         "photo_position_sd",
         "photo_attitude_sd",
+        "photo_positions_observed",
+        "photo_attitudes_observed",
         "photo_cameras",
     )
+    there = {name for name, gone in zip(block.photo_ids, photos.tolist(), strict=True) if not gone}
     return fewer.replace(
-        photo_ids=[name for name, gone in zip(block.photo_ids, photos.tolist(), strict=True) if not gone],
+        photo_ids=[name for name in block.photo_ids if name in there],
+        observations=[each for each in block.observations if there.issuperset(each.photos)],
+        mounts=[each for each in block.mounts if each.photo in there],
         image_photos=number[fewer.image_photos],
         **{name: values[~photos] for name in names if (values := getattr(block, name)) is not None},
     )
 
 
-def _first(block: Block, bad: Bools, adjusted: Adjust, section: Section) -> tuple[Result, Block]:
+def _first(block: Block, bad: Bools, adjusted: Adjuster, section: Section) -> tuple[Result, Block]:
     """Adjust with all photos, or without those bad ones with which the block does not fit."""
     error = None
     if not bad.any():
@@ -290,7 +306,7 @@ def _first(block: Block, bad: Bools, adjusted: Adjust, section: Section) -> tupl
 
 
 def _snoop(
-    first: Result, block: Block, adjusted: Adjust, section: Section
+    first: Result, block: Block, adjusted: Adjuster, section: Section
 ) -> tuple[Result, float, dict[str, list[Finding]]]:
     result = first
     control: dict[str, list[Finding]] = {}
@@ -300,12 +316,12 @@ def _snoop(
         if not suspects or not result.converged or step == ROUNDS - 1:
             break
         for suspect in suspects:
-            finding = _finding(result, suspect)
+            finding = _finding(result, suspect, spread)
             if suspect.kind == "control":
                 control.setdefault(finding.points[0], []).append(finding)
             else:
                 section.findings.append(finding)
-        block = _without(result.block, suspects)
+        block = _without(result, suspects)
         try:
             result = adjusted(block)
         except AdjustmentError as error:
@@ -318,15 +334,15 @@ def tests(result: Result) -> dict[str, Floats]:
     """Test values by kind, in standard deviations of the residuals; 0 where nothing checks."""
     block = result.block
     images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
-    stations = np.hstack(
-        [result.photo_positions - block.photo_positions, result.photo_attitudes - block.photo_attitudes]
-    )
-    stations[:, 3:] -= 2 * np.pi * np.round(stations[:, 3:] / (2 * np.pi))
-    station_sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
+    others = {
+        name: np.where(kind.redundancy > TESTABLE, np.nan_to_num(np.abs(kind.standardized)), 0.0)
+        for name, kind in result.kinds.items()
+    }
     return {
         "image": np.nan_to_num(images),
         "control": _prior_tests(result.point_differences, block.point_sd, result.point_redundancy),
-        "station": _prior_tests(stations, station_sd, result.photo_redundancy),
+        "station": _prior_tests(result.photo_residuals, result.photo_given_sd, result.photo_redundancy),
+        **{f"{BESIDE}{name}": each for name, each in others.items()},
     }
 
 
@@ -341,9 +357,10 @@ def _prior_tests(differences: Floats, sd: Floats, redundancy: Floats) -> Floats:
 def _largest(result: Result, spread: float) -> list[_Suspect]:
     """Return the observations beyond the critical value that are the largest of their neighbourhood."""
     values = tests(result)
-    limit = critical(sum(int((each > 0).sum()) for each in values.values())) * spread
+    count = sum(int((each > 0).sum()) for each in values.values())
+    limit, sure = critical(count) * spread, critical(count, SURE) * spread
     beyond = [
-        _Suspect(kind, int(row), int(axis), float(each[row, axis]))
+        _Suspect(kind, int(row), int(axis), float(each[row, axis]), bool(each[row, axis] > sure))
         for kind, each in values.items()
         for row, axis in np.argwhere(each > limit)
     ]
@@ -366,38 +383,69 @@ def _largest(result: Result, spread: float) -> list[_Suspect]:
     return taken
 
 
-def _without(block: Block, suspects: list[_Suspect]) -> Block:
-    """Leave out images; give up the weights of components of control and of stations."""
+def _without(result: Result, suspects: list[_Suspect]) -> Block:
+    """Leave out images and observations; give up the weights of components of control and of stations."""
+    block = result.block
     point_sd = block.point_sd.copy()
     station_sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     kept = np.ones(len(block.image_xy), dtype=bool)
+    gone: set[int] = set()
     for suspect in suspects:
         if suspect.kind == "image":
             kept[suspect.row] = False
         elif suspect.kind == "control":
             point_sd[suspect.row, suspect.axis] = np.inf
-        else:
+        elif suspect.kind == "station":
             station_sd[suspect.row, suspect.axis] = np.inf
+        else:
+            gone.add(int(_kind(result, suspect).rows[suspect.row]))
     changed = block.replace(
-        point_sd=point_sd, photo_position_sd=station_sd[:, :3], photo_attitude_sd=station_sd[:, 3:]
+        point_sd=point_sd,
+        photo_position_sd=station_sd[:, :3],
+        photo_attitude_sd=station_sd[:, 3:],
+        observations=[each for row, each in enumerate(block.observations) if row not in gone],
     )
     return kept_images(changed, kept)
 
 
-def _finding(result: Result, suspect: _Suspect) -> Finding:
+def _kind(result: Result, suspect: _Suspect) -> ObservedKind:
+    return result.kinds[suspect.kind.removeprefix(BESIDE)]
+
+
+def _finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     if suspect.kind == "image":
-        return _image_finding(result, suspect)
+        return _image_finding(result, suspect, spread)
     if suspect.kind == "control":
         row, axis = suspect.row, suspect.axis
         error = -float(result.point_differences[row, axis] / result.point_redundancy[row, axis])
-        return _control_finding(result.block, row, axis, error, suspect.test)
+        return _control_finding(result.block, row, axis, error, suspect.test, grave=suspect.grave)
+    level: Level = "grave" if suspect.grave else "look"
+    if suspect.kind != "station":
+        return _other_finding(result, suspect, level)
     name = result.block.photo_ids[suspect.row]
     what = ("first", "second", "third")[suspect.axis % 3] + (" coordinate" if suspect.axis < 3 else " angle")
     text = f"the {what} of station {name} contradicts its standard deviation (test value {suspect.test:.1f})"
-    return Finding("station-misfit", "grave", text, [name], [], {"test_value": suspect.test})
+    return Finding("station-misfit", level, text, [name], [], {"test_value": suspect.test})
 
 
-def _control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
+def _other_finding(result: Result, suspect: _Suspect, level: Level) -> Finding:
+    """Say that an observation beside images does not fit."""
+    kind = _kind(result, suspect)
+    observation = result.block.observations[int(kind.rows[suspect.row])]
+    redundancy = float(kind.redundancy[suspect.row, suspect.axis])
+    error, unit = float(kind.residuals[suspect.row, suspect.axis]) / redundancy, kind.units[suspect.axis]
+    if unit == "rad":
+        error, unit = error / ARCSEC, "arcsec"
+    text = (
+        f"{kind.components[suspect.axis]} of {observation.name} does not fit (test value {suspect.test:.1f},"
+        f" redundancy {redundancy:.2f}): its error is about {error:.4g} {unit}".rstrip()
+    )
+    values = {"test_value": suspect.test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
+    photos, points = list(observation.photos), list(observation.points)
+    return Finding("observation-misfit", level, text, photos, points, values)
+
+
+def _control_finding(block: Block, row: int, axis: int, error: float, test: float, *, grave: bool) -> Finding:
     """Say that a component of control does not fit; `error` is that of the given value."""
     angle = block.geographic and axis < 2
     unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
@@ -408,29 +456,38 @@ def _control_finding(block: Block, row: int, axis: int, error: float, test: floa
         f" its error is about {error:.3f} {unit}"
     )
     values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
-    return Finding("control-misfit", "grave", text, [], [name], values)
+    return Finding("control-misfit", "grave" if grave else "look", text, [], [name], values)
 
 
-def _image_finding(result: Result, suspect: _Suspect) -> Finding:
+def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     block, row, axis = result.block, suspect.row, suspect.axis
     photo, point = int(block.image_photos[row]), int(block.image_points[row])
     redundancy = float(result.redundancy[row, axis])
     error = float(result.residuals[row, axis]) / redundancy
-    others = block.image_photos[(block.image_points == point) & (block.image_photos != photo)].tolist()
-    doubt = ""
-    if len(others) == 1:
-        doubt = f"; with two rays it may as well be the image on photo {block.photo_ids[others[0]]}"
+    others = [
+        block.photo_ids[each] for each in block.image_photos[rival_images(result, row, spread)].tolist()
+    ]
+    doubt = f"; it may as well be the image on photo {' or '.join(others)}" if others else ""
+    if doubt and np.count_nonzero(block.image_points == point) == 2:
+        doubt = f"; with two rays it may as well be the image on photo {others[0]}"
+    unit, factor = small_unit(block.image_unit)
     text = (
         f"point {block.point_ids[point]} on photo {block.photo_ids[photo]}: error of {'xy'[axis]} about"
-        f" {error * 1000:.0f} um (test value {suspect.test:.1f}, redundancy {redundancy:.2f}){doubt}"
+        f" {error * factor:.{0 if unit == 'um' else 2}f} {unit} (test value {suspect.test:.1f},"
+        f" redundancy {redundancy:.2f}){doubt}"
     )
     return Finding(
         "blunder",
-        "grave",
+        "grave" if suspect.grave else "look",
         text,
-        [block.photo_ids[photo], *([block.photo_ids[others[0]]] if doubt else [])],
+        [block.photo_ids[photo], *others],
         [block.point_ids[point]],
-        {"error_um": error * 1000, "test_value": suspect.test, "redundancy": redundancy, "axis": float(axis)},
+        {
+            f"error_{unit}": error * factor,
+            "test_value": suspect.test,
+            "redundancy": redundancy,
+            "axis": float(axis),
+        },
     )
 
 
@@ -449,12 +506,15 @@ def _list(result: Result, spread: float, section: Section) -> None:
     if not len(images):
         return
     block = result.block
-    heads = "".join(f"{head:>12}" for head in ("residual um", "redundancy", "test value", "error um"))
+    unit, factor = small_unit(block.image_unit)
+    heads = "".join(
+        f"{head:>12}" for head in (f"residual {unit}", "redundancy", "test value", f"error {unit}")
+    )
     section.lines.append("the largest that are left, each with the error that would explain it:")
     section.lines.append(f"{'photo':<10}{'point':<10}   {heads}")
     for row in np.argsort(-values[images, axes], kind="stable")[:SHOWN].tolist():
         i, axis = int(images[row]), int(axes[row])
-        residual, redundancy = 1000 * result.residuals[i, axis], result.redundancy[i, axis]
+        residual, redundancy = factor * result.residuals[i, axis], result.redundancy[i, axis]
         section.lines.append(
             f"{block.photo_ids[block.image_photos[i]]:<10}{block.point_ids[block.image_points[i]]:<10}"
             f" {'xy'[axis]} {residual:>12.1f}{redundancy:>12.3f}{values[i, axis]:>12.2f}"

@@ -65,13 +65,16 @@ class Suspects:
     control: Bools
 
 
-def gross(block: Block) -> tuple[Section, Suspects]:
-    """Look for bad photos, gross errors of images and exchanged names, and control that is far off."""
+def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
+    """Look for bad photos, gross errors of images and exchanged names, and control that is far off.
+
+    `unit` is what image coordinates are called.
+    """
     section = Section(
         "Gross errors (intersection from the initial stations)",
         "Large patterned residuals are normal before the adjustment; a break in the pattern is an error.",
     )
-    rays, photos = _bad_photos(Rays.of(block), section)
+    rays, photos = _bad_photos(Rays.of(block, unit=unit), section)
     findings, images = _broken(rays)
     while (photo := _overrun(rays, findings)) is not None:
         # One mistake, not one for each of its points.
@@ -153,7 +156,7 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
         known = np.flatnonzero(medians > 0)
         if step == 0 and known.size:
             usual = float(np.median(medians[known]))
-            section.lines.append(f"{'median residual of a photo':<50}{usual:.4f} mm")
+            section.lines.append(f"{'median residual of a photo':<50}{usual:.4f} {rays.unit}")
         if len(known) < 4 or step == MOST_PHOTOS:
             break
         worst = _worst(rays, medians, known)
@@ -163,16 +166,17 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
         bad[photo] = True
         name, size = block.photo_ids[photo], float(medians[photo])
         text = (
-            f"photo {name} does not fit the others: median residual {size:.3f} mm against {usual:.3f} mm"
-            " without it; look at its station (position, angles), the preprocessing of its plate, and whether"
-            " the points under its name are its own"
+            f"photo {name} does not fit the others: median residual {size:.3f} {rays.unit} against"
+            f" {usual:.3f} {rays.unit} without it; look at its station (position, angles), the preprocessing"
+            " of its plate, and whether the points under its name are its own"
         )
-        section.findings.append(Finding("bad-photo", "grave", text, [name], [], {"median_residual_mm": size}))
+        values = {f"median_residual_{rays.unit}": size}
+        section.findings.append(Finding("bad-photo", "grave", text, [name], [], values))
     return rays, bad
 
 
 def _worst(rays: Rays, medians: Floats, known: Indices) -> tuple[int, float, Rays] | None:
-    """Return the photo that stands out, the median of the others without it in mm, and the rays without it.
+    """Return the photo that stands out, the median of the others without it, and the rays without it.
 
     A bad photo spoils the medians of its neighbours, in a small block those of all. So it is compared with
     what the others are without it.
@@ -231,20 +235,22 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
     block = solver.rays.block
     before = solver.largest(rows, solver.changed(point, [], []))
     left = [solver.without(point, rows, row) for row in rows.tolist()] if len(rows) > 2 else []
-    name, values = block.point_ids[point], {"residual_mm": before, "departure_sd": departure}
+    unit = solver.rays.unit
+    name, values = block.point_ids[point], {f"residual_{unit}": before, "departure_sd": departure}
     if left and min(left) < EXPLAINED * before:
         row = rows[[int(np.argmin(left))]]
         photo = block.photo_ids[int(block.image_photos[row[0]])]
         text = (
             f"point {name} on photo {photo} is wrong: without this image its other rays meet to"
-            f" {min(left):.3f} mm, with it to {before:.3f} mm; misidentified, misnamed or misrecorded?"
+            f" {min(left):.3f} {unit}, with it to {before:.3f} {unit}; misidentified, misnamed or"
+            " misrecorded?"
         )
         # Any two of three rays may meet by chance: a small break is no proof against the third.
         proof: Level = "grave" if len(rows) > 3 or departure > CHANCE * BREAK else "look"
         return Finding("gross-error", proof, text, [photo], [name], values), row
     photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
     text = (
-        f"point {name} does not fit (its rays miss by {before:.3f} mm), on one of the photos"
+        f"point {name} does not fit (its rays miss by {before:.3f} {unit}), on one of the photos"
         f" {', '.join(photos)}: misidentified, or one name for two points?"
     )
     level: Level = "grave" if departure > FLAGRANT else "look"
@@ -349,7 +355,8 @@ def _exchanged(solver: _Solver, rows_of: dict[int, Indices]) -> tuple[list[Findi
                 f"the points {names[0]} and {names[1]} are exchanged on photo {name}:"
                 " exchanged back, they fit"
             )
-            values = {"before_mm": max(before[a], before[b]), "after_mm": after}
+            unit = solver.rays.unit
+            values = {f"before_{unit}": max(before[a], before[b]), f"after_{unit}": after}
             findings.append(Finding("exchanged-points", "grave", text, [name], names, values))
             found.setdefault(a, []).append(photo)
             found.setdefault(b, []).append(photo)

@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.checks.findings import Finding, Section
+from photogram.checks.words import Words
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius, meet
 
@@ -37,7 +38,7 @@ MIRRORS = {
 """The four reflections that keep a frame in place, by what brings them about."""
 
 
-def orientation(block: Block) -> tuple[Section, Block]:
+def orientation(block: Block, words: Words, unit: str = "mm") -> tuple[Section, Block]:
     """Test whether photos fit when the sign of their principal distance is changed, turned, or mirrored.
 
     Returns the section, and the block with the explanations that hold, so that other errors show.
@@ -52,7 +53,7 @@ def orientation(block: Block) -> tuple[Section, Block]:
     explanations: list[Finding] = []
     doubt = _doubt(rays, met)
     if max(doubt) > SUSPICIOUS:
-        block = _whole_block(block, sum(doubt), explanations)
+        block = _whole_block(block, sum(doubt), words, explanations)
     whole = block
     for _ in range(MOST):
         turned = _one_photo(block, explanations)
@@ -65,18 +66,18 @@ def orientation(block: Block) -> tuple[Section, Block]:
     if cost > SUSPICIOUS:
         text = (
             "the rays miss each other, and neither the sign of the principal distance, nor kappa, nor the"
-            " sense of the angles (COMMON column 2), nor mirrored plates explain it: look at positions,"
-            " angles, names of frames and points"
+            f" sense of the angles ({words.sense}), nor mirrored plates explain it: look at positions,"
+            " angles, names of photos and points"
         )
         explanations.append(Finding("rays-do-not-meet", "grave", text, values={"cost": cost}))
     section.findings += _unexplained(above, explanations, whole, block) + explanations
     known = np.isfinite(met.sizes)
     behind = int((known & ~met.in_front).sum())
     section.lines.append(f"{'rays that meet behind their camera':<50}{behind} of {int(known.sum())}")
-    section.lines.append(f"{'median residual of intersection':<50}{_median(met.sizes):.3f} mm")
+    section.lines.append(f"{'median residual of intersection':<50}{_median(met.sizes):.3f} {unit}")
     if block is not rays.block:
         section.lines.append(
-            f"{'median residual with these explanations':<50}{_median(met_after.sizes):.3f} mm;"
+            f"{'median residual with these explanations':<50}{_median(met_after.sizes):.3f} {unit};"
             " the sections below hold with them"
         )
     return section, block
@@ -197,9 +198,9 @@ def _mirrored(block: Block, photos: Bools, mirror: Floats) -> Block:
     return block.replace(image_xy=np.where(images, block.image_xy @ mirror.T, block.image_xy))
 
 
-def _whole_block(block: Block, before: float, explanations: list[Finding]) -> Block:
+def _whole_block(block: Block, before: float, words: Words, explanations: list[Finding]) -> Block:
     """Look for one explanation for all photos, or for all of one principal distance."""
-    trials = _trials(block)
+    trials = _trials(block, words)
     tried = [Rays.of(trial.block) for trial in trials]
     costs = [sum(_doubt(rays, rays.intersect())) for rays in tried]
     best = trials[int(np.argmin(costs))]
@@ -227,7 +228,7 @@ class _Trial:
     block: Block
 
 
-def _trials(block: Block) -> list[_Trial]:
+def _trials(block: Block, words: Words) -> list[_Trial]:
     """Explanations to try; of equally good ones the first counts, and the sign is the most probable."""
     groups = {"all photos": np.ones(len(block.photo_ids), dtype=bool)}
     of_photos = block.known_distances("checks")
@@ -248,7 +249,7 @@ def _trials(block: Block) -> list[_Trial]:
         for what, mirror in MIRRORS.items():
             text = f"the plates of {name} are mirrored: {what}; put right, the rays meet."
             trials.append(_Trial("mirrored", text, names, _mirrored(block, photos, mirror)))
-    text = "the angles are of the other sense (COMMON column 2): taken so, the rays meet."
+    text = f"the angles are of the other sense ({words.sense}): taken so, the rays meet."
     other = block.replace(photo_to_ground=not block.photo_to_ground)
     return [*trials, _Trial("sense-of-rotation", text, list(block.photo_ids), other)]
 

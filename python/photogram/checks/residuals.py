@@ -10,6 +10,9 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.checks.findings import Finding, Section
 from photogram.checks.robust import critical, normal_of_chi_square
+from photogram.checks.words import small_unit
+from photogram.network.block import Block
+from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
 from photogram.results.result import Result
 
@@ -42,18 +45,25 @@ def residuals(result: Result, spread: float) -> Section:
     )
     _by_rays(result, section)
     _sums(result, section)
-    _frame_pattern(result, spread, section)
-    _photo_patterns(result, spread, section)
+    plain = without_lenses(result.block)
+    if len(plain.image_xy) < len(result.block.image_xy):
+        section.lines.append("images beyond what the lens sees: no patterns over the frame")
+        return section
+    _frame_pattern(result, plain, spread, section)
+    _photo_patterns(result, plain, spread, section)
     return section
 
 
 def _by_rays(result: Result, section: Section) -> None:
     used = result.used_images
+    unit, factor = small_unit(result.block.image_unit)
     rays = result.point_rays[result.block.image_points]
-    section.lines.append(f"{'rays':>6}{'images':>9}{'rms x um':>11}{'rms y um':>11}{'mean redundancy':>17}")
+    section.lines.append(
+        f"{'rays':>6}{'images':>9}{f'rms x {unit}':>11}{f'rms y {unit}':>11}{'mean redundancy':>17}"
+    )
     for number in np.unique(rays[used]).tolist():
         rows = used & (rays == number)
-        x, y = 1000 * np.sqrt((result.residuals[rows] ** 2).mean(axis=0))
+        x, y = factor * np.sqrt((result.residuals[rows] ** 2).mean(axis=0))
         redundancy = result.redundancy[rows].mean()
         section.lines.append(f"{number:>6}{int(rows.sum()):>9}{x:>11.2f}{y:>11.2f}{redundancy:>17.3f}")
 
@@ -75,20 +85,23 @@ def _sums(result: Result, section: Section) -> None:
         ]
     )
     several = result.point_rays >= 3
+    unit, factor = small_unit(block.image_unit)
     if not several.any():
         return
-    rms = 1000 * np.sqrt((sums[several] ** 2).mean())
-    section.lines.append(f"{'rms of the sums of the residuals of a point':<50}{rms:.2f} um (3 and more rays)")
+    rms = factor * np.sqrt((sums[several] ** 2).mean())
+    section.lines.append(
+        f"{'rms of the sums of the residuals of a point':<50}{rms:.2f} {unit} (3 and more rays)"
+    )
     # A point whose residuals nothing checks has sums of rounding errors.
     floor = (ROUNDING * float(block.image_sd.min())) ** 2
     sizes = np.abs(sums) / np.sqrt(np.maximum(variances, floor)) * several[:, np.newaxis]
     limit = critical(2 * int(several.sum()))
     for point in np.argsort(-sizes.max(axis=1), kind="stable")[:SHOWN].tolist():
         if sizes[point].max() > limit:
-            x, y = 1000 * sums[point]
+            x, y = factor * sums[point]
             text = (
-                f"the residuals of point {block.point_ids[point]} do not balance: they sum to {x:.1f} um in x"
-                f" and {y:.1f} um in y; is its control, or one of its images, wrong?"
+                f"the residuals of point {block.point_ids[point]} do not balance: they sum to {x:.1f} {unit}"
+                f" in x and {y:.1f} {unit} in y; is its control, or one of its images, wrong?"
             )
             section.findings.append(Finding("unbalanced-point", "look", text, [], [block.point_ids[point]]))
 
@@ -109,11 +122,12 @@ def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
     return list(patterns), np.stack([np.column_stack(each) for each in patterns.values()], axis=1)
 
 
-def _frame_pattern(result: Result, spread: float, section: Section) -> None:
+def _frame_pattern(result: Result, plain: Block, spread: float, section: Section) -> None:
     """Look for a pattern that all photos share: lens, film, or the reduction of the plates."""
     block, used = result.block, result.used_images
-    size = frame_radius(block)
-    names, terms = _terms(block.image_xy[used], size)
+    size = frame_radius(plain)
+    unit, factor = small_unit(block.image_unit)
+    names, terms = _terms(plain.image_xy[used], size)
     sd = block.image_sd[used]
     usual = float(np.median(sd))
     limit = critical(len(names))
@@ -125,41 +139,43 @@ def _frame_pattern(result: Result, spread: float, section: Section) -> None:
         amplitude = float((design * (result.residuals[used] / sd)).sum()) / norm
         significance = abs(amplitude) * math.sqrt(norm) / spread
         section.lines.append(
-            f"{f'pattern of all photos, {name}':<50}{1000 * amplitude:.2f} um at {size:.0f} mm from the"
-            f" centre ({significance:.1f} standard deviations)"
+            f"{f'pattern of all photos, {name}':<50}{factor * amplitude:.2f} {unit} at {size:.0f}"
+            f" {block.image_unit} from the centre ({significance:.1f} standard deviations)"
         )
         if significance > limit and abs(amplitude) > WORTH * usual:
             text = (
-                f"all photos share a pattern: {name}, {1000 * amplitude:.1f} um at {size:.0f} mm from the"
-                " centre; is the lens, the film or the refraction corrected?"
+                f"all photos share a pattern: {name}, {factor * amplitude:.1f} {unit} at {size:.0f}"
+                f" {block.image_unit} from the centre; is the lens, the film or the refraction corrected?"
             )
-            values = {"amplitude_um": 1000 * amplitude, "significance_sd": significance}
+            values = {f"amplitude_{unit}": factor * amplitude, "significance_sd": significance}
             section.findings.append(Finding("systematic-pattern", "look", text, values=values))
 
 
-def _photo_patterns(result: Result, spread: float, section: Section) -> None:
+def _photo_patterns(result: Result, plain: Block, spread: float, section: Section) -> None:
     """Test the residuals of each photo for the mean and the same patterns."""
     block = result.block
     rows = np.flatnonzero(result.used_images)
     rows = rows[np.argsort(block.image_photos[rows], kind="stable")]
     bounds = np.searchsorted(block.image_photos[rows], np.arange(len(block.photo_ids) + 1)).tolist()
-    size = frame_radius(block)
+    size = frame_radius(plain)
+    unit, factor = small_unit(block.image_unit)
     limit, tested = critical(len(block.photo_ids)), 0
     for photo, (first, last) in enumerate(pairwise(bounds)):
         own = rows[first:last]
         if len(own) < FEWEST:
             continue
         tested += 1
-        significance = _own_pattern(result, own, size, spread)
+        significance = _own_pattern(result, plain, own, size, spread)
         if significance > limit:
-            name, mean = block.photo_ids[photo], 1000 * result.residuals[own].mean(axis=0)
+            name, mean = block.photo_ids[photo], factor * result.residuals[own].mean(axis=0)
             text = (
-                f"the residuals of photo {name} have a pattern (mean {mean[0]:.1f} um in x, {mean[1]:.1f} um"
-                f" in y; {significance:.1f} standard deviations): look at its preprocessing"
+                f"the residuals of photo {name} have a pattern (mean {mean[0]:.1f} {unit} in x,"
+                f" {mean[1]:.1f} {unit} in y; {significance:.1f} standard deviations): look at its"
+                " preprocessing"
             )
             values = {
-                "mean_x_um": float(mean[0]),
-                "mean_y_um": float(mean[1]),
+                f"mean_x_{unit}": float(mean[0]),
+                f"mean_y_{unit}": float(mean[1]),
                 "significance_sd": significance,
             }
             section.findings.append(Finding("photo-pattern", "look", text, [name], [], values))
@@ -168,10 +184,10 @@ def _photo_patterns(result: Result, spread: float, section: Section) -> None:
     )
 
 
-def _own_pattern(result: Result, rows: Indices, size: float, spread: float) -> float:
+def _own_pattern(result: Result, plain: Block, rows: Indices, size: float, spread: float) -> float:
     """Return how significant mean and patterns of some images of a photo are, in standard deviations."""
     block = result.block
-    _, terms = _terms(block.image_xy[rows], size)
+    _, terms = _terms(plain.image_xy[rows], size)
     means = np.broadcast_to(np.eye(2), (len(rows), 2, 2))
     design = np.concatenate([means, terms], axis=1) / block.image_sd[rows][:, np.newaxis]
     design = design.transpose(0, 2, 1).reshape(2 * len(rows), -1)

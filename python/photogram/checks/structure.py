@@ -6,6 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.checks.findings import Finding, Section
+from photogram.checks.words import Words
 from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.structuring import structure
@@ -16,7 +17,7 @@ from photogram.results.result import Result
 __all__ = ["parts_of", "structure_section"]
 
 
-def structure_section(block: Block, result: Result | None) -> Section:
+def structure_section(block: Block, result: Result | None, words: Words) -> Section:
     """Describe rays, ties and bandwidth; name photos with few ties, and parts that share no point.
 
     Parameters
@@ -25,10 +26,17 @@ def structure_section(block: Block, result: Result | None) -> Section:
         The block as it was read.
     result
         Its adjustment, for the order that the program chose.
+    words
+        What things are called.
     """
     section = Section(
         "Structure",
-        "Points tie photos together; the order of FRAMES makes the bandwidth of the 1987 program.",
+        "Points tie photos together"
+        + (
+            f"; the order of {words.order} makes the bandwidth of the 1987 program."
+            if words.bandwidth
+            else "."
+        ),
     )
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     counts = np.bincount(block.image_photos, minlength=len(block.photo_ids))
@@ -38,7 +46,8 @@ def structure_section(block: Block, result: Result | None) -> Section:
         f"{'points on a photo, least, median, most':<50}"
         f"{counts.min()}, {np.median(counts):.0f}, {counts.max()}"
     )
-    _bandwidths(block, result, section)
+    if words.bandwidth:
+        _bandwidths(block, result, section)
     tied = ties(block)
     for photo in np.flatnonzero(tied < FEWEST_TIES).tolist():
         name = block.photo_ids[photo]

@@ -20,6 +20,7 @@ from photogram.cli.options import (
     PlotFormat,
     Plots,
     Quiet,
+    Strict,
     out_option,
     picture_places,
 )
@@ -164,6 +165,7 @@ def absolute_orientation(
     ] = False,
     ground_unit: Annotated[str, typer.Option(help="Name of the unit of the control.")] = "ground unit",
     model_unit: Annotated[str, typer.Option(help="Name of the unit of the model.")] = "model unit",
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
     """Orient a model absolutely: s, A, B of x = s A X + B from full, horizontal and height control.
@@ -216,7 +218,7 @@ def absolute_orientation(
         job.conclude(
             written,
             summary=lambda: print_sections(summary(result), "the report", SHOWN),
-            good=result.usable,
+            code=result.verdict.exit_code(strict=strict),
         )
 
 

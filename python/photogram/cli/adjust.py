@@ -11,7 +11,16 @@ import typer
 
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, default_out, out_option
+from photogram.cli.options import (
+    JsonFile,
+    Ordering,
+    OrderingName,
+    Quiet,
+    Strict,
+    Threads,
+    default_out,
+    out_option,
+)
 from photogram.cli.progress import shown
 from photogram.cli.projects import (
     EXAMPLE,
@@ -109,6 +118,7 @@ def adjust(
     ] = None,
     ordering: Ordering = OrderingName.AUTO,
     threads: Threads = None,
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
     """Adjust a block in whatever files it lies: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...
@@ -139,12 +149,11 @@ def adjust(
                 print_remark(remark)
         result = _adjusted(job, project, block, datum, loss, ordering, threads)
         files = _files(project, result, sections)
-        good = result.converged
         job.finish(
             {target / name: content for name, content in files.items()},
             {} if json is None else {json: result.to_json()},
             summary=lambda: print_sections(_summary(result), "report.txt"),
-            good=good,
+            code=result.verdict.exit_code(strict=strict),
         )
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import output
+from photogram.cli.console import NOT_CONVERGED, output
 from photogram.cli.job import Job, Reads, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
 
@@ -46,5 +46,5 @@ def check(
         job.finish(
             {} if json is None else {json: found.to_json()},
             summary=lambda: output.print(escape(found.report()), end=""),
-            good=not found.grave,
+            code=NOT_CONVERGED if found.grave else 0,
         )

@@ -10,7 +10,7 @@ import typer
 
 from photogram.cli.console import print_sections
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, out_option
+from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Strict, Threads, out_option
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -88,6 +88,7 @@ def collection(
     ] = True,
     ordering: Ordering = OrderingName.AUTO,
     threads: Threads = None,
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
     """Adjust photos of unknown cameras by Levenberg-Marquardt steps, however far the start."""
@@ -128,4 +129,8 @@ def collection(
             written[json] = result.to_json()
         sections = [("File", [f"{problem}: {found.title}"]), *summary(result)]
         whole = (section for section in sections if section[1])
-        job.finish(written, summary=lambda: print_sections(whole, "the report"), good=result.converged)
+        job.finish(
+            written,
+            summary=lambda: print_sections(whole, "the report"),
+            code=result.verdict.exit_code(strict=strict),
+        )

@@ -122,11 +122,12 @@ def comparator(
     """Calibrate a comparator from measurements of a grid plate.
 
     Writes listing.txt, report.html (pictures), correction.json and the corrected grid of each plate. Where
-    outliers make the correction unusable, correction and grid are withheld, and the exit code is 3.
+    outliers make the correction unusable, correction and grid are withheld, and the exit code is 4.
     """
     with job:
         from photogram.comparator import Options, calibrate, find_grid, read
         from photogram.errors import InputError
+        from photogram.statistics.verdict import worst
 
         if example:
             paths = [job.packaged(*EXAMPLE)]
@@ -149,11 +150,10 @@ def comparator(
         drawn = plots if pictures is None else pictures
         written = _results(calibrations, folder, _run_date(date), pdf=pdf, pictures=drawn, quiet=quiet)
         documents = {json: _documents(calibrations)} if json is not None else {}
-        usable = all(calibration.usable for calibration in calibrations)
         job.write(written, documents)
-        if not usable:
-            _withheld(calibrations, folder)
-        job.conclude([*written, *documents], summary=lambda: _summarize(calibrations), good=usable)
+        _withheld(calibrations, folder)
+        code = worst(calibration.verdict for calibration in calibrations)
+        job.conclude([*written, *documents], summary=lambda: _summarize(calibrations), code=code)
 
 
 def _withheld(calibrations: list[Calibration], folder: Path) -> None:
@@ -250,6 +250,8 @@ def _summarize_one(calibration: Calibration) -> None:
 
     session = calibration.session
     output.print(f"[bold]Comparator {session.comparator}, {len(calibration.cases)} cases[/]")
+    output.print("[bold]Verdict[/]")
+    output.print(f"  {escape(calibration.verdict.headline)}")
     output.print("[bold]Problems[/]")
     for text in [message.text for message in calibration.messages] or ["none"]:
         output.print(f"  {escape(text)}")

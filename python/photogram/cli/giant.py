@@ -11,7 +11,16 @@ from rich.markup import escape
 
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Threads, default_out, out_option
+from photogram.cli.options import (
+    JsonFile,
+    Ordering,
+    OrderingName,
+    Quiet,
+    Strict,
+    Threads,
+    default_out,
+    out_option,
+)
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
@@ -101,6 +110,7 @@ def giant(
             show_default=False,
         ),
     ] = None,
+    strict: Strict = False,
     quiet: Quiet = False,
     overwrite: Annotated[
         bool,
@@ -147,7 +157,7 @@ def giant(
             written,
             documents,
             summary=lambda: print_sections(summary(result), "report.txt"),
-            good=result.converged,
+            code=result.verdict.exit_code(strict=strict),
         )
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
-from photogram.cli.console import NOT_CONVERGED, errors, failures, print_remark, print_written
+from photogram.cli.console import errors, failures, print_remark, print_written
 from photogram.messages import printable
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ class Job:
                     outputs.write(path, content)
 
     def finish(
-        self, *results: Mapping[Path, bytes], summary: Callable[[], None] | None = None, good: bool = True
+        self, *results: Mapping[Path, bytes], summary: Callable[[], None] | None = None, code: int = 0
     ) -> None:
         """Write the results, as :meth:`write` does, then show what they are, and end.
 
@@ -153,22 +153,22 @@ class Job:
             Contents of files.
         summary
             Prints what a reader wants first.
-        good
-            Whether the job ends with the exit code 0; else with 3.
+        code
+            The exit code with which the job ends.
         """
         self.write(*results)
-        self.conclude([path for each in results for path in each], summary=summary, good=good)
+        self.conclude([path for each in results for path in each], summary=summary, code=code)
 
     def conclude(
-        self, written: Iterable[Path], *, summary: Callable[[], None] | None = None, good: bool = True
+        self, written: Iterable[Path], *, summary: Callable[[], None] | None = None, code: int = 0
     ) -> None:
         """Show what was found and written, and end; see :meth:`finish`."""
         if not self.quiet:
             if summary is not None:
                 summary()
             print_written(written)
-        if not good:
-            raise typer.Exit(NOT_CONVERGED)
+        if code:
+            raise typer.Exit(code)
 
     @contextmanager
     def status(self, text: str) -> Iterator[Status | None]:

@@ -20,6 +20,7 @@ __all__ = [
     "PlotFormat",
     "Plots",
     "Quiet",
+    "Strict",
     "Threads",
     "default_out",
     "out_option",
@@ -48,6 +49,10 @@ FormerPlot = Annotated[
     Path | None, Writes.FILE, Former("say --out DIR --plots"), typer.Option("--plot", hidden=True)
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+
+Strict = Annotated[
+    bool, typer.Option("--strict", help="End with exit code 4 also where the verdict is a warning.")
+]
 
 
 class OrderingName(StrEnum):

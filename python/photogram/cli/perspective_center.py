@@ -18,6 +18,7 @@ from photogram.cli.options import (
     PlotFormat,
     Plots,
     Quiet,
+    Strict,
     out_option,
     picture_places,
 )
@@ -74,6 +75,7 @@ def perspective_center(
         Weights,
         typer.Option(help="Of the points: equal, number of readings, or standard deviations of readings."),
     ] = Weights.EQUAL,
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
     """Determine perspective centre, attitude and distortion of projectors from grid measurements.
@@ -82,6 +84,7 @@ def perspective_center(
     """
     with job:
         from photogram.perspective_center import run_deck
+        from photogram.statistics.verdict import worst
 
         if deck is None:
             deck = job.packaged(*EXAMPLE)
@@ -94,7 +97,7 @@ def perspective_center(
         job.finish(
             _files(run, json, listings, pictures),
             summary=lambda: _summarize(run),
-            good=run.converged or stopped,
+            code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
         )
         if run.stop is not None:
             raise run.stop.error

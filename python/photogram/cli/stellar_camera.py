@@ -10,7 +10,16 @@ import typer
 
 from photogram.cli.console import print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, PictureFormat, PlotFormat, Plots, Quiet, Threads, out_option
+from photogram.cli.options import (
+    JsonFile,
+    PictureFormat,
+    PlotFormat,
+    Plots,
+    Quiet,
+    Strict,
+    Threads,
+    out_option,
+)
 
 if TYPE_CHECKING:
     from photogram.stellar.night import CalibratedNight
@@ -49,6 +58,7 @@ def stellar_camera(
     ] = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a camera by a plate with images of stars (NOAA Technical Report NOS 55).
@@ -56,6 +66,7 @@ def stellar_camera(
     `photogram stellar-camera exposures` does so by digital exposures of the sky.
     """
     with job:
+        from photogram.statistics.verdict import worst
         from photogram.stellar import calibrate
         from photogram.stellar.document import to_json
 
@@ -81,7 +92,7 @@ def stellar_camera(
             written,
             documents,
             summary=lambda: _summarize(results),
-            good=all(result.converged for result in results),
+            code=worst((result.verdict for result in results), strict=strict),
         )
 
 
@@ -106,6 +117,7 @@ def exposures(
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
     threads: Threads = None,
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a digital camera by exposures of the sky: pinhole and Brown distortion (needs pyerfa)."""
@@ -126,7 +138,7 @@ def exposures(
             written,
             documents,
             summary=lambda: print_sections(summary(result), "the report"),
-            good=result.usable,
+            code=result.verdict.exit_code(strict=strict),
         )
 
 

@@ -1,7 +1,13 @@
 """Collections of photos of unknown cameras: bundle adjustment "in the large"."""
 
 from photogram.arguments.annotations import check_arguments
-from photogram.collection import document, report, tables  # noqa: F401  (the ways to show a result)
+from photogram.collection import (  # noqa: F401  (the ways to show a result, and what works on it)
+    components,
+    document,
+    findings,
+    report,
+    tables,
+)
 from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection

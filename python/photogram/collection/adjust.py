@@ -14,11 +14,11 @@ from photogram.adjustment.ends import hidden, rounded, too_coarse
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
+from photogram.collection.core import CollectionOptions, collection_network
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
-from photogram.memory import available_memory
 from photogram.messages import Message, listed
 
-__all__ = ["adjust"]
+__all__ = ["adjust", "adjusted"]
 
 
 def adjust(
@@ -93,36 +93,34 @@ def adjust(
         tolerance = 1e-8 if loss is None else 1e-6
     if not tolerance > 0:
         raise InputError("the criterion of convergence must be positive")
-    row = loss_row(loss, scale)
+    options = CollectionOptions(tolerance, max_iterations, covariance, loss_row(loss, scale), ordering)
+    return adjusted(collection, options, threads=threads, progress=progress)
+
+
+def adjusted(
+    collection: Collection,
+    options: CollectionOptions,
+    *,
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    start: _photocore.BlockState | None = None,
+) -> AdjustedCollection:
+    """Adjust a collection, perhaps from where an adjustment of it has ended."""
     try:
-        solution = _photocore.adjust_collection(
-            collection.camera,
-            collection.photo_parameters,
-            collection.photo_sd,
-            collection.point_positions,
-            collection.point_sd,
-            collection.image_photos,
-            collection.image_points,
-            collection.image_xy,
-            collection.image_sd,
-            decrease=tolerance,
-            max_iterations=max_iterations,
-            covariance=covariance,
-            loss=row,
-            ordering=ordering,
-            threads=core_threads(threads),
-            memory=available_memory(),
-            progress=None if progress is None else teller(progress),
-        )
+        network = collection_network(collection, options)
+        told = None if progress is None else teller(progress)
+        solution = network.adjust(threads=core_threads(threads), progress=told, start=start)
     except _photocore.CollectionError as error:
         raise _named(*error.args) from None
     return AdjustedCollection.taken_over(
         solution,
         collection=collection,
-        messages=_messages(solution, collection) + remark(row, solution.image_weights),
-        loss=row,
+        messages=_messages(solution, collection) + remark(options.loss, solution.image_weights),
+        loss=options.loss,
         weighted_sum_of_squares=solution.sum_of_squares,
         datum=[(photo, collection.parameters[parameter]) for photo, parameter in solution.datum],
+        options=options,
+        state=solution.state,
     )
 
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
+from photogram.collection.core import CollectionOptions
 from photogram.results.network import AdjustedNetwork
 
 if TYPE_CHECKING:
-    pass
+    from photogram import _photocore
 
 __all__ = ["AdjustedCollection"]
 
@@ -38,6 +39,8 @@ class AdjustedCollection(AdjustedNetwork):
         (n,) how many image points have the point behind the camera.
     datum
         Photos and parameters that were held to give the cofactors a datum.
+    options, state
+        How the core adjusted the collection, and where that ended.
     """
 
     collection: Collection
@@ -46,6 +49,8 @@ class AdjustedCollection(AdjustedNetwork):
     photo_images: Indices
     point_rays_behind: Indices
     datum: list[tuple[int, str]]
+    options: CollectionOptions
+    state: _photocore.BlockState
 
     @property
     def cost(self) -> float:
@@ -57,6 +62,11 @@ class AdjustedCollection(AdjustedNetwork):
     def image_points(self) -> Indices:
         """(m,) the point of each image."""
         return self.collection.image_points
+
+    @property
+    def image_given_sd(self) -> Floats:
+        """(m, 2) standard deviations a priori of the image coordinates."""
+        return self.collection.image_sd
 
     @property
     def photo_given_sd(self) -> Floats:

@@ -55,6 +55,7 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         "degrees_of_freedom": result.degrees_of_freedom,
         "variance_of_unit_weight": result.variance_of_unit_weight,
         "covariance_scale": result.covariance_scale,
+        "verdict": result.verdict.document(),
         "datum": [{"photo": photo, "parameter": parameter} for photo, parameter in result.datum],
         "camera": result.collection.camera,
         "parameters": result.collection.parameters,

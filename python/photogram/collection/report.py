@@ -3,30 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.results.observed import image_lines, observed_lines, tested
-from photogram.show.sections import Section, composed, headline, problems
+from photogram.collection.findings import names, tested_observations
+from photogram.results.observed import image_lines, observed_lines
+from photogram.show.sections import Section, composed, headline, problems, verdict_section
 from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
 from photogram.statistics.outliers import outliers
+from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["report", "summary"]
 
 SUSPECTS = 20
 """Image points with large standardized residuals that are listed at most."""
 NOTABLE = 3.0
-"""Standard deviations."""
+"""What is listed, not what decides: the limit of the tests stands in the verdict."""
 
 
 @report_of.register(AdjustedCollection)
 def report(result: AdjustedCollection) -> str:
     """Return the report of an adjusted collection."""
-    (photos, points), heads = _numbers(result), _heads(result)
+    (photos, points), heads = names(result), _heads(result)
     sections = [
         *summary(result),
         ("Iterations", _iterations(result)),
@@ -47,11 +48,12 @@ def report(result: AdjustedCollection) -> str:
 
 
 def summary(result: AdjustedCollection) -> list[Section]:
-    """Return what a reader wants first, as titled sections: problems, adjustment, suspects."""
+    """Return what a reader wants first, as titled sections: verdict, problems, adjustment, suspects."""
     return [
+        verdict_section(result.verdict),
         ("Problems", _problems(result)),
         ("Adjustment", _adjustment(result)),
-        (f"Image points with |standardized residual| > {NOTABLE:g} sigma0, largest first", _suspects(result)),
+        (f"Image points with |t| > {NOTABLE:g} (externally studentized), largest first", _suspects(result)),
     ]
 
 
@@ -60,10 +62,11 @@ def _problems(result: AdjustedCollection) -> list[str]:
 
     Standard deviations of pixels are guesses: single residuals are tested against all others.
     """
-    collection, omega, freedom = result.collection, result.weighted_sum_of_squares, result.degrees_of_freedom
-    photos, points = _numbers(result)
-    groups = tested(result, collection.image_photos, photos, points, collection.parameters, "XYZ")
-    groups = [replace(each, values=externally_studentized(each.values, omega, freedom)) for each in groups]
+    omega, freedom = result.weighted_sum_of_squares, result.degrees_of_freedom
+    groups = [
+        replace(each, values=externally_studentized(each.values, omega, freedom))
+        for each in tested_observations(result)
+    ]
     found = outliers(
         groups, lambda tests: studentized_limit(freedom, tests), "externally studentized residuals"
     )
@@ -103,14 +106,14 @@ def _adjustment(result: AdjustedCollection) -> list[str]:
 
 def _suspects(result: AdjustedCollection) -> list[str]:
     """List the image points that fit worst, in units of what the others have."""
-    sigma0 = math.sqrt(result.covariance_scale)
-    with np.errstate(invalid="ignore"):
-        test = np.abs(result.standardized).max(axis=1) / sigma0 if sigma0 > 0 else np.zeros(0)
-        worst = np.flatnonzero(test > NOTABLE)
+    w = np.where(result.redundancy > TESTABLE, result.standardized, math.nan)
+    t = externally_studentized(w, result.weighted_sum_of_squares, result.degrees_of_freedom)
+    test = np.nan_to_num(np.abs(t), posinf=math.inf).max(axis=1, initial=0.0)
+    worst = np.flatnonzero(test > NOTABLE)
     worst = worst[np.argsort(-test[worst], kind="stable")]
     if not len(worst):
         return []
-    lines = ["  photo    point     x, px     y, px   /sigma0  weight"]
+    lines = ["  photo    point     x, px     y, px       |t|  weight"]
     for image in worst[:SUSPECTS]:
         photo, point = result.collection.image_photos[image], result.collection.image_points[image]
         x, y = result.residuals[image]
@@ -132,14 +135,7 @@ def _iterations(result: AdjustedCollection) -> list[str]:
 
 
 def _images(result: AdjustedCollection) -> list[str]:
-    return image_lines(result, result.collection.image_photos, *_numbers(result), "px")
-
-
-def _numbers(result: AdjustedCollection) -> tuple[Sequence[str], Sequence[str]]:
-    """Return what photos and points are called: numbers from 0."""
-    return [str(photo) for photo in range(len(result.photo_parameters))], [
-        str(point) for point in range(len(result.point_positions))
-    ]
+    return image_lines(result, result.collection.image_photos, *names(result), "px")
 
 
 def _heads(result: AdjustedCollection) -> list[str]:

@@ -45,6 +45,7 @@ from photogram.comparator.variance import VarianceAnalysis, analyse_variance
 from photogram.errors import AdjustmentError
 from photogram.memory import require
 from photogram.messages import Message
+from photogram.show.ways import Judged
 
 if TYPE_CHECKING:
     from photogram.comparator.readings import Session
@@ -119,7 +120,7 @@ class PlateResult:
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class Calibration(Judged):
     """A calibrated comparator.
 
     Attributes

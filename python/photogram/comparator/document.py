@@ -61,6 +61,7 @@ def to_document(calibration: Calibration) -> dict[str, Any]:
         "conventions": CONVENTIONS,
         "messages": [str(message) for message in calibration.messages],
         "usable": calibration.usable,
+        "verdict": calibration.verdict.document(),
         "screening": asdict(calibration.screening),
         "far_pointings": [asdict(pointing) for pointing in calibration.far_pointings],
         "linear": {

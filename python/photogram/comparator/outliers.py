@@ -114,12 +114,18 @@ class Screening:
         rotation and translation. 0 without outliers.
     sigma_um
         Standard deviation of unit weight of the adjustment without them.
+    ratios
+        Of each case, (k, 2): the test values of all its points before any was taken out, without signs.
+    freedom
+        Degrees of freedom of that adjustment.
     """
 
     outliers: tuple[Outlier, ...]
     limit: float
     change_um: float
     sigma_um: float
+    ratios: tuple[Floats, ...]
+    freedom: float
 
     @property
     def harmful(self) -> bool:
@@ -177,8 +183,11 @@ def screen(
     kept = list(cases)
     removed: list[tuple[int, int, float]] = []
     clean, limit = stage, math.inf
+    first: tuple[tuple[Floats, ...], float] | None = None
     for _ in range(ROUNDS):
-        ratios, freedom = _ratios(kept, clean)
+        tests, freedom = _ratios(kept, clean)
+        first = first or (tuple(tests), freedom)
+        ratios = [own.max(axis=1) for own in tests]
         limit = studentized_limit(freedom, 2 * sum(len(own) for own in ratios))
         worst = max(float(own.max()) for own in ratios)
         if not worst > limit:
@@ -198,13 +207,15 @@ def screen(
         _outlier(cases[k], grids[cases[k].case.plate], clean, k, point, ratio)
         for k, point, ratio in sorted(removed)
     )
-    return Screening(outliers, limit, _change(stage, clean, cases) if outliers else 0.0, clean.sigma0_um)
+    change = _change(stage, clean, cases) if outliers else 0.0
+    assert first is not None
+    return Screening(outliers, limit, change, clean.sigma0_um, *first)
 
 
 def _ratios(
     cases: Sequence[PlacedCase], stage: CombinedLinear | CombinedPolynomial
 ) -> tuple[list[Floats], float]:
-    """Return externally studentized residuals of each case, of every point the larger one (absolute).
+    """Return externally studentized residuals of each case, (k, 2) without signs.
 
     And the degrees of freedom: the trace of R R^T.
     """
@@ -217,7 +228,7 @@ def _ratios(
     ratios = externally_studentized(w, float((residuals**2).sum()), freedom)
     ratios[~checked | (np.abs(residuals) <= LEAST_UM) | np.isnan(ratios)] = 0.0
     ends = np.cumsum([len(case.points) for case in cases])[:-1]
-    return np.split(np.abs(ratios).max(axis=1), ends), freedom
+    return np.split(np.abs(ratios), ends), freedom
 
 
 def _without(case: PlacedCase, out: Bools) -> PlacedCase:

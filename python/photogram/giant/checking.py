@@ -1,37 +1,43 @@
-"""The check of a project: Appendix H of the guide (editing and run strategy) as a report."""
+"""The check of a project: that of its block, in the words of the guide, with the remarks on its files."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
-from photogram.adjustment.hints import hints
-from photogram.checks.editing import HOPELESS, Edited, blunder_section, edit
+from photogram.arguments.types import Bools
+from photogram.checks.checking import Manner, check_block
+from photogram.checks.checking import check as check_network
 from photogram.checks.findings import Check, Finding, Section
-from photogram.checks.gross import Suspects, disproved, gross, without
-from photogram.checks.heights import two_ray_heights
-from photogram.checks.orientation import orientation, spare_explained
-from photogram.checks.residuals import residuals
-from photogram.checks.stations import stations
-from photogram.checks.structure import structure_section
-from photogram.giant.control import control, key_numbers
+from photogram.checks.words import Words
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
+from photogram.giant.project import Project
 from photogram.network.block import Block
-from photogram.network.rays import Rays
-
-if TYPE_CHECKING:
-    from photogram.giant.project import Project
 
 __all__ = ["check"]
 
-FINAL_STATIONS = 5.0
-"""Stations count as adjusted when half the residuals are below so many standard deviations."""
 NAMES_ON_A_LINE = 4
 """As the 1987 program printed them."""
+CODES = np.array([1, 2, 4])
+
+
+class _GuideWords(Words):
+    """Words of the guide."""
+
+    sense = "COMMON column 2"
+    order = "FRAMES"
+    usual_um = (5.0, 15.0)
+    bandwidth = True
+
+    def unhold(self, kept: Bools) -> str:
+        return f"lower the type (column 80: {_type_code(kept)})"
+
+    def values(self, kept: Bools) -> dict[str, float]:
+        return {"type_code": float(_type_code(kept))}
+
+
+def _type_code(kept: Bools) -> int:
+    return int(CODES[~kept].sum())
 
 
 def check(project: Project, *, limits: Limits | None = None, threads: int | None = None) -> Check:
@@ -59,51 +65,16 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
         The project makes no block.
     """
     block = project.to_block(limits)
-    # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _checked(project, block, limits, threads)
-
-
-def _checked(project: Project, block: Block, limits: Limits | None, threads: int | None) -> Check:
-    upright, oriented = orientation(block)
-    if oriented is block:
-        upright.findings += [Finding("convention", "grave", str(hint)) for hint in hints(block)]
-    errors, suspects = gross(oriented)
-    if suspects.photos.any():
-        spare_explained(upright, oriented, suspects.photos)
-    edited = _edited(project, oriented, suspects, threads)
-    misleading: set[str] = set()
-    if edited.last is not None and edited.last.converged and edited.spread < HOPELESS:
-        cleared = disproved(oriented, suspects, edited.last)
-        if cleared.any():
-            suspects = replace(suspects, images=suspects.images & ~cleared)
-            points = oriented.image_points[cleared]
-            on = oriented.image_photos[np.isin(oriented.image_points, points)]
-            misleading = {oriented.photo_ids[photo] for photo in on.tolist()}
-            errors.findings = without(oriented, errors.findings, cleared)
-            edited = _edited(project, oriented, suspects, threads)
-    # What the adjustment has explained or disproved.
-    settled = {name for pair in edited.exchanged for name in pair} | set(edited.cleared)
-    errors.findings = [
-        each for each in errors.findings if each.kind != "control-difference" or not settled & {*each.points}
-    ]
-    sections = [_input(project, block, limits), structure_section(block, edited.first), upright, errors]
-    sections += [edited.section, *_after_adjustment(oriented, edited, misleading)]
-    return Check(project.title, sections, edited.last)
-
-
-def _edited(project: Project, block: Block, suspects: Suspects, threads: int | None) -> Edited:
-    """Adjust the block, or intersect it when that is the job and its stations are good enough."""
     common = project.common
-    options: dict[str, Any] = {"unit_variance": common.unit_variance, "threads": threads}
-    if not common.intersection_only:
-        return edit(block, suspects, **options)
-    met = Rays.of(block).intersect()
-    ratio = met.sizes / block.image_sd.mean(axis=1)
-    if np.isfinite(ratio).any() and np.nanmedian(ratio) < FINAL_STATIONS:
-        return edit(block, suspects, **options, fix_photos=True)
-    reason = "COMMON column 10 asks for intersection only, and the stations are not adjusted ones"
-    return Edited(None, None, reason, math.nan, blunder_section(), asked=False)
+    why = "COMMON column 10 asks for intersection only" if common.intersection_only else ""
+    options = {"unit_variance": common.unit_variance, "threads": threads}
+    sections, result = check_block(block, Manner(options, _GuideWords(), why))
+    return Check(project.title, [_input(project, block, limits), *sections], result)
+
+
+@check_network.register
+def _(network: Project, *, threads: int | None = None) -> Check:
+    return check(network, threads=threads)
 
 
 def _input(project: Project, block: Block, limits: Limits | None) -> Section:
@@ -124,17 +95,3 @@ def _input(project: Project, block: Block, limits: Limits | None) -> Section:
         text = f"{warning.heading.lower()}: {len(warning.names)}"
         section.findings.append(Finding("warning", "look", text, [], warning.names))
     return section
-
-
-def _after_adjustment(block: Block, edited: Edited, misleading: set[str]) -> list[Section]:
-    """Return the sections that rest on the adjustment, as far as there is one."""
-    result = edited.last
-    if result is None or not result.converged:
-        return [stations(block, None), key_numbers(edited)]
-    return [
-        control(edited),
-        stations(block, result, misleading),
-        residuals(result, edited.spread),
-        two_ray_heights(result),
-        key_numbers(edited),
-    ]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.network.block import Block
 
-__all__ = ["direction_deviations", "image_directions", "without_lenses"]
+__all__ = ["direction_deviations", "image_directions", "seen_without_lenses", "without_lenses"]
 
 _SIDE = -0.02
 """u3 of unit directions that are seen well in front of the camera."""
@@ -38,8 +38,13 @@ def without_lenses(block: Block) -> Block:
     be in another unit) lenses are left out, and cameras are everywhere what they are near the axis; else
     images without a direction in front of the camera are left out.
     """
+    return seen_without_lenses(block)[0]
+
+
+def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
+    """Return the block of :func:`without_lenses`, and (m,) which of the images it has."""
     if not block.cameras or block.photo_cameras is None:
-        return block
+        return block, np.ones(len(block.image_xy), dtype=bool)
     directions = image_directions(block)
     seen = directions[:, 2] < _SIDE
     if 2 * np.count_nonzero(seen) < len(seen):
@@ -47,7 +52,7 @@ def without_lenses(block: Block) -> Block:
     else:
         tangents = -directions[:, :2] / directions[:, 2:]
     scales = block.camera_scales()
-    return block.replace(
+    plain = block.replace(
         cameras=(),
         photo_cameras=None,
         principal_distances=-scales,
@@ -56,6 +61,7 @@ def without_lenses(block: Block) -> Block:
         image_xy=(scales[block.image_photos, np.newaxis] * tangents)[seen],
         image_sd=block.image_sd[seen],
     )
+    return plain, seen
 
 
 def _near_axis(block: Block) -> Floats:

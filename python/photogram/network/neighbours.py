@@ -6,18 +6,20 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 
-__all__ = ["mutually_nearest"]
+__all__ = ["mutually_nearest", "nearest"]
 
 
 def mutually_nearest(points: Floats, predicted: Floats, limit: float) -> Indices:
     """Return for each point its mutually nearest predicted one within a limit; else -1."""
-    found, back = _nearest(points, predicted, limit), _nearest(predicted, points, limit)
+    found, back = nearest(points, predicted, limit), nearest(predicted, points, limit)
     mutual = (found >= 0) & (back[found] == np.arange(len(points))) if len(predicted) else found >= 0
     return np.where(mutual, found, -1)
 
 
-def _nearest(points: Floats, others: Floats, limit: float) -> Indices:
+def nearest(points: Floats, others: Floats, limit: float, but: Indices | None = None) -> Indices:
     """Return for each point the nearest of the others within a limit, -1 for none.
+
+    `but` names for each point one of the others that does not count.
 
     The others are sorted into cells as wide as the limit, so that only nine cells are searched.
     """
@@ -39,5 +41,7 @@ def _nearest(points: Floats, others: Floats, limit: float) -> Indices:
             point, other = inside[here], order[first[here] + k]
             square = np.sum((points[point] - others[other]) ** 2, axis=1)
             nearer = square <= least[point]
+            if but is not None:
+                nearer &= other != but[point]
             best[point[nearer]], least[point[nearer]] = other[nearer], square[nearer]
     return best

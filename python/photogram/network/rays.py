@@ -112,6 +112,8 @@ class Rays:
         (P, 3, 3) rotations from the photos to the metric axes.
     used
         (m,) the images that count.
+    unit
+        What the image coordinates of the block are called in reports.
     """
 
     block: Block
@@ -119,13 +121,14 @@ class Rays:
     centres: Floats
     cameras: Floats
     used: Bools
+    unit: str = "mm"
 
     @classmethod
-    def of(cls, block: Block, used: Bools | None = None) -> Rays:
+    def of(cls, block: Block, used: Bools | None = None, unit: str = "mm") -> Rays:
         """Return the rays of a block from its initial stations."""
         axes = local_axes(block)
         used = np.ones(len(block.image_xy), dtype=bool) if used is None else used
-        return cls(block, axes, axes.positions(block.photo_positions), axes.cameras(), used)
+        return cls(block, axes, axes.positions(block.photo_positions), axes.cameras(), used, unit)
 
     def without(self, images: Bools) -> Rays:
         """Return the rays with some images left out."""

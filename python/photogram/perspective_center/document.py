@@ -54,6 +54,7 @@ def _set(result: PerspectiveCenter) -> dict[str, Any]:
             "limit": result.limit if math.isfinite(result.limit) else None,
             "outliers": [[result.grid.ids[row], "XY"[axis]] for row, axis in result.outliers],
         },
+        "verdict": result.verdict.document(),
         "converged": result.converged,
         "iterations": len(result.cycles),
         "points": _points(result),

@@ -19,6 +19,7 @@ def summary(result: PerspectiveCenter) -> list[str]:
         f"{grid.title}, data set {grid.number}: {len(grid.ids)} points, {int(grid.readings.sum())} readings,"
         f" {how}, {len(result.cycles)} iterations"
     ]
+    lines.append(f"  verdict: {result.verdict.headline}")
     if not result.converged:
         lines.append(f"  {NOT_CONVERGED}")
     errors = result.standard_errors

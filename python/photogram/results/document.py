@@ -11,7 +11,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.report import problems_of
-from photogram.results.result import Result
+from photogram.results.result import Result, SumsByKind
 from photogram.show.ways import document_of
 
 if TYPE_CHECKING:
@@ -58,17 +58,13 @@ def _document(result: Result) -> dict[str, Any]:
             }
             for iteration in result.iterations
         ],
-        "weighted_sum_of_squares": {
-            "camera": sums.camera,
-            "ground": sums.ground,
-            "plates": sums.plates,
-            "observations": sums.observations,
-            "total": sums.total,
-        },
+        "weighted_sum_of_squares": _by_kind(sums),
+        "redundancy": None if result.redundancies is None else _by_kind(result.redundancies),
         "degrees_of_freedom": result.degrees_of_freedom,
         "unit_variance": result.unit_variance,
         "variance_of_unit_weight": result.variance_of_unit_weight,
         "global_test": _global_test(result),
+        "verdict": result.verdict.document(),
         "covariance_scale": result.covariance_scale,
         "photos": _photos(result),
         **(
@@ -88,6 +84,16 @@ def _document(result: Result) -> dict[str, Any]:
         "predictions": dict(result.predictions),
         "operations": dict(result.operations),
         "seconds": dict(result.seconds),
+    }
+
+
+def _by_kind(sums: SumsByKind) -> dict[str, float]:
+    return {
+        "camera": sums.camera,
+        "ground": sums.ground,
+        "plates": sums.plates,
+        "observations": sums.observations,
+        "total": sums.total,
     }
 
 

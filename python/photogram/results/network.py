@@ -67,7 +67,8 @@ class AdjustedNetwork(Shown, ABC):
     initial_weighted_sum_of_squares, iterations
         The history; with a loss, sums of losses.
     degrees_of_freedom, variance_of_unit_weight
-        The variance is None without degrees of freedom; covariances are then scaled by 1.
+        The variance is None without degrees of freedom; covariances are then scaled by 1. They are a whole
+        number unless the unit variance is based on redundancy numbers.
     photo_cofactors
         (P, k, k).
     photo_redundancy
@@ -102,7 +103,7 @@ class AdjustedNetwork(Shown, ABC):
     loss: tuple[str, float] | None
     initial_weighted_sum_of_squares: float
     iterations: list[Iteration]
-    degrees_of_freedom: int
+    degrees_of_freedom: float
     variance_of_unit_weight: float | None
     photo_cofactors: Floats
     photo_redundancy: Floats
@@ -138,6 +139,11 @@ class AdjustedNetwork(Shown, ABC):
     @abstractmethod
     def image_points(self) -> Indices:
         """(m,) the point of each image."""
+
+    @property
+    @abstractmethod
+    def image_given_sd(self) -> Floats:
+        """(m, 2) standard deviations a priori of the image coordinates."""
 
     @property
     @abstractmethod

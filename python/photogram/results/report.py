@@ -10,15 +10,18 @@ import numpy as np
 
 from photogram.network.structuring import structure
 from photogram.results.calibration_report import calibration_sections
-from photogram.results.kinds import kind_lines, tested_kind
-from photogram.results.observed import image_lines, observed_lines, tested
+from photogram.results.findings import axes, tested_observations
+from photogram.results.group_sums import observables, sums_of
+from photogram.results.grouping import grouped
+from photogram.results.kinds import kind_lines
+from photogram.results.observed import image_lines, observed_lines
 from photogram.results.result import Result
 from photogram.results.unknowns import unknown_lines
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
-from photogram.show.sections import Section, composed, headline, problems
+from photogram.show.sections import Section, composed, headline, problems, verdict_section
 from photogram.show.ways import report_of
 from photogram.statistics.limits import normal_limit
-from photogram.statistics.outliers import Observations, outliers
+from photogram.statistics.outliers import outliers
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
@@ -43,6 +46,7 @@ def report(result: Result) -> str:
     """Return the report of an adjusted block."""
     sections = [
         *summary(result),
+        ("Redundancy by kind of observation", _redundancy(result)),
         ("Iterations", _iterations(result)),
         ("Check points: adjusted minus supplied", _difference_table(result, _check_differences(result))),
         (
@@ -74,8 +78,9 @@ def report(result: Result) -> str:
 
 @np.errstate(over="ignore")
 def summary(result: Result) -> list[Section]:
-    """Return what a reader wants first, as titled sections: problems, adjustment, residuals."""
+    """Return what a reader wants first, as titled sections: verdict, problems, adjustment, residuals."""
     return [
+        verdict_section(result.verdict),
         ("Problems", problems_of(result)),
         ("Adjustment", _adjustment(result)),
         ("Residuals", _residuals(result)),
@@ -85,23 +90,9 @@ def summary(result: Result) -> list[Section]:
 
 def problems_of(result: Result) -> list[str]:
     """Return what keeps a reader from using the values: a failed test and outliers before other remarks."""
-    found = outliers(_tested(result), normal_limit, "standardized residuals")
+    found = outliers(tested_observations(result), normal_limit, "standardized residuals")
     messages = [*found, *result.messages]
     return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
-
-
-def _tested(result: Result) -> list[Observations]:
-    block = result.block
-    unknowns = (*_axes(result), "omega", "phi", "kappa")
-    of_unknowns = tested(
-        result, block.image_photos, block.photo_ids, block.point_ids, unknowns, _axes(result)
-    )
-    return of_unknowns + [tested_kind(each) for each in result.kinds.values()]
-
-
-def _axes(result: Result) -> tuple[str, str, str]:
-    """Return what the coordinates are called."""
-    return ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
 
 
 def _adjustment(result: Result) -> list[str]:
@@ -109,11 +100,14 @@ def _adjustment(result: Result) -> list[str]:
     kinds = result.point_kinds[result.used_points].tolist()
     variance = result.variance_of_unit_weight
     held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
-    counts = zip(_axes(result), held.sum(axis=0), strict=True)
+    counts = zip(axes(result), held.sum(axis=0), strict=True)
     components = ", ".join(f"{axis} {count}" for axis, count in counts)
-    basis = {"free": "cameras free", "constrained": "cameras constrained", "unity": "set to 1"}[
-        result.unit_variance
-    ]
+    basis = {
+        "free": "cameras free",
+        "constrained": "cameras constrained",
+        "unity": "set to 1",
+        "redundancy": "redundancy numbers",
+    }[result.unit_variance]
     rows = [
         ("status", result.status),
         ("iterations", f"{len(result.iterations)}"),
@@ -122,7 +116,7 @@ def _adjustment(result: Result) -> list[str]:
             "standard deviation of unit weight",
             f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
         ),
-        ("degrees of freedom", f"{result.degrees_of_freedom}"),
+        ("degrees of freedom", f"{result.degrees_of_freedom:.8g}"),
         ("weighted sum of squares, camera", f"{sums.camera:.6f}"),
         ("weighted sum of squares, ground", f"{sums.ground:.6f}"),
         ("weighted sum of squares, plates", f"{sums.plates:.6f}"),
@@ -171,6 +165,24 @@ def _residuals(result: Result) -> list[str]:
         values = [_rms(column[np.isfinite(column)]) for column in differences.T]
         if np.isfinite(differences).any():
             lines.append(f"{f'rms of {what}':<36}{', '.join(_differences(result, values))}")
+    return lines
+
+
+def _redundancy(result: Result) -> list[str]:
+    """List number, redundancy and sum of squares of every kind; the redundancies sum to the excess."""
+    if result.redundancies is None or result.loss is not None:
+        return []
+    grouping = grouped(observables(result), "kind")
+    counts, squares, redundancy = sums_of(result, grouping)
+    lines = [f"{'kind':<36}{'number':>8}{'redundancy':>14}{'v P v':>14}{'factor of sd':>14}"]
+    rows = zip(grouping.groups.names, counts, squares, redundancy, strict=True)
+    for name, count, square, r in rows:
+        factor = f"{math.sqrt(square / r):>14.3f}" if r > TESTABLE else f"{'-':>14}"
+        lines.append(f"{name:<36}{count:>8}{r:>14.4f}{square:>14.4f}{factor}")
+    others = result.redundancies.total - float(redundancy.sum())
+    if abs(others) > TESTABLE:
+        lines.append(f"{'cameras and common unknowns':<36}{'':>8}{others:>14.4f}")
+    lines.append(f"{'all':<36}{'':>8}{result.redundancies.total:>14.4f}{result.sums_of_squares.total:>14.4f}")
     return lines
 
 
@@ -241,12 +253,12 @@ def _difference_table(result: Result, differences: Floats) -> list[str]:
 
 
 def _control(result: Result) -> list[str]:
-    columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
+    columns = [f"{axis} {unit}" for axis, unit in zip(axes(result), _difference_units(result), strict=True)]
     return observed_lines("point", result.block.point_ids, columns, _outward(result), result.control)
 
 
 def _stations(result: Result) -> list[str]:
-    columns = [f"{axis} {unit}" for axis, unit in zip(_axes(result), _difference_units(result), strict=True)]
+    columns = [f"{axis} {unit}" for axis, unit in zip(axes(result), _difference_units(result), strict=True)]
     columns += ["omega arcsec", "phi arcsec", "kappa arcsec"]
     outward = np.append(_outward(result), [1.0 / ARCSEC] * 3)
     return observed_lines("photo", result.block.photo_ids, columns, outward, result.stations)
@@ -360,7 +372,7 @@ def _difference_units(result: Result) -> tuple[str, str, str]:
 
 def _differences(result: Result, values: Iterable[float]) -> list[str]:
     outward = np.array(list(values)) * _outward(result)
-    triples = zip(_axes(result), outward, _difference_units(result), strict=True)
+    triples = zip(axes(result), outward, _difference_units(result), strict=True)
     return [f"{axis} {value:.5f} {unit}" for axis, value, unit in triples if math.isfinite(value)]
 
 

@@ -35,12 +35,12 @@ from photogram.statistics.limits import GlobalTest, global_test
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Result", "SumsOfSquares"]
+__all__ = ["Redundancies", "Result", "SumsByKind", "SumsOfSquares"]
 
 
 @dataclass(frozen=True)
-class SumsOfSquares:
-    """Weighted sums of squares.
+class SumsByKind:
+    """Sums over kinds of observations.
 
     Attributes
     ----------
@@ -70,6 +70,14 @@ class SumsOfSquares:
         return self.camera + self.ground + self.plates + self.observations
 
 
+class SumsOfSquares(SumsByKind):
+    """Weighted sums of squares."""
+
+
+class Redundancies(SumsByKind):
+    """Sums of redundancy numbers."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Result(AdjustedNetwork):
     """An adjusted block; the arrays that every network has are those of `AdjustedNetwork`, with k = 6.
@@ -83,8 +91,11 @@ class Result(AdjustedNetwork):
         What was adjusted: a copy, which later changes of the caller's lists do not reach.
     sums_of_squares
         Weighted sums by group.
+    redundancies
+        Sums of redundancy numbers of the same groups; None without covariances.
     unit_variance
-        What degrees of freedom and variance of unit weight are based on: `free`, `constrained` or `unity`.
+        What degrees of freedom and variance of unit weight are based on: `free`, `constrained`, `unity` or
+        `redundancy`.
     photo_corrections
         (i, P, 6) corrections of position and attitude in each of the i iterations; they lead from the initial
         to the adjusted values.
@@ -111,6 +122,7 @@ class Result(AdjustedNetwork):
 
     block: Block
     sums_of_squares: SumsOfSquares
+    redundancies: Redundancies | None
     unit_variance: str
     photo_corrections: Floats
     photo_positions: Floats
@@ -133,8 +145,9 @@ class Result(AdjustedNetwork):
         options: CoreOptions,
         datum: ResultDatum,
         messages: list[Message],
+        freedom: float,
     ) -> Self:
-        """Take over what the core found."""
+        """Take over what the core found; `freedom` are the degrees of freedom of the unit variance."""
         variance = solution.variance_of_unit_weight
         scale = 1.0 if variance is None else variance
         return cls.taken_over(
@@ -145,6 +158,8 @@ class Result(AdjustedNetwork):
             options=options,
             datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
+            redundancies=None if solution.redundancies is None else Redundancies(*solution.redundancies),
+            degrees_of_freedom=freedom,
             unit_variance=options.unit_variance,
             kinds=observed_kinds(block, solution),
             cameras=adjusted_cameras(block, solution, scale),
@@ -249,15 +264,26 @@ class Result(AdjustedNetwork):
         return self.block.image_points
 
     @property
+    def image_given_sd(self) -> Floats:
+        """(m, 2) standard deviations a priori of the image coordinates."""
+        return self.block.image_sd
+
+    @property
     def global_test(self) -> GlobalTest | None:
         """The test of all residuals together; None without degrees of freedom.
 
         It takes the observations on which the variance of unit weight is based: with `constrained` cameras
-        all of them, else image coordinates, observations beside these and ground control.
+        all of them, else image coordinates, observations beside these and ground control. With `redundancy`
+        the degrees of freedom are those of Satterthwaite's approximation (docs/weights.md).
         """
-        sums = self.sums_of_squares
+        sums, freedom = self.sums_of_squares, self.degrees_of_freedom
+        if self.unit_variance == "redundancy":
+            if self.variance_of_unit_weight is None:
+                return None
+            # q / c with c = s / r, which has r^2 / s degrees of freedom (Satterthwaite): s^2 is q / r.
+            return global_test(self.variance_of_unit_weight * freedom, freedom)
         tested = sums.total if self.unit_variance == "constrained" else sums.measured
-        return global_test(tested, self.degrees_of_freedom)
+        return global_test(tested, freedom)
 
     @property
     def photo_residuals(self) -> Floats:

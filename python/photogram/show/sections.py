@@ -6,9 +6,11 @@ from collections.abc import Iterable, Sequence
 
 from photogram import _photocore
 from photogram.messages import Message
+from photogram.statistics.evidence import Test
 from photogram.statistics.limits import GlobalTest
+from photogram.statistics.verdict import Verdict
 
-__all__ = ["Section", "composed", "headline", "problems"]
+__all__ = ["Section", "composed", "headline", "problems", "verdict_section"]
 
 Section = tuple[str, list[str]]
 """A title and lines."""
@@ -23,6 +25,32 @@ def composed(head: str, sections: Iterable[Section]) -> str:
     """Return a report: its first line, then the sections; those without lines are left out."""
     parts = [f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) for title, lines in sections if lines]
     return "\n\n".join([head, *parts]) + "\n"
+
+
+def verdict_section(verdict: Verdict) -> Section:
+    """Return what stands on top of every report: the verdict in a sentence, remarks, and the tests."""
+    lines = [f"{verdict.headline}.", *(f"{line[:1].upper()}{line[1:]}." for line in verdict.lines)]
+    if verdict.tests:
+        lines += [f"{'test':<54}{'value':>14}{'limits':>20}{'p':>10}{'level':>10}{'tests':>8}"]
+        lines += [line for test in verdict.tests for line in _test_lines(test)]
+    return "Verdict", lines
+
+
+def _test_lines(test: Test) -> list[str]:
+    """Write a test: its name on a line of its own where that is long."""
+    low, high = test.limits
+    if high is None:
+        limits = "-"
+    elif low is None:
+        limits = f"to {high:.4g}"
+    else:
+        limits = f"{low:.4g} to {high:.4g}"
+    p = f"{test.p:.2g}" if test.p > 1e-99 else f"1e{test.log10_p:.0f}"
+    figures = (
+        f"{f'{test.statistic} = {test.value:.4g}':>14}{limits:>20}{p:>10}{test.level:>10.2g}{test.tests:>8}"
+        f"{'' if test.accepted else '  rejected'}"
+    )
+    return [f"{test.name:<54}{figures}"] if len(test.name) < 54 else [test.name, f"{'':<54}{figures}"]
 
 
 def problems(

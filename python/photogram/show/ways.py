@@ -9,13 +9,16 @@ they are there as soon as the class is.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import singledispatch
+from functools import cached_property, singledispatch
 from typing import TYPE_CHECKING, Any, NoReturn
+
+from photogram.statistics.findings import Findings
+from photogram.statistics.verdict import Verdict, verdict
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Shown", "columns_of", "document_of", "picture_of", "report_of"]
+__all__ = ["Judged", "Shown", "columns_of", "document_of", "findings_of", "picture_of", "report_of"]
 
 
 @singledispatch
@@ -42,11 +45,26 @@ def picture_of(result: object) -> bytes:
     _undefined(result, "picture")
 
 
+@singledispatch
+def findings_of(result: object) -> Findings:
+    """Return what the verdict on a result rests on."""
+    _undefined(result, "verdict")
+
+
 def _undefined(result: object, way: str) -> NoReturn:
     raise NotImplementedError(f"{type(result).__name__} has no {way}")
 
 
-class Shown:
+class Judged:
+    """What has a verdict."""
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the result can be used, and if not, what is wrong; see `docs/tests.md`."""
+        return verdict(findings_of(self))
+
+
+class Shown(Judged):
     """What has a report, a JSON document, and tables."""
 
     def report(self) -> str:

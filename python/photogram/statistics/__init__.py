@@ -1,5 +1,21 @@
-"""Statistics of an adjustment: tests, reliability, outliers."""
+"""Statistics of an adjustment: tests, critical values, reliability, outliers."""
 
+from photogram.statistics.distributions import (
+    b_method,
+    benjamini_hochberg,
+    bonferroni,
+    critical_chi_square,
+    critical_fisher,
+    critical_normal,
+    critical_student,
+    critical_tau,
+    lambda0,
+    log_chi_square,
+    log_fisher,
+)
+from photogram.statistics.evidence import Test
+from photogram.statistics.findings import Findings, Snooped, Tested
+from photogram.statistics.groups import GroupTests, group_tests, parts_tests
 from photogram.statistics.limits import (
     NOTABLE_FACTOR,
     GlobalTest,
@@ -8,12 +24,33 @@ from photogram.statistics.limits import (
     normal_limit,
     studentized_limit,
 )
+from photogram.statistics.verdict import Verdict, verdict
 
 __all__ = [
     "NOTABLE_FACTOR",
+    "Findings",
     "GlobalTest",
+    "GroupTests",
+    "Snooped",
+    "Test",
+    "Tested",
+    "Verdict",
+    "b_method",
+    "benjamini_hochberg",
+    "bonferroni",
+    "critical_chi_square",
+    "critical_fisher",
+    "critical_normal",
+    "critical_student",
+    "critical_tau",
     "externally_studentized",
     "global_test",
+    "group_tests",
+    "lambda0",
+    "log_chi_square",
+    "log_fisher",
     "normal_limit",
+    "parts_tests",
     "studentized_limit",
+    "verdict",
 ]

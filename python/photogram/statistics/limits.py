@@ -16,12 +16,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
+from photogram.statistics.distributions import (
+    LEVEL,
+    bonferroni,
+    critical_fisher,
+    critical_normal,
+    critical_student,
+    log_chi_square,
+    log_fisher,
+)
 
 __all__ = ["GlobalTest", "externally_studentized", "global_test", "normal_limit", "studentized_limit"]
 
@@ -44,6 +52,9 @@ class GlobalTest:
         Lower and upper limit of the variance of unit weight, Omega / f.
     probability_below, probability_above
         Of a sum as small as this, and of one as large, where the standard deviations are right.
+    reference_dof
+        Degrees of freedom of the unit weight that it is compared with; infinite where that is known. The test
+        is then chi-square, else F.
     """
 
     weighted_sum_of_squares: float
@@ -52,6 +63,13 @@ class GlobalTest:
     limits: tuple[float, float]
     probability_below: float
     probability_above: float
+    reference_dof: float = math.inf
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The interval that holds the true factor with the probability 1 - level; see :attr:`factor`."""
+        low, high = self.limits
+        return math.sqrt(self.variance / high), math.sqrt(self.variance / low) if low > 0 else math.inf
 
     @property
     def variance(self) -> float:
@@ -78,6 +96,17 @@ class GlobalTest:
         """Of a sum as far out as this, on either side, where the standard deviations are right."""
         return min(1.0, 2 * min(self.probability_below, self.probability_above))
 
+    @property
+    def log10_probability(self) -> float:
+        """Decimal logarithm of :attr:`probability`, also where that is less than the smallest number."""
+        if self.probability > 0:
+            return math.log10(self.probability)
+        if math.isinf(self.reference_dof):
+            log_p = log_chi_square(self.weighted_sum_of_squares, self.degrees_of_freedom)
+        else:
+            log_p = log_fisher(self.variance, self.degrees_of_freedom, self.reference_dof)
+        return (float(log_p) + math.log(2)) / math.log(10)
+
     def problem(self) -> str | None:
         """Return a sentence for the report when residuals are too large by a factor that matters."""
         if not self.rejected_high or self.factor <= NOTABLE_FACTOR:
@@ -90,7 +119,10 @@ class GlobalTest:
 
 
 def global_test(
-    weighted_sum_of_squares: float, degrees_of_freedom: float, level: float = 0.05
+    weighted_sum_of_squares: float,
+    degrees_of_freedom: float,
+    level: float = LEVEL,
+    reference_dof: float = math.inf,
 ) -> GlobalTest | None:
     """Test all residuals together against their standard deviations.
 
@@ -102,6 +134,9 @@ def global_test(
         f; need not be whole.
     level
         Probability that right standard deviations are rejected, half of it on each side.
+    reference_dof
+        Degrees of freedom with which the unit weight was estimated from other data, where it was: the
+        standard deviations are those scaled by it.
 
     Returns
     -------
@@ -110,17 +145,21 @@ def global_test(
     if not degrees_of_freedom > 0:
         return None
     omega, f = float(weighted_sum_of_squares), float(degrees_of_freedom)
-    return GlobalTest(
-        weighted_sum_of_squares=omega,
-        degrees_of_freedom=f,
-        level=level,
-        limits=(
+    if math.isinf(reference_dof):
+        limits = (
             _photocore.chi_square_quantile(level / 2, f, upper=False) / f,
             _photocore.chi_square_quantile(level / 2, f, upper=True) / f,
-        ),
-        probability_below=_photocore.chi_square(omega, f, upper=False),
-        probability_above=_photocore.chi_square(omega, f, upper=True),
-    )
+        )
+        below, above = (_photocore.chi_square(omega, f, upper=upper) for upper in (False, True))
+    else:
+        # The lower tail of F is the upper tail of its reciprocal.
+        limits = (
+            1 / critical_fisher(level / 2, reference_dof, f),
+            critical_fisher(level / 2, f, reference_dof),
+        )
+        below = _photocore.fisher(f / omega if omega > 0 else math.inf, reference_dof, f)
+        above = _photocore.fisher(omega / f, f, reference_dof)
+    return GlobalTest(omega, f, level, limits, below, above, reference_dof)
 
 
 def externally_studentized(
@@ -149,7 +188,7 @@ def externally_studentized(
     return np.asarray(w / np.sqrt(others / (f - 1)))
 
 
-def studentized_limit(degrees_of_freedom: float, tests: int, level: float = 0.05) -> float:
+def studentized_limit(degrees_of_freedom: float, tests: int, level: float = LEVEL) -> float:
     """Return the limit that externally studentized residuals of good observations rarely exceed.
 
     Parameters
@@ -167,10 +206,10 @@ def studentized_limit(degrees_of_freedom: float, tests: int, level: float = 0.05
     """
     if degrees_of_freedom < 2:
         return math.inf
-    return _photocore.student_limit(level / max(tests, 1), degrees_of_freedom - 1)
+    return critical_student(bonferroni(level, tests), degrees_of_freedom - 1)
 
 
-def normal_limit(tests: int, level: float = 0.05) -> float:
+def normal_limit(tests: int, level: float = LEVEL) -> float:
     """Return the limit that standardized residuals of good observations rarely exceed, unit weight known.
 
     Parameters
@@ -180,4 +219,4 @@ def normal_limit(tests: int, level: float = 0.05) -> float:
     level
         Probability that any of them exceeds it (Bonferroni: `level / tests` for each, both sides).
     """
-    return -NormalDist().inv_cdf(level / max(tests, 1) / 2)
+    return critical_normal(bonferroni(level, tests))

@@ -18,13 +18,12 @@ Both hold for the a priori unit weight, and need no measurements: planned networ
 from __future__ import annotations
 
 import math
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.statistics.distributions import lambda0
 
 __all__ = ["ROUNDING", "TESTABLE", "largest_effect", "minimal_detectable_error", "noncentrality"]
 
@@ -54,12 +53,9 @@ def noncentrality(significance: float = 0.001, power: float = 0.80) -> float:
     Raises
     ------
     InputError
-        Unless 0 < significance < 1 and significance / 2 < power < 1.
+        Unless 0 < significance < power < 1.
     """
-    if not 0 < significance < 1 or not significance / 2 < power < 1:
-        raise InputError("significance must be between 0 and 1, power between half of it and 1")
-    normal = NormalDist()
-    return normal.inv_cdf(1 - significance / 2) + normal.inv_cdf(power)
+    return math.sqrt(lambda0(significance, power))
 
 
 def minimal_detectable_error(sd: ArrayLike, redundancy: ArrayLike, delta0: float | None = None) -> Floats:

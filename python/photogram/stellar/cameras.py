@@ -8,71 +8,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import orjson
-from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
-from photogram.io.files import read_bytes
-from photogram.network.cameras import Camera
+from photogram.stellar.camera_files import read_camera, read_document, weight_of
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
-from photogram.stellar.sky import TAU
+from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 from photogram.stellar.transformation import transformed_angles
 
 if TYPE_CHECKING:
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
 
-__all__ = ["BrownCamera", "PlateCamera", "camera_document"]
+__all__ = ["BrownCamera", "PlateCamera", "SkyCamera", "camera_document"]
 
 
 _INTERIOR = NAMES[9:22]
-_BROWN = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
-BROWN_PLACE = (3, 4, 1, 2, 7, 8, 9, 11, 10)
-"""Places of these among the common parameters of the core, whose P1 is the p2 of computer vision."""
-COMMON = 17
-"""Parameters of the core that all images share."""
-
-
-def weight_of(covariance: Floats) -> Floats:
-    """Return the weight matrix of a covariance whose rows differ by orders of magnitude.
-
-    Raises
-    ------
-    InputError
-        The covariance is not positive definite.
-    """
-    sd = np.sqrt(np.diag(covariance))
-    try:
-        lower = np.linalg.cholesky(covariance / np.outer(sd, sd))
-    except np.linalg.LinAlgError:
-        raise InputError("the covariance of the camera is not positive definite") from None
-    root = np.linalg.solve(lower, np.diag(1.0 / sd))
-    return np.asarray(root.T @ root, float)
-
-
-def _read(path: Path, kind: str, names: tuple[str, ...]) -> tuple[dict[str, Any], Floats, Floats]:
-    """Read a document, its parameters and their covariance: zero for what is not in its order."""
-    try:
-        document = orjson.loads(read_bytes(path))
-        if document["kind"] != kind:
-            raise InputError(f"is a {document['kind']}, not a {kind}", file=path)
-        values = [document["parameters"][name] for name in names]
-        order = [names.index(name) for name in document["covariance"]["order"]]
-        matrix = np.array(document["covariance"]["matrix"], float).reshape(len(order), len(order))
-        found = np.array([v["value"] if isinstance(v, dict) else v for v in values], float)
-        # A null becomes NaN.
-        if not (np.isfinite(found).all() and np.isfinite(matrix).all() and (np.diag(matrix) >= 0).all()):
-            raise InputError("is not a camera: what is not a number, or a negative variance", file=path)
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"is not a camera: {error}", file=path) from None
-    covariance = np.zeros((len(names), len(names)))
-    covariance[np.ix_(order, order)] = matrix
-    return document, found, covariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +78,8 @@ class PlateCamera:
         InputError
             The file cannot be read, or is another document.
         """
-        document, values, covariance = _read(path, "stellar camera", _INTERIOR)
+        document = read_document(path, ("stellar camera",))
+        values, covariance = read_camera(path, document, _INTERIOR)
         try:
             return cls(
                 values,
@@ -236,86 +190,3 @@ def camera_document(result: Result) -> bytes:
         },
     }
     return json.to_json(document)
-
-
-@dataclass(frozen=True, eq=False)
-class BrownCamera:
-    """A pinhole camera with Brown's distortion, in pixels, and its covariance.
-
-    With (u, v) = (X, Y) / Z and r^2 = u^2 + v^2,
-    x = fx (u (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 u v + p2 (r^2 + 2 u^2)) + cx,
-    and y likewise with fy, cy, and p1, p2 exchanged.
-
-    Attributes
-    ----------
-    values
-        (9,) fx, fy, cx, cy, k1, k2, k3, p1, p2.
-    covariance
-        (9, 9); zero for what was held.
-    """
-
-    values: Floats
-    covariance: Floats
-
-    NAMES = _BROWN
-
-    @classmethod
-    def of_field(cls, width: float, height: float, field_of_view: float) -> BrownCamera:
-        """Return an ideal camera of a frame in pixels and a horizontal field of view in radians."""
-        f = 0.5 * width / math.tan(0.5 * field_of_view)
-        values = np.array([f, f, 0.5 * width, 0.5 * height, 0, 0, 0, 0, 0], float)
-        return cls(values, np.zeros((9, 9)))
-
-    @property
-    def common(self) -> Floats:
-        """(17,) as the core takes it."""
-        common = np.zeros(COMMON)
-        common[list(BROWN_PLACE)] = self.values
-        common[13:] = TAU
-        return common
-
-    @property
-    def known(self) -> NDArray[np.bool_]:
-        """(9,) which parameters have a mean error."""
-        return np.diag(self.covariance) > 0
-
-    def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
-        """Return the camera as blocks take it: columns and rows, y down, the model `full_opencv`.
-
-        Parameters
-        ----------
-        name
-            For reports.
-        weighted
-            Whether its parameters are observations with their full covariance; otherwise they are known. What
-            was held here is held there.
-        """
-        values = dict(zip(_BROWN, self.values.tolist(), strict=True))
-        if not (weighted and self.known.any()):
-            return Camera("full_opencv", values, name=name)
-        known = np.flatnonzero(self.known)
-        covariance = [_BROWN[i] for i in known], self.covariance[np.ix_(known, known)]
-        return Camera("full_opencv", values, covariance=covariance, name=name)
-
-    def to_json(self) -> bytes:
-        """Return the camera as a JSON document: a weighted prior of later adjustments."""
-        document = {
-            "program": f"photogram {_photocore.__version__}",
-            "kind": "brown camera",
-            "unit": "pixel",
-            "parameters": dict(zip(_BROWN, self.values.tolist(), strict=True)),
-            "covariance": {"order": _BROWN, "matrix": self.covariance},
-        }
-        return json.to_json(document)
-
-    @classmethod
-    def read(cls, path: Path) -> BrownCamera:
-        """Read what `to_json` wrote.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read, or is another document.
-        """
-        _, values, covariance = _read(path, "brown camera", _BROWN)
-        return cls(values, covariance)

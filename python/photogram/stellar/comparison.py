@@ -15,13 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.stellar.catalogue import Catalogue
+from photogram.stellar.odds import binomial_tail
 from photogram.stellar.places import Earth
 from photogram.stellar.skies import Exposure, SkyCalibration, partials
 from photogram.stellar.sky import Site
 
-__all__ = ["HeldOut", "held_out"]
+__all__ = ["HeldOut", "fewer_stars", "held_out"]
 
 
 LEVEL = 0.05
@@ -95,6 +96,30 @@ def held_out(
         total, rank = _held_out(*rows, residuals[of].ravel())
         tests.append(_test(total, rank, omega - total, freedom - rank))
     return tests
+
+
+def fewer_stars(images: Indices, matched: Indices) -> list[int]:
+    """Return the exposures in which far fewer images have a star than in the others, the worst first.
+
+    Less than half of the share of the others, and that beyond chance: the probability of so few among so
+    many, binomial, is below 5 % for all exposures together.
+
+    Parameters
+    ----------
+    images, matched
+        (E,) of each exposure.
+    """
+    found = []
+    for number, (count, few) in enumerate(zip(images.tolist(), matched.tolist(), strict=True)):
+        others = int(images.sum()) - count
+        share = (int(matched.sum()) - few) / others if others else 0.0
+        if few < 0.5 * share * count:
+            # As many without a star, or more; the share of a star missing is small enough for the tail in
+            # logs.
+            probability = binomial_tail(count, 1.0 - share, count - few)
+            if probability < LEVEL / len(images):
+                found.append((few / (share * count), number))
+    return [number for _, number in sorted(found)]
 
 
 def _held_out(camera: Floats, attitude: Floats, residuals: Floats) -> tuple[float, int]:

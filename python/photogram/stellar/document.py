@@ -49,6 +49,7 @@ def _document(result: Result) -> dict[str, Any]:
         "iterations": [asdict(level) for level in result.levels],
         "stop": result.solved.stop,
         "converged": result.converged,
+        "verdict": result.verdict.document(),
         "solutions": [_stage(stage) for stage in result.stages],
         "messages": [str(message) for message in result.messages],
         "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],

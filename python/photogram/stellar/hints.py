@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.identification import identify
 from photogram.stellar.matching import STRETCH
@@ -17,6 +16,7 @@ from photogram.stellar.places import Earth
 from photogram.stellar.pointing import attitude_of, axis_of, roll_of
 from photogram.stellar.skies import Exposure
 from photogram.stellar.sky import Site
+from photogram.stellar.sky_cameras import SkyCamera
 
 __all__ = ["Hint", "Setting", "find_hint"]
 
@@ -38,15 +38,19 @@ class Setting:
         As for `identify`.
     attitude_error, tolerance
         Radians; pixels.
+    field_error, roll_known
+        As for `photogram.stellar.night.Night`.
     """
 
     site: Site
     catalogue: Catalogue
     frame: tuple[float, float]
-    camera: BrownCamera
+    camera: SkyCamera
     attitude_error: float
     tolerance: float
     earth: Earth
+    field_error: float = STRETCH
+    roll_known: bool = True
 
     @property
     def radius(self) -> float:
@@ -77,6 +81,7 @@ class _Mistake:
     text: str
     mend: Callable[[Exposure, Setting], tuple[Exposure, Setting]]
     stretch: float = STRETCH
+    of_roll: bool = False
 
 
 def find_hint(exposures: Sequence[Exposure], names: Sequence[str], setting: Setting) -> Hint | None:
@@ -94,7 +99,7 @@ def find_hint(exposures: Sequence[Exposure], names: Sequence[str], setting: Sett
     The mistake that explains most of them, by the odds against chance; None where none does.
     """
     order = sorted(range(len(exposures)), key=lambda i: -len(exposures[i].xy))[:_TRIED]
-    mistakes = _mistakes()
+    mistakes = [mistake for mistake in _mistakes() if setting.roll_known or not mistake.of_roll]
     best: tuple[tuple[int, float], Hint] | None = None
     for mistake in mistakes:
         explained, odds, scales = [], 0.0, []
@@ -106,10 +111,11 @@ def find_hint(exposures: Sequence[Exposure], names: Sequence[str], setting: Sett
                 mended.site,
                 mended.catalogue,
                 frame=mended.frame,
-                radius=mended.radius + mistake.stretch * max(mended.frame),
+                radius=mended.radius,
                 tolerance=mended.tolerance,
                 earth=mended.earth,
-                stretch=mistake.stretch,
+                stretch=max(mistake.stretch, mended.field_error),
+                roll_known=mended.roll_known,
             )
             if sighting.match.expected * len(mistakes) < ACCEPTED:
                 explained.append(names[index])
@@ -136,11 +142,12 @@ def _mistakes() -> list[_Mistake]:
             _pointed(lambda a, e, r: (math.pi - a, e, r)),
         ),
         _Mistake("elevation_deg is the zenith distance", _pointed(lambda a, e, r: (a, math.pi / 2 - e, r))),
-        _Mistake("roll_deg counts counterclockwise", _pointed(lambda a, e, r: (a, e, -r))),
+        _Mistake("roll_deg counts counterclockwise", _pointed(lambda a, e, r: (a, e, -r)), of_roll=True),
         _Mistake("the longitude counts to the east, not to the west", _other_longitude),
     ]
     found += [
-        _Mistake(f"roll_deg has to be changed by {turn:+d} degrees", _rolled(turn)) for turn in (90, 180, -90)
+        _Mistake(f"roll_deg has to be changed by {turn:+d} degrees", _rolled(turn), of_roll=True)
+        for turn in (90, 180, -90)
     ]
     found += [
         _Mistake("the horizontal field of view is about {field:.1f} degrees", _scaled(scale), _WIDE)

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.network.neighbours import mutually_nearest
-from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.matching import STRETCH, Match, match
-from photogram.stellar.odds import ACCEPTED, expected_false
+from photogram.stellar.matching import STRETCH, Match, Search, match
+from photogram.stellar.odds import ACCEPTED, DOUBTFUL, expected_false, log_odds, star_probabilities
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
 from photogram.stellar.skies import Exposure, project_sky, stars_near
 from photogram.stellar.sky import Site
+from photogram.stellar.sky_cameras import SkyCamera
+from photogram.stellar.start import local_directions, sky_share, turned_to
 
 __all__ = ["Found", "Sighting", "identify", "identify_again"]
 
 _STILL = Earth()
+_FOR_ATTITUDE = 3
+"""Stars that a first attitude is computed from at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +36,26 @@ class Sighting:
         much.
     match
         The count that was made.
+    found
+        (k,) the stars that the best hypothesis gives, whatever speaks for it.
+    attitude
+        (3,) alpha, omega, kappa that go with them; the given one where there are not enough.
     """
 
     stars: Indices
     match: Match
+    found: Indices
+    attitude: Floats
 
     @property
     def accepted(self) -> bool:
         """Whether chance would not have found as much."""
         return self.match.accepted
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether chance may or may not have found as much."""
+        return not self.accepted and self.match.expected <= DOUBTFUL
 
     def reason(self) -> str:
         """Say why an exposure is not accepted."""
@@ -64,7 +78,7 @@ def _times(expected: float) -> str:
 
 def identify(
     exposure: Exposure,
-    camera: BrownCamera,
+    camera: SkyCamera,
     site: Site,
     catalogue: Catalogue,
     *,
@@ -73,6 +87,8 @@ def identify(
     tolerance: float = 3.0,
     earth: Earth = _STILL,
     stretch: float = STRETCH,
+    roll_known: bool = True,
+    tried: float = 0.0,
 ) -> Sighting:
     """Find the catalogue star of each image.
 
@@ -81,7 +97,7 @@ def identify(
     exposure
         With its approximate attitude; the brightest images first.
     camera
-        Approximate, such as `BrownCamera.of_field`.
+        Approximate, such as `SkyCamera.of_field`.
     site, catalogue
         Where, and which stars; the brightest first (`Catalogue.brighter`).
     frame
@@ -92,21 +108,41 @@ def identify(
         UT1 - UTC, and the pole.
     stretch
         Share by which the principal distance of the camera may be wrong.
+    roll_known
+        Whether the camera is turned about its axis as the attitude says.
+    tried
+        Hypotheses about this exposure that were counted before: they count with those of this one.
     """
+    if stretch > STRETCH:
+        # The corners are as far away from where they should be.
+        radius += stretch * max(frame)
     site = earth.site_of_date(site)
     time = sidereal_time(site, exposure.utc, earth.dut1)
     near = stars_near(exposure, camera, site, catalogue, frame, radius / camera.values[0], earth.dut1)
-    places = apparent_places(catalogue.take(near), exposure.utc)
+    places = apparent_places(catalogue.take(near), exposure.utc, site.effects)
     predicted = project_sky(camera, exposure.attitude, site, places, time)
-    margin = np.array([-radius, -radius]), np.array(frame) + radius
+    axis = None if roll_known else camera.values[2:4]
     with np.errstate(invalid="ignore"):
-        seen = np.flatnonzero(((predicted >= margin[0]) & (predicted <= margin[1])).all(axis=1))
-    made = match(
-        exposure.xy, predicted[seen], frame=frame, radius=radius, tolerance=tolerance, stretch=stretch
-    )
-    if not made.accepted:
-        return Sighting(np.full(len(made.found), -1, np.int64), made)
-    return Sighting(np.where(made.found >= 0, near[seen[made.found]], -1), made)
+        if axis is None:
+            inside = ((predicted >= -radius) & (predicted <= np.array(frame) + radius)).all(axis=1)
+        else:
+            inside = np.linalg.norm(predicted - axis, axis=1) <= 0.5 * math.hypot(*frame) + radius
+    seen = np.flatnonzero(inside)
+    share = sky_share(camera, exposure.attitude, frame)
+    search = Search(frame, radius, stretch, axis, share, tried)
+    made = match(exposure.xy, predicted[seen], search, tolerance=tolerance)
+    local = np.where(made.found >= 0, seen[made.found], -1) if len(seen) else made.found
+    has = np.flatnonzero(local >= 0)
+    attitude = exposure.attitude
+    if len(has) >= _FOR_ATTITUDE:
+        values = camera.values.copy()
+        values[:2] /= made.scale
+        rays = replace(camera, values=values).rays(exposure.xy[has])
+        standard = site.standard_coordinates(places[local[has]], time)
+        attitude = turned_to(rays, local_directions(standard))
+    stars = np.where(local >= 0, near[local], -1) if len(near) else local
+    accepted = stars if made.accepted else np.full(len(stars), -1, np.int64)
+    return Sighting(accepted, made, stars, attitude)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,27 +157,62 @@ class Found:
         (k,) largest coordinate difference of image and star, pixels; NaN for none.
     inside
         Catalogue stars in the frame.
+    predicted
+        (n, 2) where they and those within reach are, pixels.
+    nearest
+        (k,) which of these each image has; -1 for none.
+    area
+        Of the frame that shows the sky, square pixels.
+    xy
+        (k, 2) the images.
+    named
+        Whether the images name their stars.
     """
 
     stars: Indices
     off: Floats
     inside: int
+    predicted: Floats
+    nearest: Indices
+    area: float
+    xy: Floats
+    named: bool = False
 
-    def expected(self, limit: float, radius: float, frame: tuple[float, float]) -> float:
+    @property
+    def density(self) -> float:
+        """Catalogue stars a square pixel of the sky."""
+        return self.inside / self.area
+
+    def probabilities(self, sd: float) -> Floats:
+        """Return the probability (k,) of each star, NaN for none, and where images name theirs.
+
+        `sd` is the standard deviation of an image coordinate.
+        """
+        if self.named:
+            return np.full(len(self.stars), np.nan)
+        return star_probabilities(self.xy, self.predicted, self.nearest, sd, self.density)
+
+    def log_odds(self, sd: float) -> float:
+        """Return the logarithm of the odds of the exposure against chance, as Lang et al. have them."""
+        has = self.nearest >= 0
+        off = np.linalg.norm(self.xy[has] - self.predicted[self.nearest[has]], axis=1)
+        return log_odds(off, len(self.stars), sd, self.density)
+
+    def expected(self, limit: float, radius: float, roll: float) -> float:
         """Return the expected number of wrong attitudes under which as many images have a star so near.
 
         Attitudes are counted that differ by the limit (pixels), as far as the approximate one may be wrong
-        (`radius`, pixels) in its three angles.
+        (`radius`, pixels), and the corners by its turn about the axis (`roll`, pixels).
         """
-        mu = self.inside / (frame[0] * frame[1]) * (2 * limit) ** 2
-        attitudes = (1 + 2 * radius / limit) ** 3
+        mu = self.density * (2 * limit) ** 2
+        attitudes = (1 + 2 * radius / limit) ** 2 * (1 + 2 * roll / limit)
         matched = int((self.off <= limit).sum())
         return expected_false(len(self.stars), 2, mu, matched, attitudes)
 
 
 def identify_again(
     exposure: Exposure,
-    camera: BrownCamera,
+    camera: SkyCamera,
     site: Site,
     catalogue: Catalogue,
     *,
@@ -164,13 +235,15 @@ def identify_again(
     named = exposure.stars
     if named is not None:
         near = np.union1d(near, named[named >= 0])
-    places = apparent_places(catalogue.take(near), exposure.utc)
+    places = apparent_places(catalogue.take(near), exposure.utc, site.effects)
     predicted = project_sky(
         camera, exposure.attitude, site, places, sidereal_time(site, exposure.utc, earth.dut1)
     )
     with np.errstate(invalid="ignore"):
         seen = ((predicted > -reach) & (predicted < np.array(frame) + reach)).all(axis=1)
+        in_frame = ((predicted >= 0) & (predicted <= frame)).all(axis=1)
     inside = np.flatnonzero(seen)
+    nearest = np.full(len(exposure.xy), -1, np.int64)
     if named is None:
         nearest = mutually_nearest(exposure.xy, predicted[inside], reach)
         local = np.where(nearest >= 0, inside[nearest], -1) if len(inside) else nearest
@@ -181,4 +254,7 @@ def identify_again(
     off = np.full(len(local), np.nan)
     has = local >= 0
     off[has] = np.abs(exposure.xy[has] - predicted[local[has]]).max(axis=1)
-    return Found(stars, off, len(inside))
+    area = frame[0] * frame[1] * sky_share(camera, exposure.attitude, frame)
+    return Found(
+        stars, off, int(in_frame.sum()), predicted[inside], nearest, area, exposure.xy, named is not None
+    )

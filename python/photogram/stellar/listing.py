@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
-from photogram.show.sections import Section, composed, headline
+from photogram.show.sections import Section, composed, headline, verdict_section
 from photogram.stellar import tables
 from photogram.stellar.parameters import GROUPS
 from photogram.stellar.result import SIGNIFICANT, Result, Stage
@@ -34,8 +34,9 @@ def listing(result: Result) -> str:
 
 
 def summary(result: Result) -> list[Section]:
-    """Return what a reader wants first: problems and figures."""
+    """Return what a reader wants first: verdict, problems and figures."""
     return [
+        verdict_section(result.verdict),
         ("Problems", [str(message) for message in result.messages] or ["none"]),
         ("Adjustment", _adjustment(result)),
     ]

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.neighbours import mutually_nearest
-from photogram.stellar.odds import ACCEPTED, CROWDED, expected_false
+from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
 
-__all__ = ["Match", "match"]
+__all__ = ["STRETCH", "Match", "Search", "match"]
 
 
 _SEEDS = 25
 """Brightest images that make hypotheses; three times as many vote for them."""
 _RASTER, _BATCH, _EXACT = 2000, 4096, 20
 """Cells of a raster a side, hypotheses that are counted in it at once, and those that are counted exactly."""
-_CANDIDATES = 1500
-"""Pairs of an image and a star that make hypotheses at most: they are compared two by two."""
+_CANDIDATES, _TURNED = 1500, 800
+"""Pairs of an image and a star that make hypotheses at most, and where the roll is not known: they are
+compared two by two."""
+_PLANE = np.array([1.0, 1.0j])
+Similarities = tuple[NDArray[np.complex128], NDArray[np.complex128]]
+"""(h,) factors f and shifts s of complex numbers: z goes to f z + s."""
 _DEEPER = 2
 """Stars in the frame for each image: where the catalogue has more, the faint ones only match by chance."""
 STRETCH = 0.01
@@ -43,6 +47,8 @@ class Match:
         Whether there are so many stars in a tolerance area that counting cannot tell.
     scale
         Of the predicted images over the measured ones.
+    hypotheses
+        How many were counted.
     """
 
     found: Indices
@@ -51,11 +57,61 @@ class Match:
     images: int
     crowded: bool = False
     scale: float = 1.0
+    hypotheses: float = 0.0
 
     @property
     def accepted(self) -> bool:
         """Whether chance would not have found as much."""
         return self.expected < ACCEPTED
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Where the images of stars may be.
+
+    Attributes
+    ----------
+    frame
+        Width and height.
+    radius
+        Largest distance between an image and its prediction; where the roll is not known, of their distances
+        from the axis.
+    stretch
+        Share by which the scale may be wrong.
+    axis
+        (2,) the point about which the camera may be turned; None where its roll is known.
+    share
+        What of the frame shows the sky.
+    tried
+        Hypotheses that were counted before in the same exposure.
+    """
+
+    frame: tuple[float, float]
+    radius: float
+    stretch: float = STRETCH
+    axis: Floats | None = None
+    share: float = 1.0
+    tried: float = 0.0
+
+    def regions(self, predicted: Floats) -> tuple[Bools, float, float]:
+        """Return which predicted images are in the middle, the area of that, and the area of all."""
+        width, height = self.frame
+        if self.axis is None:
+            around = (width + 2 * self.radius) * (height + 2 * self.radius)
+            middle = np.asarray(((predicted >= 0) & (predicted <= self.frame)).all(axis=1), bool)
+            return middle, width * height * self.share, around * self.share
+        inner, outer = 0.5 * min(self.frame), 0.5 * math.hypot(width, height) + self.radius
+        middle = np.asarray(np.linalg.norm(predicted - self.axis, axis=1) <= inner, bool)
+        return middle, math.pi * inner**2, math.pi * outer**2 * self.share
+
+    def candidates(self, measured: Floats, predicted: Floats) -> Bools:
+        """Return (m, n) whether a star may be where an image is."""
+        if self.axis is None:
+            return np.asarray(
+                np.linalg.norm(measured[:, None] - predicted[None], axis=2) <= self.radius, bool
+            )
+        own, other = (np.linalg.norm(xy - self.axis, axis=1) for xy in (measured, predicted))
+        return np.asarray(np.abs(own[:, None] - other[None]) <= self.radius, bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +130,14 @@ class _Sky:
     density: float
 
     @classmethod
-    def as_deep(cls, predicted: Floats, images: int, frame: tuple[float, float], radius: float) -> _Sky:
+    def as_deep(cls, predicted: Floats, images: int, search: Search) -> _Sky:
         """Take the brightest predicted images, for so many measured ones in the frame."""
-        area = frame[0] * frame[1]
-        around = (frame[0] + 2 * radius) * (frame[1] + 2 * radius)
-        chosen = predicted[: math.ceil(_DEEPER * max(images, _SEEDS) * around / area)]
-        inside = int(((chosen >= 0) & (chosen <= frame)).all(axis=1).sum())
-        return cls(chosen, max(inside / area, len(chosen) / around))
+        width, height = search.frame
+        _, _, around = search.regions(predicted)
+        seen = width * height * search.share
+        chosen = predicted[: math.ceil(_DEEPER * max(images, _SEEDS) * around / seen)]
+        middle, area, around = search.regions(chosen)
+        return cls(chosen, max(int(middle.sum()) / area, len(chosen) / around))
 
     def mu(self, tolerance: float) -> float:
         """Return the mean number of stars in a tolerance area."""
@@ -90,11 +147,9 @@ class _Sky:
 def match(
     measured: Floats,
     predicted: Floats,
+    search: Search,
     *,
-    frame: tuple[float, float],
-    radius: float,
     tolerance: float,
-    stretch: float = STRETCH,
 ) -> Match:
     """Match measured star images to predicted ones.
 
@@ -110,53 +165,66 @@ def match(
     predicted
         (n, 2) images of catalogue stars under the approximate attitude, the brightest first. Of many, the
         brightest are taken, two for each image.
-    frame
-        Width and height.
-    radius
-        Largest distance between an image and its prediction.
+    search
+        Where the images may be.
     tolerance
         Largest distance that is left after the polynomials.
-    stretch
-        Share by which the scale may be wrong.
     """
     none = Match(np.full(len(measured), -1, np.int64), math.inf, 0, len(measured))
     if len(measured) < 3 or len(predicted) < 3:
         return none
     seeds = measured[: 3 * _SEEDS]
-    bright = _Sky.as_deep(predicted, len(seeds), frame, radius)
-    transforms = _hypotheses(measured[:_SEEDS], bright.predicted, radius, tolerance, stretch)
-    count = len(transforms)
+    bright = _Sky.as_deep(predicted, len(seeds), search)
+    transforms = _hypotheses(measured[:_SEEDS], bright.predicted, search, tolerance)
+    # Both counts take part, and what was tried before.
+    hypotheses = 2.0 * len(transforms[0]) + search.tried
     best, most = None, 2
     for transform in _promising(transforms, seeds, bright.predicted, 3 * tolerance):
         found = mutually_nearest(_apply(transform, seeds), bright.predicted, 3 * tolerance)
         matched = int((found >= 0).sum())
         if matched > most:
             best, most = transform, matched
-    expected = expected_false(len(seeds), 2, bright.mu(3 * tolerance), most, 2 * count)
+    expected = expected_false(len(seeds), 2, bright.mu(3 * tolerance), most, hypotheses)
     if best is None:
-        return none
+        return replace(none, hypotheses=hypotheses)
     if bright.mu(3 * tolerance) > CROWDED:
         expected = math.inf
-    sky = _Sky.as_deep(predicted, len(measured), frame, radius)
+    sky = _Sky.as_deep(predicted, len(measured), search)
     halves = np.arange(len(measured)) % 2 == 0
     again = mutually_nearest(
         _refined(measured, sky.predicted, best, tolerance, halves), sky.predicted, tolerance
     )
     held_out = int((again[~halves] >= 0).sum())
     # Both images of a pair may be among those held out.
-    second = expected_false(int((~halves).sum()), 2, sky.mu(tolerance), held_out, 2 * count)
+    second = expected_false(int((~halves).sum()), 2, sky.mu(tolerance), held_out, hypotheses)
     crowded = sky.mu(tolerance) > CROWDED
     counted = (most, len(seeds))
     if not crowded and second < expected:
         expected, counted = second, (held_out, int((~halves).sum()))
     moved = _refined(measured, sky.predicted, best, tolerance, np.ones(len(measured), bool))
     return Match(
-        mutually_nearest(moved, sky.predicted, tolerance),
+        _certain(moved, sky, tolerance),
         expected,
         *counted,
         crowded=crowded and bright.mu(3 * tolerance) > CROWDED,
         scale=math.hypot(best[0, 0], best[0, 1]),
+        hypotheses=hypotheses,
     )
+
+
+def _certain(moved: Floats, sky: _Sky, tolerance: float) -> Indices:
+    """Match images to stars, but for those that show another one nearly as well.
+
+    These wait for the calibrated camera.
+    """
+    found = mutually_nearest(moved, sky.predicted, tolerance)
+    has = found >= 0
+    if not has.any():
+        return found
+    off = moved[has] - sky.predicted[found[has]]
+    sd = max(1.4826 * float(np.median(np.abs(off))), 1e-3 * tolerance)
+    probability = star_probabilities(moved, sky.predicted, found, sd, sky.density)
+    return np.where(has & ~(probability >= CERTAIN), -1, found)
 
 
 def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: float, fitted: Bools) -> Floats:
@@ -173,33 +241,35 @@ def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: floa
     return moved
 
 
-def _hypotheses(
-    measured: Floats, predicted: Floats, radius: float, tolerance: float, stretch: float
-) -> Floats:
-    """Return similarities (h, 3, 2) from pairs of candidates whose separations agree."""
-    distance = np.linalg.norm(measured[:, None] - predicted[None], axis=2)
-    i, k = np.nonzero(distance <= radius)
-    if len(i) > _CANDIDATES:
+def _hypotheses(measured: Floats, predicted: Floats, search: Search, tolerance: float) -> Similarities:
+    """Return similarities from pairs of candidates whose separations agree."""
+    i, k = np.nonzero(search.candidates(measured, predicted))
+    most = _CANDIDATES if search.axis is None else _TURNED
+    if len(i) > most:
         # The brightest images and stars.
-        order = np.argsort(i / len(measured) + k / len(predicted), kind="stable")[:_CANDIDATES]
+        order = np.argsort(i / len(measured) + k / len(predicted), kind="stable")[:most]
         i, k = i[order], k[order]
-    a, b = np.triu_indices(len(i), 1)
-    keep = (i[a] != i[b]) & (k[a] != k[b])
-    a, b = a[keep], b[keep]
-    first = (measured[i[b]] - measured[i[a]]) @ np.array([1, 1j])
-    second = (predicted[k[b]] - predicted[k[a]]) @ np.array([1, 1j])
-    agree = (np.abs(np.abs(first) - np.abs(second)) < 3 * tolerance + stretch * np.abs(first)) & (
-        np.abs(first) > min(radius, 0.25 * np.ptp(measured, axis=0).max())
-    )
-    a, b, z, w = a[agree], b[agree], first[agree], second[agree]
-    factor = w / z
-    shift = predicted[k[a]] @ np.array([1, 1j]) - factor * (measured[i[a]] @ np.array([1, 1j]))
-    rows = [[factor.real, factor.imag], [-factor.imag, factor.real], [shift.real, shift.imag]]
-    return np.moveaxis(np.array(rows), 2, 0)
+    images, stars = (measured @ _PLANE)[i], (predicted @ _PLANE)[k]
+    least = min(search.radius, 0.25 * float(np.ptp(measured, axis=0).max()))
+    pairs = []
+    for a in range(len(i) - 1):
+        first, second = np.abs(images[a + 1 :] - images[a]), np.abs(stars[a + 1 :] - stars[a])
+        agree = (np.abs(first - second) < 3 * tolerance + search.stretch * first) & (first > least)
+        # The same image, or the same star, is no pair: the one has no length, the other does not agree.
+        pairs.append(a + 1 + np.flatnonzero(agree & (k[a + 1 :] != k[a])))
+    one = np.repeat(np.arange(len(pairs)), [len(each) for each in pairs])
+    other = np.concatenate(pairs) if pairs else np.zeros(0, np.int64)
+    factor = (stars[other] - stars[one]) / (images[other] - images[one])
+    shift = stars[one] - factor * images[one]
+    if search.axis is not None:
+        axis = complex(*search.axis)
+        near = np.abs(factor * axis + shift - axis) <= search.radius
+        factor, shift = factor[near], shift[near]
+    return factor, shift
 
 
-def _promising(transforms: Floats, seeds: Floats, predicted: Floats, limit: float) -> Floats:
-    """Return the similarities (h, 3, 2) under which the most images fall near a star, counted in a raster."""
+def _promising(transforms: Similarities, seeds: Floats, predicted: Floats, limit: float) -> list[Floats]:
+    """Return the similarities (3, 2) under which the most images fall near a star, counted in a raster."""
     corner = predicted.min(axis=0) - 3 * limit
     size = max(0.5 * limit, float(np.ptp(predicted, axis=0).max()) / _RASTER)
     shape = np.ceil((predicted.max(axis=0) + 3 * limit - corner) / size).astype(np.int64) + 1
@@ -213,13 +283,34 @@ def _promising(transforms: Floats, seeds: Floats, predicted: Floats, limit: floa
     # The rim is far from every star: what falls outside goes there.
     near[0] = near[-1] = False
     near[:, 0] = near[:, -1] = False
-    counts = np.empty(len(transforms), np.int64)
-    for first in range(0, len(transforms), _BATCH):
-        some = transforms[first : first + _BATCH]
-        cells = (seeds @ some[:, :2] + some[:, 2:] - corner) / size
-        column, row = np.clip(cells, 0, shape - 1).astype(np.int64).transpose(2, 0, 1)
-        counts[first : first + _BATCH] = near[column, row].sum(axis=1)
-    return transforms[np.argsort(-counts, kind="stable")[:_EXACT]]
+    # Of very many the brightest images choose those for which all are counted.
+    images = seeds @ _PLANE
+    if len(transforms[0]) > _BATCH:
+        counts = _counted(transforms, images[:_SEEDS], near, corner, size)
+        best = np.sort(np.argsort(-counts, kind="stable")[:_BATCH])
+        transforms = transforms[0][best], transforms[1][best]
+    counts = _counted(transforms, images, near, corner, size)
+    chosen = np.argsort(-counts, kind="stable")[:_EXACT]
+    return [
+        np.array([[f.real, f.imag], [-f.imag, f.real], [s.real, s.imag]])
+        for f, s in zip(transforms[0][chosen], transforms[1][chosen], strict=True)
+    ]
+
+
+def _counted(
+    transforms: Similarities, images: NDArray[np.complex128], near: Bools, corner: Floats, size: float
+) -> Indices:
+    """Count how many images each similarity brings near a star."""
+    factor, shift = transforms[0] / size, (transforms[1] - complex(*corner)) / size
+    counts = np.empty(len(factor), np.int64)
+    columns, rows = near.shape
+    for first in range(0, len(factor), _BATCH):
+        some = slice(first, first + _BATCH)
+        cells = factor[some, None] * images + shift[some, None]
+        column = np.clip(cells.real.astype(np.int32), 0, columns - 1)
+        row = np.clip(cells.imag.astype(np.int32), 0, rows - 1)
+        counts[some] = near[column, row].sum(axis=1)
+    return counts
 
 
 def _apply(transform: Floats, points: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,8 @@ import numpy as np
 from photogram import _photocore
 from photogram.io import json
 from photogram.show.angles import ARCSEC
-from photogram.stellar.cameras import BrownCamera
-from photogram.stellar.night import CalibratedNight
+from photogram.stellar.lens_tests import LensTest
+from photogram.stellar.nights import CalibratedNight
 from photogram.stellar.pointing import axis_of
 
 __all__ = ["to_json"]
@@ -31,6 +32,8 @@ def to_json(result: CalibratedNight) -> bytes:
                 "residual": "measured minus computed; of stars adjusted minus catalogue",
                 "standardized": "residual over its mean error",
                 "covariance": "cofactors times m squared, in the units of the parameters",
+                "icrs": "quaternion w, x, y, z from ICRS to the camera (x right, y down, z along the axis);"
+                " covariance of the turn about these axes, radians squared",
             },
             "m": found.mean_error,
             "m_unit": "standard deviation of an image coordinate",
@@ -40,6 +43,7 @@ def to_json(result: CalibratedNight) -> bytes:
             "stop": found.status,
             "converged": result.converged,
             "usable": result.usable,
+            "verdict": result.verdict.document(),
             "global_test": None
             if result.test is None
             else {
@@ -47,6 +51,19 @@ def to_json(result: CalibratedNight) -> bytes:
                 "limits": result.test.limits,
                 "probability": result.test.probability,
             },
+            "doubtful": result.doubtful,
+            "falsely_identified": result.falsely_identified,
+            "lens": {
+                "name": result.camera.lens,
+                "model": result.camera.facts.model,
+                "formula": result.camera.facts.formula,
+                "common_scale": result.camera.common_scale,
+                "tried": [asdict(fit) for fit in result.lenses],
+                "scale_test": _test(result.scale_test),
+                "term_tests": [_test(test) for test in result.term_tests],
+            },
+            "effects": asdict(night.site.effects),
+            "standstill": None if result.standstill is None else _standstill(result),
             "messages": [str(message) for message in result.messages],
             "parameters": {
                 name: {
@@ -54,9 +71,9 @@ def to_json(result: CalibratedNight) -> bytes:
                     "mean_error": float(error),
                     "unit": "pixel" if name[0] in "fc" else "",
                 }
-                for name, value, error in zip(BrownCamera.NAMES, result.camera.values, errors, strict=True)
+                for name, value, error in zip(result.camera.names, result.camera.values, errors, strict=True)
             },
-            "covariance": {"order": BrownCamera.NAMES, "matrix": result.camera.covariance},
+            "covariance": {"order": result.camera.names, "matrix": result.camera.covariance},
             "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],
             "significance": result.significance(),
             "exposures": _exposures(result),
@@ -64,6 +81,23 @@ def to_json(result: CalibratedNight) -> bytes:
             "images": _images(result),
         }
     )
+
+
+def _test(test: LensTest | None) -> dict[str, Any] | None:
+    return None if test is None else asdict(test) | {"verdict": test.verdict}
+
+
+def _standstill(result: CalibratedNight) -> dict[str, Any]:
+    test = result.standstill
+    assert test is not None
+    return {
+        "chi_square": test.statistic,
+        "degrees_of_freedom": test.dimension,
+        "probability": test.probability,
+        "own_probability": test.own,
+        "turn_arcsec": test.turns / ARCSEC,
+        "moved": [result.names[k] for k in test.moved],
+    }
 
 
 def _exposures(result: CalibratedNight) -> list[dict[str, Any]]:
@@ -80,17 +114,41 @@ def _exposures(result: CalibratedNight) -> list[dict[str, Any]]:
             "images": len(exposure.xy),
             "identified": identified,
             "rejected": rejected,
+            "icrs": {
+                "quaternion": inertial.quaternion,
+                "quaternion_covariance": inertial.quaternion_covariance,
+                "covariance": inertial.covariance,
+                "right_ascension_deg": math.degrees(inertial.axis[0]),
+                "declination_deg": math.degrees(inertial.axis[1]),
+            },
             "expected_chance_matches": odds,
+            "probability": probability,
+            "log_odds": log_odds,
         }
-        for name, exposure, attitude, covariance, cross, identified, rejected, odds in zip(
+        for (
+            name,
+            exposure,
+            attitude,
+            covariance,
+            cross,
+            inertial,
+            identified,
+            rejected,
+            odds,
+            probability,
+            log_odds,
+        ) in zip(
             result.names,
             result.exposures,
             found.attitudes,
             found.attitude_covariances,
             found.cross_covariances,
+            result.inertial,
             result.identified.tolist(),
             result.rejected.tolist(),
             result.odds.tolist(),
+            result.probabilities.tolist(),
+            result.log_odds.tolist(),
             strict=True,
         )
     ]
@@ -122,6 +180,7 @@ def _images(result: CalibratedNight) -> list[dict[str, Any]]:
         found.residuals.tolist(),
         found.redundancy.tolist(),
         found.standardized.tolist(),
+        result.star_probabilities.tolist(),
         strict=True,
     )
     return [
@@ -132,6 +191,7 @@ def _images(result: CalibratedNight) -> list[dict[str, Any]]:
             "residual_px": residual,
             "redundancy": redundancy,
             "standardized": standardized,
+            "probability": probability,
         }
-        for exposure, star, xy, residual, redundancy, standardized in rows
+        for exposure, star, xy, residual, redundancy, standardized, probability in rows
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Set
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,26 +13,50 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.show.angles import ARCSEC
-from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.night import Night
+from photogram.stellar.lenses import LENSES
+from photogram.stellar.matching import STRETCH
+from photogram.stellar.nights import Night
 from photogram.stellar.parameters import GRAD
 from photogram.stellar.places import Earth, epoch
 from photogram.stellar.pointing import attitude_of
 from photogram.stellar.skies import Exposure
-from photogram.stellar.tomlfile import Document, Table, pole_arcsec, read_document, site
+from photogram.stellar.sky_cameras import SkyCamera
+from photogram.stellar.tomlfile import Document, Table, effects, pole_arcsec, read_document, site
 
-__all__ = ["inputs", "read_night"]
+__all__ = ["AUTO", "inputs", "read_night"]
+
+
+AUTO = "auto"
+"""The lens of a file that leaves the choice to the data."""
 
 
 _TABLES = {
     "labels": ("title",),
     "station": None,
     "earth": ("dut1_s", "pole_x_arcsec", "pole_y_arcsec"),
-    "camera": ("width_px", "height_px", "field_of_view_deg", "start", "prior", "fixed"),
+    "camera": (
+        "width_px",
+        "height_px",
+        "field_of_view_deg",
+        "start",
+        "prior",
+        "fixed",
+        "lens",
+        "common_scale",
+        "tripod",
+    ),
+    "places": ("annual_aberration", "light_deflection", "diurnal_aberration", "refraction"),
     "catalogue": ("file", "epoch", "faintest", "weigh_stars"),
     "images": ("file", "sd_px"),
-    "matching": ("attitude_error_deg", "tolerance_px", "rejection"),
+    "matching": (
+        "attitude_error_deg",
+        "tolerance_px",
+        "rejection",
+        "roll_known",
+        "field_of_view_error",
+        "confirmed",
+    ),
     "exposures": ("name", "utc", "azimuth_deg", "elevation_deg", "roll_deg", "alpha", "omega", "kappa"),
 }
 
@@ -81,20 +106,26 @@ def _night(document: Document) -> Night:
         camera.number("width_px", low=1, high=_LARGEST_FRAME),
         camera.number("height_px", low=1, high=_LARGEST_FRAME),
     )
-    prior = BrownCamera.read(camera.path("prior")) if "prior" in camera else None
+    prior = SkyCamera.read(camera.path("prior")) if "prior" in camera else None
     exposures = _Exposures(document.tables("exposures"), images.path("file"))
     catalogue = _catalogue(stars, exposures.named)
     return Night(
-        site=site(document.table("station")),
+        site=replace(site(document.table("station")), effects=effects(document.optional("places"))),
         catalogue=catalogue,
         frame=frame,
         camera=_start(camera, frame, prior),
+        lenses=tuple(LENSES) if camera.word("lens", "brown") == AUTO else (),
+        common_scale=camera.switch("common_scale", prior is not None and prior.common_scale),
+        tripod=camera.switch("tripod", False),
         exposures=exposures.read(catalogue, frame),
         names=exposures.names,
         pixel_sd=images.positive("sd_px", 0.1),
         attitude_error=math.radians(matching.number("attitude_error_deg", 1.0, low=0, high=180)),
         tolerance=matching.number("tolerance_px", 8.0, low=0.01, high=max(frame)),
         rejection=matching.number("rejection", 4.0, low=0),
+        roll_known=matching.switch("roll_known", True),
+        field_error=matching.number("field_of_view_error", STRETCH, low=1e-4, high=0.5),
+        confirmed=matching.words("confirmed", ()),
         fixed=camera.words("fixed", ()),
         prior=prior,
         weigh_stars=stars.switch("weigh_stars", False),
@@ -106,16 +137,21 @@ def _night(document: Document) -> Night:
     )
 
 
-def _start(table: Table, frame: tuple[float, float], prior: BrownCamera | None) -> BrownCamera:
+def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) -> SkyCamera:
     """Return the camera to begin with: a file, the prior, or an ideal one of the field of view."""
     if "start" in table:
-        return BrownCamera.read(table.path("start"))
+        return SkyCamera.read(table.path("start"))
     if prior is not None:
         return prior
     field = table.number("field_of_view_deg")
-    if not 0 < field < 180:
-        raise table.error("field_of_view_deg", f": the field of view is {field:g} degrees")
-    return BrownCamera.of_field(*frame, math.radians(field))
+    lens = table.word("lens", "brown")
+    if lens not in (*LENSES, AUTO):
+        raise table.error("lens", f"is {lens!r}; lenses are {', '.join((*LENSES, AUTO))}")
+    try:
+        # The choice begins with what sees most.
+        return SkyCamera.of_field(*frame, math.radians(field), "kannala_brandt" if lens == AUTO else lens)
+    except InputError as error:
+        raise table.error("field_of_view_deg", f": {error.message}") from None
 
 
 def _catalogue(table: Table, named: Set[str]) -> Catalogue:

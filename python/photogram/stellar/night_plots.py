@@ -11,7 +11,7 @@ from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from photogram.stellar.night import CalibratedNight
+    from photogram.stellar.nights import CalibratedNight
 
 __all__ = ["figures"]
 

@@ -10,10 +10,39 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["ACCEPTED", "CROWDED", "chance", "expected_false"]
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.network.neighbours import nearest
+
+__all__ = [
+    "ACCEPTED",
+    "CERTAIN",
+    "CROWDED",
+    "DOUBTFUL",
+    "FALSE",
+    "LOG_ODDS",
+    "binomial_tail",
+    "chance",
+    "expected_false",
+    "log_odds",
+    "star_probabilities",
+]
 
 ACCEPTED = 1e-6
 """Expected number of equally good chance matches below which an exposure is accepted."""
+DOUBTFUL = 1e-2
+"""Expected number up to which an exposure that is not accepted may still show the stars found."""
+LOG_ODDS = math.log(1e9)
+"""Logarithm of the odds of D. Lang et al. above which their form accepts an exposure."""
+CERTAIN = 0.95
+"""Probability of a star below which its image has to wait for the calibrated camera."""
+FALSE = 0.1
+"""Share of images of no star that is assumed for single ones."""
+_WRONG = 0.25
+"""The same in the odds of an exposure."""
+_REACH = 6.0
+"""Standard deviations up to which a second star counts."""
 CROWDED = 0.3
 """Catalogue stars in a tolerance area above which counting cannot tell."""
 
@@ -31,11 +60,18 @@ def chance(images: int, fixing: int, mu: float, matched: int) -> float:
         Mean number of catalogue stars in a tolerance area.
     """
     trials, least = images - fixing, matched - fixing
+    return binomial_tail(trials, -math.expm1(-mu), least)
+
+
+def binomial_tail(trials: int, probability: float, least: int) -> float:
+    """Return the probability of at least so many of some trials, summed in logarithms."""
     if least <= 0:
         return 1.0
-    if least > trials or mu <= 0:
+    if least > trials or probability <= 0:
         return 0.0
-    log_p, log_q = math.log(-math.expm1(-mu)), -mu
+    if probability >= 1:
+        return 1.0
+    log_p, log_q = math.log(probability), math.log1p(-probability)
     terms = [
         math.lgamma(trials + 1)
         - math.lgamma(k + 1)
@@ -51,3 +87,65 @@ def chance(images: int, fixing: int, mu: float, matched: int) -> float:
 def expected_false(images: int, fixing: int, mu: float, matched: int, hypotheses: float) -> float:
     """Return how many of so many wrong hypotheses match at least as many images: E = T P."""
     return hypotheses * chance(images, fixing, mu, matched)
+
+
+def _normal(off: Floats, sd: float) -> Floats:
+    """Return the density of an image so far from its star, the same in x and y."""
+    return np.asarray(np.exp(-0.5 * (off / sd) ** 2) / (math.tau * sd**2), float)
+
+
+def star_probabilities(
+    images: Floats, predicted: Floats, found: Indices, sd: float, density: float
+) -> Floats:
+    """Return the probability that images show the stars that they were given.
+
+    Of f, the density of the image about its star, against f' about the next one, and against a false image
+    that has a star by chance: (1 - q) f / ((1 - q) (f + f') + q rho), rho being the density of the stars and
+    q = 0.1.
+
+    Parameters
+    ----------
+    images, predicted
+        (m, 2) and (n, 2).
+    found
+        (m,) index of the star; -1 for none.
+    sd
+        Standard deviation of an image coordinate.
+    density
+        Stars a unit of area.
+
+    Returns
+    -------
+    (m,), NaN where there is no star.
+    """
+    probability = np.full(len(images), np.nan)
+    has = np.flatnonzero(found >= 0)
+    if not len(has):
+        return probability
+    own = np.linalg.norm(images[has] - predicted[found[has]], axis=1)
+    second = nearest(images[has], predicted, float(own.max()) + _REACH * sd, found[has])
+    away = np.where(second >= 0, np.linalg.norm(images[has] - predicted[second], axis=1), np.inf)
+    first = _normal(own, sd)
+    rest = _normal(away, sd) + FALSE / (1 - FALSE) * density
+    probability[has] = first / np.maximum(first + rest, 1e-300)
+    return probability
+
+
+def log_odds(off: Floats, images: int, sd: float, density: float) -> float:
+    """Return the logarithm of the odds of an exposure against chance: each image is a star's or a false one.
+
+    The sum of ln(w f / rho + 1 - w), with w = 0.75, the density f of an image about its star and rho of the
+    stars.
+
+    Parameters
+    ----------
+    off
+        Distances of images from their stars; images without one have none.
+    images
+        All images.
+    sd, density
+        As for `star_probabilities`.
+    """
+    density = max(density, 1e-300)
+    of_stars = np.log((1 - _WRONG) * _normal(np.asarray(off, float), sd) / density + _WRONG)
+    return float(of_stars.sum()) + (images - len(off)) * math.log(_WRONG)

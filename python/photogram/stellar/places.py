@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +15,13 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.show.angles import ARCSEC
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.sky import Site
+from photogram.stellar.sky import Effects, Site
 from photogram.stellar.transformation import pole_matrix, terrestrial
 
-__all__ = ["Earth", "apparent_places", "epoch", "sidereal_time"]
+__all__ = ["Earth", "apparent_places", "epoch", "sidereal_time", "to_date"]
 
 
+_ALL = Effects()
 _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:\.\d*)?)Z?")
 
 
@@ -75,7 +78,7 @@ def epoch(utc: str) -> float:
     return float(erfa.epj(*erfa.taitt(*erfa.utctai(*_utc(utc)))))
 
 
-def apparent_places(catalogue: Catalogue, utc: str) -> Floats:
+def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> Floats:
     """Return geocentric apparent places of a catalogue (true equator and equinox of date).
 
     Proper motion, parallax, light deflection, annual aberration, precession and nutation (IAU 2006/2000A).
@@ -86,6 +89,8 @@ def apparent_places(catalogue: Catalogue, utc: str) -> Floats:
         The stars.
     utc
         Such as 2024-03-01T21:03:05.25.
+    effects
+        Which of light deflection and annual aberration there are.
 
     Returns
     -------
@@ -126,8 +131,41 @@ def apparent_places(catalogue: Catalogue, utc: str) -> Floats:
         raise _no_motion(catalogue)
     # Precession and nutation once for all stars.
     astrometry, origins = erfa.apci13(*tt)
-    right, declination = erfa.atciq(*moved, astrometry)
+    if effects.annual_aberration and effects.light_deflection:
+        right, declination = erfa.atciq(*moved, astrometry)
+    else:
+        right, declination = _reduced(moved, astrometry, effects)
     return np.column_stack([erfa.anp(right - origins), declination])
+
+
+def _reduced(places: Sequence[Floats], astrometry: Any, effects: Effects) -> tuple[Floats, Floats]:
+    """Take the steps of erfa.atciq one by one: places of 2000.0 with their motions to those of date."""
+    import erfa
+
+    right, declination, pm_right, pm_declination, parallax, velocity = places
+    seen = erfa.pmpx(
+        right,
+        declination,
+        pm_right,
+        pm_declination,
+        parallax,
+        velocity,
+        astrometry["pmt"],
+        astrometry["eb"],
+    )
+    if effects.light_deflection:
+        seen = erfa.ldsun(seen, astrometry["eh"], astrometry["em"])
+    if effects.annual_aberration:
+        seen = erfa.ab(seen, astrometry["v"], astrometry["em"], astrometry["bm1"])
+    right, declination = erfa.c2s(erfa.rxp(astrometry["bpn"], seen))
+    return right, declination
+
+
+def to_date(utc: str) -> Floats:
+    """Return the matrix (3, 3) from ICRS to the true equator and equinox of date (IAU 2006/2000A)."""
+    import erfa
+
+    return np.asarray(erfa.pnm06a(*erfa.taitt(*erfa.utctai(*_utc(utc)))), float)
 
 
 def sidereal_time(site: Site, utc: str, dut1: float = 0.0) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.rejection import rejected
-from photogram.stellar.tomlfile import Document, Table, pole_arcsec, read_document, site
+from photogram.stellar.tomlfile import Document, Table, effects, pole_arcsec, read_document, site
 
 __all__ = ["inputs", "read_plain"]
 
@@ -53,6 +54,7 @@ _IMAGE_WEIGHT = ("weight_xx", "weight_yy", "weight_xy")
 _TABLES = {
     "labels": None,
     "station": None,
+    "places": ("diurnal_aberration", "refraction"),
     "reference": None,
     "pole": ("x_arcsec", "y_arcsec"),
     "camera": None,
@@ -115,7 +117,7 @@ def _problem(document: Document) -> Problem:
     star_weight, image_weight = _common_weight(stars), _common_weight(images)
     groups = _Groups(images)
     problem = Problem(
-        site=site(document.table("station")),
+        site=replace(site(document.table("station")), effects=effects(document.optional("places"))),
         star_ids=ids,
         star_names=tuple(row.cells.get("name") or row.cells.get("star", "") for row in star_rows),
         star_places=_pairs(star_rows, "ra_rad", "dec_rad"),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.messages import Message
+from photogram.show.ways import Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.counts import Counts
 from photogram.stellar.moved import Movement
@@ -140,7 +141,7 @@ class PreRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(Judged):
     """A calibration.
 
     Residuals are computed minus measured (the report's v), for stars adjusted minus catalogue: what has to be

@@ -1,4 +1,4 @@
-"""Digital exposures of the sky to a calibrated camera: pinhole and Brown distortion, with full covariance.
+"""Digital exposures of the sky to a calibrated camera of any lens, with full covariance.
 
 Pixels count right and down; x, y, axis of the camera are right-handed: the reflection in the
 report's matrix leads from the left-handed north, east, zenith to them.
@@ -19,17 +19,19 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import available_memory
 from photogram.messages import listed
-from photogram.stellar.cameras import BROWN_PLACE, COMMON, BrownCamera, weight_of
+from photogram.stellar.camera_files import weight_of
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
 from photogram.stellar.problem import weight_root
 from photogram.stellar.sky import Site
+from photogram.stellar.sky_cameras import COMMON, BrownCamera, SkyCamera
 from photogram.stellar.transformation import transformed_angles
 
 __all__ = [
     "BrownCamera",
     "Exposure",
     "SkyCalibration",
+    "SkyCamera",
     "calibrate_exposures",
     "partials",
     "project_sky",
@@ -76,7 +78,7 @@ class SkyCalibration:
     attitudes, attitude_covariances
         (E, 3) alpha, omega, kappa in radians, and (E, 3, 3).
     cross_covariances
-        (E, 3, 9) of attitudes and camera.
+        (E, 3, k) of attitudes and camera.
     exposures, stars
         (m,) exposure and catalogue star of each image used.
     xy, residuals, redundancy, standardized
@@ -93,7 +95,7 @@ class SkyCalibration:
         Of the adjustment.
     """
 
-    camera: BrownCamera
+    camera: SkyCamera
     attitudes: Floats
     attitude_covariances: Floats
     cross_covariances: Floats
@@ -113,28 +115,26 @@ class SkyCalibration:
     status: str
 
 
-def project_sky(camera: BrownCamera, attitude: Floats, site: Site, places: Floats, time: float) -> Floats:
+def project_sky(camera: SkyCamera, attitude: Floats, site: Site, places: Floats, time: float) -> Floats:
     """Return the pixels (n, 2) of apparent places.
 
     NaN below the horizon, behind the camera, and where distortion folds.
     """
     standard = site.standard_coordinates(places, time)
     attitude = np.asarray(attitude, float)
-    pixels = _photocore.plate_images(standard, attitude, camera.common[:13], (1.0, True, False))
-    ideal = np.zeros(13)
-    ideal[3:5] = 1.0
-    square = np.sum(_photocore.plate_images(standard, attitude, ideal, (1.0, True, False)) ** 2, axis=1)
-    # Where radial distortion turns back, it would fold stars from far outside into the frame.
-    k1, k2, k3 = camera.values[4:7]
-    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0]) if camera.values[4:7].any() else np.zeros(0)
-    turns = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real
-    pixels[square >= turns.min(initial=np.inf)] = np.nan
+    pixels = _photocore.plate_images(standard, attitude, camera.common[:-4], camera.kind)
+    limit = _photocore.radial_domain(camera.facts.model, camera.model_values)
+    if limit is not None:
+        # Where radial distortion turns back, it would fold stars from far outside into the frame.
+        ideal = replace(camera, values=np.where(np.arange(len(camera.values)) < 2, 1.0, 0.0))
+        straight = _photocore.plate_images(standard, attitude, ideal.common[:-4], camera.kind)
+        pixels[np.linalg.norm(straight, axis=1) >= limit[0]] = np.nan
     return pixels
 
 
 def stars_near(
     exposure: Exposure,
-    camera: BrownCamera,
+    camera: SkyCamera,
     site: Site,
     catalogue: Catalogue,
     frame: tuple[float, float],
@@ -151,10 +151,8 @@ def stars_near(
         return np.arange(len(catalogue.ids))
     axis = np.array([[math.tan(alpha), math.tan(omega) / math.cos(alpha)]])
     ((ra, dec),) = site.places(axis, sidereal_time(site, exposure.utc, dut1))
-    fx, fy, cx, cy = camera.values[:4]
-    corner = math.hypot(max(cx, frame[0] - cx) / fx, max(cy, frame[1] - cy) / fy)
     # Distortion, and precession over the years.
-    reach = 1.1 * math.atan(corner) + margin + _SLACK
+    reach = 1.1 * camera.largest_angle(frame) + margin + _SLACK
     right, declination = catalogue.places.T
     cosine = np.sin(dec) * np.sin(declination) + np.cos(dec) * np.cos(declination) * np.cos(right - ra)
     return np.flatnonzero(cosine >= math.cos(min(reach, math.pi)))
@@ -162,13 +160,14 @@ def stars_near(
 
 def calibrate_exposures(
     exposures: Sequence[Exposure],
-    camera: BrownCamera,
+    camera: SkyCamera,
     site: Site,
     catalogue: Catalogue,
     *,
     pixel_sd: float = 0.1,
     fixed: Sequence[str] = (),
-    prior: BrownCamera | None = None,
+    common_scale: bool = False,
+    prior: SkyCamera | None = None,
     weigh_stars: bool = False,
     earth: Earth = _STILL,
     threads: int | None = None,
@@ -187,7 +186,9 @@ def calibrate_exposures(
     pixel_sd
         Standard deviation of an image coordinate, pixels.
     fixed
-        Names of camera parameters to hold (of fx, fy, cx, cy, k1, k2, k3, p1, p2).
+        Names of camera parameters to hold (of `camera.names`).
+    common_scale
+        Whether fx is the principal distance of both axes.
     prior
         A calibrated camera, whose values take part with the weight of their covariance; what was held in it
         has no weight.
@@ -202,30 +203,38 @@ def calibrate_exposures(
     Raises
     ------
     InputError
-        An exposure without stars; a parameter that does not exist; a standard deviation that is not positive.
+        An exposure without stars; a parameter that does not exist; a standard deviation that is not positive;
+        a prior of another lens.
     AdjustmentError
         The stars do not determine the camera, or the memory does not hold the adjustment.
     """
-    unknown = sorted(set(fixed) - set(BrownCamera.NAMES))
+    unknown = sorted(set(fixed) - set(camera.names))
     if unknown:
         raise InputError(f"there is no camera parameter {', '.join(unknown)}")
     if not pixel_sd > 0:
         raise InputError(f"the standard deviation of an image coordinate is {pixel_sd} pixels")
+    if prior is not None and (prior.lens, prior.common_scale) != (camera.lens, common_scale):
+        raise InputError(
+            f"the prior is a camera {_described(prior.lens, prior.common_scale)},"
+            f" not {_described(camera.lens, common_scale)}"
+        )
+    camera = _tied(camera, common_scale)
     place = earth.site_of_date(site)
     images = _Images(exposures, place, catalogue, earth.dut1, weigh_stars)
     _refuse_too_large(len(images.xy), len(exposures), weigh_stars)
-    free = np.array([name not in fixed for name in BrownCamera.NAMES])
+    free = np.array([name not in fixed for name in camera.names])
+    free[1] &= not common_scale
     core = _core(images, exposures, camera, place, free, prior, pixel_sd)
     try:
         found = core.adjust(
             unit=1.0, fraction=1e-5, max_iterations=100, covariance=True, threads=threads or 0, progress=None
         )
     except _photocore.StellarError as error:
-        undetermined = _undetermined(error, len(exposures))
+        undetermined = _undetermined(error, camera, len(exposures))
         raise AdjustmentError(f"the stars do not determine the camera: {undetermined}") from None
     weighted = 0 if prior is None else int((prior.known & free).sum())
     freedom = 2 * len(images.xy) + weighted - 3 * len(exposures) - int(free.sum())
-    result = _result(found, images, len(exposures), freedom)
+    result = _result(found, images, camera, len(exposures), freedom)
     if earth.pole == (0.0, 0.0):
         return result
     # The turn between the poles is so small that covariances stay.
@@ -234,13 +243,25 @@ def calibrate_exposures(
     return replace(result, attitudes=result.attitudes + np.remainder(change + np.pi, 2 * np.pi) - np.pi)
 
 
-def _undetermined(error: _photocore.StellarError, exposures: int) -> str:
+def _described(lens: str, common_scale: bool) -> str:
+    return f"of the lens {lens}{' with fx = fy' if common_scale else ''}"
+
+
+def _tied(camera: SkyCamera, common_scale: bool) -> SkyCamera:
+    """Return a camera whose fy is fx, or no longer."""
+    values = camera.values.copy()
+    if common_scale and not camera.common_scale:
+        values[:2] = values[:2].mean()
+    return replace(camera, values=values, common_scale=common_scale)
+
+
+def _undetermined(error: _photocore.StellarError, camera: SkyCamera, exposures: int) -> str:
     """Name what the stars of so many exposures do not determine."""
     kind, message, indices = error.args
     if kind != "undetermined" or not indices:
         return str(message)
     attitudes = sorted({index // 3 + 1 for index in indices if index < 3 * exposures})
-    places = dict(zip(BROWN_PLACE, BrownCamera.NAMES, strict=True))
+    places = dict(zip(camera.facts.places, camera.names, strict=True))
     left = [places[index - 3 * exposures] for index in indices if index >= 3 * exposures]
     if attitudes:
         left.append(f"the attitudes of exposures {listed([str(number) for number in attitudes])}")
@@ -261,7 +282,7 @@ def _refuse_too_large(images: int, exposures: int, weigh_stars: bool) -> None:
 
 def partials(
     exposures: Sequence[Exposure],
-    camera: BrownCamera,
+    camera: SkyCamera,
     site: Site,
     catalogue: Catalogue,
     earth: Earth = _STILL,
@@ -270,13 +291,13 @@ def partials(
 
     Returns
     -------
-    (m, 2, 3) pixels a radian, and (m, 2, 9) in the order of `BrownCamera.NAMES`.
+    (m, 2, 3) pixels a radian, and (m, 2, k) in the order of `camera.names`.
     """
     place = earth.site_of_date(site)
     images = _Images(exposures, place, catalogue, earth.dut1, False)
     core = _core(images, exposures, camera, place, np.ones(len(camera.values), bool), None, 1.0)
     equations = core.equations()
-    return equations["pointing"], equations["common"][:, :, list(BROWN_PLACE)]
+    return equations["pointing"], equations["common"][:, :, list(camera.facts.places)]
 
 
 class _Images:
@@ -294,7 +315,7 @@ class _Images:
             stars.append(exposure.stars[chosen])
             xy.append(exposure.xy[chosen])
             times.append(np.full(len(chosen), sidereal_time(site, exposure.utc, dut1)))
-            places.append(apparent_places(catalogue.take(exposure.stars[chosen]), exposure.utc))
+            places.append(apparent_places(catalogue.take(exposure.stars[chosen]), exposure.utc, site.effects))
         self.exposures, self.stars = np.concatenate(exposure_of), np.concatenate(stars)
         self.xy, self.times = np.vstack(xy), np.concatenate(times)
         every = np.vstack(places)
@@ -316,14 +337,14 @@ class _Images:
 def _core(
     images: _Images,
     exposures: Sequence[Exposure],
-    camera: BrownCamera,
+    camera: SkyCamera,
     site: Site,
     free: NDArray[np.bool_],
-    prior: BrownCamera | None,
+    prior: SkyCamera | None,
     pixel_sd: float,
 ) -> _photocore.StellarProblem:
     first, count = 3 * len(exposures), len(images.xy)
-    place = first + np.array(BROWN_PLACE)
+    place = first + np.array(camera.facts.places)
     fixed = np.ones(first + COMMON, bool)
     fixed[:first] = fixed[place[free]] = False
     weighted, values, root = np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0))
@@ -335,10 +356,10 @@ def _core(
         )
         chosen = np.flatnonzero(prior.known & free)
         weighted, values = place[chosen], prior.values[chosen]
-        root = weight_root(weights[np.ix_(chosen, chosen)], [BrownCamera.NAMES[i] for i in chosen])
+        root = weight_root(weights[np.ix_(chosen, chosen)], [camera.names[i] for i in chosen])
     return _photocore.StellarProblem(
         station=site.core,
-        camera=(1.0, True, False),
+        camera=camera.kind,
         pointings=np.array([exposure.attitude for exposure in exposures], float),
         common=camera.common,
         fixed=fixed.tolist(),
@@ -359,10 +380,12 @@ def _core(
     )
 
 
-def _result(found: dict[str, Any], images: _Images, count: int, freedom: int) -> SkyCalibration:
+def _result(
+    found: dict[str, Any], images: _Images, camera: SkyCamera, count: int, freedom: int
+) -> SkyCalibration:
     mean_error = math.sqrt(sum(found["sums_of_squares"]) / freedom) if freedom > 0 else 1.0
     held = ~images.weighted[:, None]
-    place, variance = list(BROWN_PLACE), mean_error**2
+    place, variance = list(camera.facts.places), mean_error**2
     parameters = found["parameters"]
     with np.errstate(over="ignore"):
         covariance = variance * found["common_cofactors"][np.ix_(place, place)]
@@ -371,8 +394,11 @@ def _result(found: dict[str, Any], images: _Images, count: int, freedom: int) ->
             "the variances of the camera are beyond double precision: images lie too far from their stars, or"
             " standard deviations cannot be right"
         )
+    values = parameters[3 * count :][place]
+    if camera.common_scale:
+        values[1] = values[0]
     return SkyCalibration(
-        camera=BrownCamera(parameters[3 * count :][place], covariance),
+        camera=replace(camera, values=values, covariance=covariance),
         attitudes=parameters[: 3 * count].reshape(count, 3),
         attitude_covariances=variance * found["pointing_cofactors"],
         cross_covariances=variance * np.take(found["cross_cofactors"], place, axis=2),

@@ -17,7 +17,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.show.angles import ARCSEC
 
-__all__ = ["ABERRATION", "TAU", "Air", "Site", "refraction"]
+__all__ = ["ABERRATION", "TAU", "Air", "Effects", "Site", "refraction"]
 
 
 TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)
@@ -105,6 +105,33 @@ def refraction(
 
 
 @dataclass(frozen=True)
+class Effects:
+    """What apparent places are made of: an effect that is left out is taken for none.
+
+    Attributes
+    ----------
+    annual_aberration
+        Of the Earth's motion, up to 20.5 arcsec.
+    light_deflection
+        By the Sun, below 0.01 arcsec at night.
+    diurnal_aberration
+        Of the station's motion, up to 0.32 arcsec.
+    refraction
+        By the air: a minute of arc at 45 degrees.
+    """
+
+    annual_aberration: bool = True
+    light_deflection: bool = True
+    diurnal_aberration: bool = True
+    refraction: bool = True
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the effects that are left out, as reports have them."""
+        return tuple(name.replace("_", " ") for name, taken in vars(self).items() if not taken)
+
+
+@dataclass(frozen=True)
 class Site:
     """A station under the sky.
 
@@ -122,6 +149,8 @@ class Site:
         Constant of diurnal aberration at the equator, radians.
     number, name
         As the station is called.
+    effects
+        Which effects places and standard coordinates have.
     """
 
     latitude: float
@@ -131,11 +160,14 @@ class Site:
     aberration: float = ABERRATION
     number: str = ""
     name: str = ""
+    effects: Effects = field(default_factory=Effects)
 
     @property
     def core(self) -> tuple[float, float, float, float]:
-        """Latitude, aberration, temperature and pressure as the core takes them."""
-        return (self.latitude, self.aberration, self.air.temperature, self.air.pressure)
+        """Latitude, aberration, temperature and pressure as the core takes them: 0 for what is left out."""
+        aberration = self.aberration if self.effects.diurnal_aberration else 0.0
+        pressure = self.air.pressure if self.effects.refraction else 0.0
+        return (self.latitude, aberration, self.air.temperature, pressure)
 
     def standard_coordinates(
         self, places: ArrayLike, sidereal_times: ArrayLike, tau: ArrayLike = TAU

@@ -6,6 +6,7 @@ import math
 import re
 import tomllib
 from collections.abc import Collection, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.messages import listed
 from photogram.show.angles import ARCSEC
-from photogram.stellar.sky import ABERRATION, Air, Site
+from photogram.stellar.sky import ABERRATION, Air, Effects, Site
 
-__all__ = ["Document", "Table", "pole_arcsec", "read_document", "site"]
+__all__ = ["Document", "Table", "effects", "pole_arcsec", "read_document", "site"]
 
 _STATION = {
     "latitude_deg",
@@ -334,6 +335,17 @@ def read_document(path: Path, tables: Mapping[str, Collection[str] | None]) -> D
             if keys is not None:
                 table.only(keys)
     return Document(found, path)
+
+
+def effects(table: Table) -> Effects:
+    """Return which effects apparent places have, all that the table does not switch off.
+
+    Raises
+    ------
+    InputError
+        A value that is neither true nor false.
+    """
+    return Effects(**{one.name: table.switch(one.name, True) for one in fields(Effects)})
 
 
 def site(table: Table) -> Site:

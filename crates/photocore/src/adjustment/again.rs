@@ -38,6 +38,7 @@ impl InDatum {
             redundancy_excess: None,
             unknowns: self.unknowns,
             cofactors: Some(self.cofactors),
+            selected: None,
             undetermined: None,
             counts: problem.counts(held.len()),
             datum: held,

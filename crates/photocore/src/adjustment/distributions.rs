@@ -1,11 +1,15 @@
 //! Tails and quantiles of the distributions that the tests of an adjustment need.
 //!
 //! Tails come from the incomplete gamma and beta functions of `statrs`; quantiles are bisected on the tail that is asked for,
-//! so that small probabilities keep their digits (chi-square values below 1e-15 count as zero). Arguments outside a distribution's
-//! range give NaN.
+//! so that small probabilities keep their digits (chi-square values below 1e-15 count as zero). Upper tails too small for a number
+//! have logarithms, from the continued fractions of the same functions (Abramowitz and Stegun 1964, 6.5.31 and 26.5.8). Arguments
+//! outside a distribution's range give NaN.
 
-use statrs::function::beta::checked_beta_reg;
-use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur};
+use statrs::function::beta::{checked_beta_reg, ln_beta};
+use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur, ln_gamma};
+
+/// Probabilities above it have all their digits; the logarithm of smaller ones comes from a continued fraction.
+const SMALL: f64 = 1e-200;
 
 /// On which side of a value a probability lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +41,56 @@ pub fn chi_square_quantile(probability: f64, dof: f64, tail: Tail) -> f64 {
         return f64::NAN;
     }
     quantile(probability, tail, |x| chi_square(x, dof, tail))
+}
+
+/// Natural logarithm of the probability that a chi-square variable of `dof` degrees of freedom exceeds `x`.
+pub fn log_chi_square(x: f64, dof: f64) -> f64 {
+    let probability = chi_square(x, dof, Tail::Upper);
+    if probability.is_nan() || probability > SMALL || x.is_infinite() {
+        return probability.ln();
+    }
+    let (a, x) = (dof / 2.0, x / 2.0);
+    // 1 / (x + 1 - a - 1 (1 - a) / (x + 3 - a - ...))
+    let fraction = continued_fraction(x + 1.0 - a, |k| (k * (a - k), x + 2.0 * k + 1.0 - a));
+    a * x.ln() - x - ln_gamma(a) - fraction.ln()
+}
+
+/// Natural logarithm of the probability that Fisher's variable of `first` and `second` degrees of freedom exceeds `x`.
+pub fn log_fisher(x: f64, first: f64, second: f64) -> f64 {
+    let probability = fisher(x, first, second);
+    if probability.is_nan() || probability > SMALL || x.is_infinite() {
+        return probability.ln();
+    }
+    let (a, b) = (second / 2.0, first / 2.0);
+    let ratio = first * x / second;
+    let y = 1.0 / (1.0 + ratio);
+    let fraction = continued_fraction(1.0, |k| {
+        let half = (k / 2.0).floor();
+        let term = if k % 2.0 == 0.0 {
+            half * (b - half) * y / ((a + k - 1.0) * (a + k))
+        } else {
+            -(a + half) * (a + b + half) * y / ((a + k - 1.0) * (a + k))
+        };
+        (term, 1.0)
+    });
+    -a * ratio.ln_1p() - b * ratio.recip().ln_1p() - a.ln() - ln_beta(a, b) - fraction.ln()
+}
+
+/// The continued fraction `first + a1 / (b1 + a2 / (b2 + ...))` of the terms `(ak, bk)`, by the method of Lentz.
+fn continued_fraction(first: f64, term: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let nonzero = |value: f64| if value == 0.0 { f64::MIN_POSITIVE } else { value };
+    let mut fraction = nonzero(first);
+    let (mut c, mut d) = (fraction, 0.0);
+    for k in 1..10_000_u16 {
+        let (above, below) = term(f64::from(k));
+        d = nonzero(below + above * d).recip();
+        c = nonzero(below + above / c);
+        fraction *= c * d;
+        if (c * d - 1.0).abs() < 1e-15 {
+            break;
+        }
+    }
+    fraction
 }
 
 /// Probability that the absolute value of Student's variable of `dof` degrees of freedom exceeds that of `t`.
@@ -73,7 +127,7 @@ pub fn fisher_limit(probability: f64, first: f64, second: f64) -> f64 {
 }
 
 /// Bisects the positive numbers, by their exponents first, for the value whose tail holds the probability.
-fn quantile(probability: f64, tail: Tail, of: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn quantile(probability: f64, tail: Tail, of: impl Fn(f64) -> f64) -> f64 {
     if !(probability > 0.0 && probability < 1.0) {
         return f64::NAN;
     }
@@ -116,6 +170,26 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn logarithms_go_on_where_probabilities_end() {
+        // Two degrees of freedom have closed forms: exp(-x / 2), and (1 + 2 x / f)^(-f / 2).
+        for x in [1.0, 900.0, 1000.0, 1e5] {
+            assert!(close(log_chi_square(x, 2.0), -x / 2.0));
+            assert!(close(log_fisher(x, 2.0, 400.0), -200.0 * (x / 200.0).ln_1p()), "{x}");
+        }
+        // Both sides of where the continued fraction begins.
+        for dof in [1.0, 3.0, 250.0] {
+            let (before, after) = (log_chi_square(900.0, dof), log_chi_square(900.0001, dof));
+            let near = quantile(SMALL, Tail::Upper, |x| chi_square(x, dof, Tail::Upper));
+            assert!(before > after);
+            assert!(close(log_chi_square(near * (1.0 + 1e-14), dof), SMALL.ln()), "{dof}");
+            let near = quantile(SMALL, Tail::Upper, |x| fisher(x, dof, 500.0));
+            assert!(close(log_fisher(near * (1.0 + 1e-13), dof, 500.0), SMALL.ln()), "{dof}");
+        }
+        assert_eq!(log_chi_square(f64::INFINITY, 3.0), f64::NEG_INFINITY);
+        assert_eq!(log_fisher(f64::INFINITY, 3.0, 5.0), f64::NEG_INFINITY);
     }
 
     #[test]

@@ -121,7 +121,10 @@ impl Factored {
     }
 
     /// Solves for right-hand sides over all unknowns, one after the other; so are the solutions.
-    pub(super) fn solve_for<M: Model>(
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn solve_for<M: Model>(
         &self,
         problem: &Problem<M>,
         rights: &[f64],
@@ -150,7 +153,7 @@ impl Factored {
 }
 
 /// The equations at some values: it takes a pass over unknowns, and is not kept.
-fn linearized<'a, M: Model>(
+pub(super) fn linearized<'a, M: Model>(
     problem: &'a Problem<M>,
     loss: Option<Loss>,
     values: &[f64],

@@ -58,29 +58,41 @@ mod damped;
 mod datum;
 mod distributions;
 mod factored;
+mod group_test;
 mod loss;
 mod method;
 mod motions;
+mod noncentral;
 mod normal_equations;
+mod observation_rows;
 mod options;
 mod problem;
+mod projection;
 mod published;
 mod resistance;
 mod result;
 mod run;
 mod statistics;
+mod traces;
 mod transformation;
+mod tried;
 mod trust_region;
 mod walk;
 
 pub use datum::{Adjusted, Datum, DatumError, InDatum, in_datum};
 pub use distributions::{
-    Tail, chi_square, chi_square_quantile, fisher, fisher_limit, student, student_limit,
+    Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, student,
+    student_limit,
 };
 pub use factored::{CofactorError, Factored};
+pub use group_test::{GroupTest, VISIBLE, canonical_correlation};
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
+pub use noncentral::{
+    detectable_noncentrality, level_of_equal_power, noncentral_chi_square, noncentral_fisher,
+};
 pub use normal_equations::NormalEquations;
+pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
 pub use problem::{Model, Motions, Problem, Weighted};
 pub use resistance::Classes;
@@ -88,3 +100,5 @@ pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
 pub use run::{Watch, adjust, on_all_processors};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
+pub use traces::{EquationGroups, GroupSquares, Probing};
+pub use tried::{TieCofactors, Tried};

@@ -43,6 +43,9 @@ const HOLDS: f64 = 1e-6;
 /// Local blocks that are added up one after the other.
 const AT_ONCE: usize = 256;
 
+/// Local blocks that are tried at the least where all are known to leave all motions open.
+const TRIED: usize = 1024;
+
 /// Candidates are taken so many at once, in the registers of one instruction: there are seven, and one that moves nothing.
 const LANES: usize = 8;
 
@@ -71,6 +74,11 @@ impl Sums {
             if apart > 0.0 { (self.together[k * stride + k] / apart).sqrt() } else { 0.0 }
         };
         (0..count).map(share).fold(0.0, f64::max)
+    }
+
+    fn multiply(&mut self, factor: f64) {
+        let apart = self.apart.as_flattened_mut().iter_mut();
+        self.together.iter_mut().chain(apart).for_each(|sum| *sum *= factor);
     }
 
     fn add(&mut self, other: &Self) {
@@ -105,6 +113,12 @@ impl<'a> Candidates<'a> {
     /// No sums yet.
     pub fn sums(&self) -> Sums {
         Sums::zero(self.parts)
+    }
+
+    /// Whether any of them moves a fixed unknown.
+    fn move_fixed(&self) -> bool {
+        let moved = |unknown: usize| self.of(unknown).as_flattened().iter().any(|&change| change != 0.0);
+        self.fixed.iter().enumerate().any(|(unknown, &fixed)| fixed && moved(unknown))
     }
 
     /// How they move an unknown.
@@ -210,17 +224,21 @@ impl<M: Model> Problem<M> {
         let fixed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
         let candidates = Candidates::new(motions, &by_unknown, &fixed);
         let equations = pool.install(|| Linearized::of_all(self, values));
+        let known = self.model.groups_leave_open() && !candidates.move_fixed();
+        // One of so many local blocks is tried, and stands for them all.
+        let stride = if known { (layout.locals() / TRIED).max(1) } else { 1 };
+        let tried = layout.locals().div_ceil(stride);
         let chunk = |chunk: usize| {
             let (mut sums, mut buffers) = (candidates.sums(), Buffers::default());
-            let end = ((chunk + 1) * AT_ONCE).min(layout.locals());
-            for local in chunk * AT_ONCE..end {
-                candidates.add_local(&mut sums, &mut buffers, layout, &equations, local);
+            for local in chunk * AT_ONCE..((chunk + 1) * AT_ONCE).min(tried) {
+                candidates.add_local(&mut sums, &mut buffers, layout, &equations, local * stride);
             }
             sums
         };
-        let chunks = (0..layout.locals().div_ceil(AT_ONCE)).into_par_iter();
+        let chunks = (0..tried.div_ceil(AT_ONCE)).into_par_iter();
         let mut sums = candidates.sums();
         pool.install(|| chunks.map(chunk).collect::<Vec<Sums>>()).iter().for_each(|part| sums.add(part));
+        sums.multiply(stride as f64);
         self.for_ties(|tie, rows| {
             equations.write_tie(tie, rows);
             let width = layout.tie_columns(tie).count();

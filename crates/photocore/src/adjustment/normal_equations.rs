@@ -104,8 +104,9 @@ impl<'a, M: Model> NormalEquations<'a, M> {
         let Self { problem, pool, equations, prior, factor, .. } = self;
         let system = &problem.system;
         let selected = unless_stopped(system.invert(pool, factor, &equations, &prior, between))?.selected;
-        let block = |&local: &usize| system.equation_block(&selected, &equations, &prior, local);
-        Ok(locals.iter().map(block).collect())
+        let of =
+            |&local: &usize| system.local_cofactors(&selected, &equations, &prior, &equations, local, &[]);
+        Ok(locals.iter().map(|local| of(local).equations).collect())
     }
 
     /// Solves for other right-hand sides, each over all unknowns, one after the other; so are the solutions.

@@ -54,6 +54,12 @@ pub trait Model: Sync {
         None
     }
 
+    /// Whether what is observed of groups is known to leave all motions open, where none of the unknowns is fixed. They are then tried on some
+    /// groups only.
+    fn groups_leave_open(&self) -> bool {
+        false
+    }
+
     /// Its motions whether or not observations and weights give a datum.
     fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
         self.motions(unknowns)
@@ -187,6 +193,8 @@ impl<M: Model> Problem<M> {
 pub(super) struct Linearized<'a, M: Model> {
     problem: &'a Problem<M>,
     prepared: M::Prepared,
+    /// Standard deviations of the observations; infinite for those that do not take part.
+    observation_sd: &'a [f64],
     /// Which unknowns are fixed or held; None where none is.
     fixed: Option<Vec<bool>>,
     reweighting: Option<Reweighting>,
@@ -212,12 +220,18 @@ impl<'a, M: Model> Linearized<'a, M> {
         let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
         held.iter().for_each(|&unknown| fixed[unknown] = true);
         let fixed = fixed.contains(&true).then_some(fixed);
-        Self { problem, prepared, fixed, reweighting }
+        Self { problem, prepared, observation_sd: &problem.observation_sd, fixed, reweighting }
+    }
+
+    /// The same equations with other standard deviations of the observations.
+    pub fn with_deviations(self, observation_sd: &'a [f64]) -> Self {
+        Self { observation_sd, ..self }
     }
 
     /// With the columns of fixed unknowns, and without a loss.
     pub fn of_all(problem: &'a Problem<M>, values: &[f64]) -> Self {
-        Self { problem, prepared: problem.model.prepare(values), fixed: None, reweighting: None }
+        let prepared = problem.model.prepare(values);
+        Self { problem, prepared, observation_sd: &problem.observation_sd, fixed: None, reweighting: None }
     }
 
     /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).
@@ -264,7 +278,7 @@ impl<M: Model> Equations for Linearized<'_, M> {
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let layout = self.problem.layout();
         self.problem.model.observe(&self.prepared, local, group, rows);
-        let sd = &self.problem.observation_sd[group * layout.rows()..][..layout.rows()];
+        let sd = &self.observation_sd[group * layout.rows()..][..layout.rows()];
         self.weight(sd, rows.constant, &mut [&mut *rows.local, &mut *rows.kept, &mut *rows.common]);
         if let Some(fixed) = &self.fixed {
             let of = |unknown: usize| fixed[unknown];
@@ -278,7 +292,7 @@ impl<M: Model> Equations for Linearized<'_, M> {
         let layout = self.problem.layout();
         self.problem.model.observe_tie(&self.prepared, tie, rows);
         let first = layout.groups() * layout.rows();
-        let sd = &self.problem.observation_sd[first..][layout.tie_rows(tie)];
+        let sd = &self.observation_sd[first..][layout.tie_rows(tie)];
         self.weight(sd, rows.constant, &mut [&mut *rows.coefficients]);
         if let Some(fixed) = &self.fixed {
             leave_out(rows.coefficients, sd.len(), layout.tie_columns(tie).map(|unknown| fixed[unknown]));

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::options::{Iteration, Status};
 use super::statistics::{Counts, Observed, standardized};
-use crate::normals::{Cofactors, Operations, Ordering, Stopped};
+use crate::normals::{Cofactors, Operations, Ordering, SelectedInverse, Stopped};
 
 /// Time spent in each phase, in seconds, over all iterations.
 #[derive(Debug, Clone, Copy, Default)]
@@ -43,6 +43,8 @@ pub struct Adjustment {
     /// Cofactors (a priori unit weight, weights as the loss has changed them), when asked for; none where the last values leave
     /// unknowns undetermined.
     pub cofactors: Option<Cofactors>,
+    /// The inverse that they come from, where tests of groups are to follow.
+    pub(super) selected: Option<SelectedInverse>,
     /// Why the last values give no cofactors although they were asked for.
     pub undetermined: Option<AdjustError>,
     /// Local blocks that the last step has led to where they harm all others (see [`super::Model::collapsed`]): the iterations

@@ -49,9 +49,33 @@ pub fn adjust<M: Model>(
     pool: &ThreadPool,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
+    adjusted(problem, options, pool, watch, false)
+}
+
+/// Adjusts, and keeps what tests of groups of observations need ([`Cofactors::groups`], [`Adjustment::selected`]).
+///
+/// # Errors
+/// Those of [`adjust`].
+pub(super) fn adjust_by_groups<M: Model>(
+    problem: &Problem<M>,
+    options: &Options,
+    pool: &ThreadPool,
+    watch: Watch<'_>,
+) -> Result<Adjustment, AdjustError> {
+    adjusted(problem, options, pool, watch, true)
+}
+
+fn adjusted<M: Model>(
+    problem: &Problem<M>,
+    options: &Options,
+    pool: &ThreadPool,
+    watch: Watch<'_>,
+    by_groups: bool,
+) -> Result<Adjustment, AdjustError> {
     let mut run = Run {
         problem,
         options,
+        by_groups,
         pool,
         watch,
         seconds: Seconds::default(),
@@ -146,6 +170,8 @@ impl<'a, M: Model> End<'a, M> {
 pub(super) struct Run<'a, 'w, M: Model> {
     pub problem: &'a Problem<M>,
     pub options: &'a Options,
+    /// Whether to keep what tests of groups need.
+    by_groups: bool,
     pub pool: &'a ThreadPool,
     watch: &'w mut dyn FnMut(Event) -> ControlFlow<()>,
     seconds: Seconds,
@@ -285,11 +311,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 self.observed_sum(&residuals) + problem.prior_sum_of_squares(&unknowns, 0..unknowns.len());
             self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, &unknowns)?;
         }
-        let cofactors = match end.basis {
-            Some(basis) if self.options.covariance => Some(self.cofactors(basis, &end.unknowns)?),
-            _ => None,
-        };
-        let (cofactors, prior_redundancy) = cofactors.unzip();
+        let (mut cofactors, mut prior_redundancy, mut selected) = (None, None, None);
+        if let Some(basis) = end.basis.filter(|_| self.options.covariance) {
+            let (found, redundancy) = self.cofactors(basis, &end.unknowns)?;
+            (cofactors, prior_redundancy) = (Some(found.cofactors), Some(redundancy));
+            selected = self.by_groups.then_some(found.selected);
+        }
         let redundancy: Option<Vec<f64>> = cofactors
             .as_ref()
             .map(|cofactors: &Cofactors| cofactors.equations.iter().map(|share| 1.0 - share).collect());
@@ -312,6 +339,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             redundancy,
             prior_redundancy,
             cofactors,
+            selected,
             undetermined: end.undetermined,
             counts,
             datum: self.datum,
@@ -331,17 +359,20 @@ impl<'a, M: Model> Run<'a, '_, M> {
         &mut self,
         basis: Basis<'a, M>,
         values: &[f64],
-    ) -> Result<(Cofactors, Vec<f64>), AdjustError> {
+    ) -> Result<(Inversion, Vec<f64>), AdjustError> {
         let Basis { equations, prior, factor } = basis;
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Invert, self.problem.layout().locals());
-        let found = self.problem.system.invert(self.pool, factor, &equations, &prior, &mut between);
-        let Inversion { mut cofactors, inversion_share, .. } = unless_stopped(found)?;
-        let prior_redundancy = self.problem.finish_cofactors(&mut cofactors, &self.datum, values);
+        let system = &self.problem.system;
+        let mut found = unless_stopped(match self.by_groups {
+            true => system.invert_by_groups(self.pool, factor, &equations, &prior, &mut between),
+            false => system.invert(self.pool, factor, &equations, &prior, &mut between),
+        })?;
+        let prior_redundancy = self.problem.finish_cofactors(&mut found.cofactors, &self.datum, values);
         let seconds = start.elapsed().as_secs_f64();
-        self.seconds.invert = seconds * inversion_share;
-        self.seconds.cofactors = seconds * (1.0 - inversion_share);
-        Ok((cofactors, prior_redundancy))
+        self.seconds.invert = seconds * found.inversion_share;
+        self.seconds.cofactors = seconds * (1.0 - found.inversion_share);
+        Ok((found, prior_redundancy))
     }
 
     /// Keeps an iteration that stands, with its corrections, and tells of it.

@@ -60,12 +60,18 @@ pub enum Of {
 /// An adjusted network whose normal equations are factored: cofactors of anything with anything.
 #[derive(Debug)]
 pub struct Covariances {
-    assembled: Assembled,
-    factored: Factored,
+    pub(super) assembled: Assembled,
+    pub(super) factored: Factored,
+    /// How many images the network has.
+    pub(super) images: usize,
+    /// How many observations beside these.
+    pub(super) observations: usize,
     /// The place of each point among those that took part.
-    point: Vec<Option<usize>>,
+    pub(super) point: Vec<Option<usize>>,
     /// A photo of each camera.
-    photo_of_camera: Vec<Option<usize>>,
+    pub(super) photo_of_camera: Vec<Option<usize>>,
+    /// The camera of each photo.
+    pub(super) camera_of_photo: Vec<usize>,
     memory: Option<usize>,
 }
 
@@ -114,7 +120,16 @@ impl Network {
         assembled.points.iter().enumerate().for_each(|(place, &index)| point[index] = Some(place));
         let mut photo_of_camera = vec![None; self.cameras.len()];
         self.photos.iter().enumerate().for_each(|(index, photo)| photo_of_camera[photo.camera] = Some(index));
-        Ok(Covariances { assembled, factored, point, photo_of_camera, memory: options.memory })
+        Ok(Covariances {
+            assembled,
+            factored,
+            images: self.images.len(),
+            observations: self.observations.len(),
+            point,
+            photo_of_camera,
+            camera_of_photo: self.photos.iter().map(|photo| photo.camera).collect(),
+            memory: options.memory,
+        })
     }
 
     /// Takes an adjusted network to another datum without adjusting again: values, cofactors, redundancy numbers.
@@ -189,7 +204,7 @@ impl Network {
     }
 
     /// The problem whose solution a state is.
-    fn assembled_again(
+    pub(super) fn assembled_again(
         &self,
         options: &Options,
         state: &State,
@@ -285,6 +300,12 @@ impl Covariances {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Vec<f64>, NetworkError> {
+        let functions = self.functions(partials, of)?;
+        self.of_functions(&functions, None, pool, watch)
+    }
+
+    /// Linear functions of the unknowns of what is named, a row of partials for each.
+    fn functions(&self, partials: &[f64], of: &[Of]) -> Result<Vec<Function>, NetworkError> {
         let unknowns = self.unknowns(of)?;
         if unknowns.is_empty() || !partials.len().is_multiple_of(unknowns.len()) {
             return Err(NetworkError::Partials { unknowns: unknowns.len(), numbers: partials.len() });
@@ -297,8 +318,25 @@ impl Covariances {
                 })
                 .collect()
         };
-        let functions: Vec<Function> = partials.chunks_exact(unknowns.len()).map(function).collect();
-        self.of_functions(&functions, None, pool, watch)
+        Ok(partials.chunks_exact(unknowns.len()).map(function).collect())
+    }
+
+    /// Q h of such functions h, over all unknowns, in the datum of what was held.
+    pub(super) fn solutions(
+        &self,
+        partials: &[f64],
+        of: &[Of],
+        pool: &ThreadPool,
+    ) -> Result<Vec<Vec<f64>>, NetworkError> {
+        let problem = &self.assembled.problem;
+        let solve = |function: &Function| {
+            let mut right = vec![0.0; problem.layout().unknowns()];
+            function.iter().for_each(|&(unknown, value)| right[unknown] += value);
+            let go_on = &mut |_| ControlFlow::Continue(());
+            let found = self.factored.solve_for(problem, &right, pool, go_on);
+            found.map_err(|error| NetworkError::new(error, &self.assembled))
+        };
+        self.functions(partials, of)?.iter().map(solve).collect()
     }
 
     fn of_functions(

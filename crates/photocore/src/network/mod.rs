@@ -59,6 +59,7 @@ pub mod commons;
 mod covariance;
 mod datum;
 mod error;
+mod groups;
 mod model;
 mod mounts;
 mod naming;
@@ -67,9 +68,12 @@ pub mod observations;
 mod on_frames;
 mod precision;
 mod problem;
+mod responses;
 mod screening;
 mod solution;
 mod start;
+mod suspects;
+mod trial;
 mod weighted_angles;
 
 use std::ops::ControlFlow;
@@ -86,13 +90,17 @@ pub use commons::{AdjustedCommon, Common, CommonKind};
 pub use covariance::{Covariances, NetworkDatum, Of, State};
 pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError, PosePart};
+pub use groups::Groups;
 pub use mounts::Mount;
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub(crate) use precision::median;
+pub use responses::{Moved, UnknownOf};
 pub use screening::{Dropped, Reason};
-pub use solution::{AdjustedPhoto, AdjustedPoint, Solution, SumsOfSquares};
+pub use solution::{AdjustedPhoto, AdjustedPoint, Redundancies, Solution, SumsOfSquares};
 pub(crate) use start::meet;
+pub use suspects::Subject;
+pub use trial::{OnPoint, Out, Prediction, Standing, Tests, Trial};
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
@@ -198,6 +206,9 @@ pub enum UnitVariance {
     /// Photos constrained: every weighted quantity counts.
     #[default]
     Constrained,
+    /// Image coordinates, ground control and what was observed beside these, over the sum of their redundancy numbers: right whatever the
+    /// weights of poses and cameras are.
+    Redundancy,
     /// Set to one.
     Unity,
 }
@@ -270,7 +281,23 @@ impl Network {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, None, pool, watch)
+        self.adjusted(options, None, None, pool, watch)
+    }
+
+    /// Adjusts the network from where an adjustment of it has ended, perhaps with other weights: in the order that was in force, and
+    /// without the points that had run into a station.
+    ///
+    /// # Errors
+    /// Those of [`Network::adjust`]; a state that is not of this network.
+    pub fn adjust_again(
+        &self,
+        options: &Options,
+        state: &State,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solution, NetworkError> {
+        let options = Options { ordering: state.ordering, ..*options };
+        self.adjusted(&options, None, Some(state), pool, watch)
     }
 
     /// Adjusts a network that is free, and takes it to the datum of inner constraints.
@@ -284,18 +311,22 @@ impl Network {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, Some(datum), pool, watch)
+        self.adjusted(options, Some(datum), None, pool, watch)
     }
 
     fn adjusted(
         &self,
         options: &Options,
         datum: Option<&InnerConstraints>,
+        start: Option<&State>,
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
         self.check()?;
         let mut left_out = vec![false; self.points.len()];
+        for &point in start.iter().flat_map(|state| &state.collapsed) {
+            *left_out.get_mut(point).ok_or(NetworkError::State)? = true;
+        }
         let mut before: Option<(Adjustment, problem::Reached)> = None;
         loop {
             let screened = self.screen(&left_out);
@@ -303,7 +334,10 @@ impl Network {
                 return Err(NetworkError::Empty);
             }
             let reached = before.as_ref().map(|(_, reached)| reached);
-            let assembled = pool.install(|| self.assemble(options, screened, reached))?;
+            let mut assembled = pool.install(|| self.assemble(options, screened, reached))?;
+            if let Some(state) = start.filter(|_| before.is_none()) {
+                assembled.go_on_from(state)?;
+            }
             let problem = &assembled.problem;
             assembled.check_memory(options)?;
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());

@@ -634,6 +634,11 @@ impl Model for Bundle {
         near.iter().map(|near| near.point).collect()
     }
 
+    /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.
+    fn groups_leave_open(&self) -> bool {
+        self.refraction.is_none() && self.mounts.iter().all(Option::is_none)
+    }
+
     fn motions(&self, unknowns: &[f64]) -> Option<Motions> {
         if self.placed { None } else { self.rigid_motions(unknowns) }
     }

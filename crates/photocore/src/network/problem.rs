@@ -9,7 +9,7 @@ use super::model::{Bundle, Station};
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
-use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start};
+use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start, State};
 use crate::adjustment::{Method, Model, Problem};
 use crate::geometry::{
     Matrix3, ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, local_vertical, nearest_turns,
@@ -40,6 +40,15 @@ impl Assembled {
             Some(available) if needed > available => Err(NetworkError::Memory { needed, available }),
             _ => Ok(()),
         }
+    }
+
+    /// Begins where an adjustment has ended.
+    pub fn go_on_from(&mut self, state: &State) -> Result<(), NetworkError> {
+        if state.unknowns.len() != self.problem.initial.len() {
+            return Err(NetworkError::State);
+        }
+        self.problem.initial.clone_from(&state.unknowns);
+        Ok(())
     }
 
     /// Takes over adjusted unknowns; `count` is the number of all points.

@@ -47,6 +47,9 @@ pub struct AdjustedPoint {
     pub behind: usize,
 }
 
+/// A redundancy of less is rounding.
+const LEAST_REDUNDANCY: f64 = 1e-9;
+
 /// Weighted sums of squares, weights as the loss has changed them.
 #[derive(Debug, Clone, Copy)]
 pub struct SumsOfSquares {
@@ -69,6 +72,26 @@ impl SumsOfSquares {
     /// All together.
     pub fn total(&self) -> f64 {
         self.camera + self.ground + self.plates + self.observations
+    }
+}
+
+/// Sums of redundancy numbers, of what [`SumsOfSquares`] are sums of squares of.
+#[derive(Debug, Clone, Copy)]
+pub struct Redundancies {
+    /// Of the weighted poses, cameras and common unknowns.
+    pub camera: f64,
+    /// Of the held components of control.
+    pub ground: f64,
+    /// Of the image coordinates.
+    pub plates: f64,
+    /// Of the observations beside these.
+    pub observations: f64,
+}
+
+impl Redundancies {
+    /// Of all but photos and cameras.
+    pub fn measured(&self) -> f64 {
+        self.ground + self.plates + self.observations
     }
 }
 
@@ -113,7 +136,10 @@ pub struct Solution {
     pub collapsed: Vec<usize>,
     /// Weighted sums of squares.
     pub sums_of_squares: SumsOfSquares,
-    /// Degrees of freedom of the chosen unit variance; not positive where there is no redundancy.
+    /// Sums of redundancy numbers; None where there are no cofactors.
+    pub redundancies: Option<Redundancies>,
+    /// Degrees of freedom of the chosen unit variance; not positive where there is no redundancy. Those of all observations where it is
+    /// based on redundancy numbers.
     pub degrees_of_freedom: i64,
     /// Variance of unit weight; None where there are no degrees of freedom.
     pub variance_of_unit_weight: Option<f64>,
@@ -138,12 +164,17 @@ impl Solution {
         let unknowns = std::mem::take(&mut adjustment.unknowns);
         let observations = observations(network, problem, &adjustment);
         let sums_of_squares = sums_of_squares(problem, &adjustment, &unknowns, &observations);
+        let redundancies = redundancies(problem, &adjustment, &observations);
         let degrees_of_freedom = degrees_of_freedom(options.unit_variance, problem, &adjustment);
         let over_freedom = |sum: f64| (degrees_of_freedom > 0).then(|| sum / degrees_of_freedom as f64);
         let variance_of_unit_weight = match options.unit_variance {
             UnitVariance::Unity => Some(1.0),
             UnitVariance::Free => over_freedom(sums_of_squares.measured()),
             UnitVariance::Constrained => over_freedom(sums_of_squares.total()),
+            UnitVariance::Redundancy => redundancies
+                .map(|own| own.measured())
+                .filter(|&own| own > LEAST_REDUNDANCY)
+                .map(|own| sums_of_squares.measured() / own),
         };
         let mut images = vec![None; network.images.len()];
         for (group, &image) in problem.model.order.iter().enumerate() {
@@ -179,6 +210,7 @@ impl Solution {
             lost_digits: 0.0,
             collapsed,
             sums_of_squares,
+            redundancies,
             degrees_of_freedom,
             variance_of_unit_weight,
             adjustment,
@@ -427,6 +459,25 @@ fn sums_of_squares(
     }
 }
 
+/// Sums of redundancy numbers by group; None where there are none.
+fn redundancies(
+    problem: &Problem<Bundle>,
+    adjustment: &Adjustment,
+    observations: &[Option<AdjustedObservation>],
+) -> Option<Redundancies> {
+    let of_observations = adjustment.redundancy.as_ref()?;
+    let of_unknowns = adjustment.prior_redundancy.as_ref()?;
+    let stations = problem.model.of_stations();
+    let images = problem.layout().rows() * problem.model.images.len();
+    let sum = |values: &[f64]| values.iter().sum::<f64>();
+    Some(Redundancies {
+        camera: sum(&of_unknowns[stations.clone()]),
+        ground: sum(&of_unknowns[..stations.start]) + sum(&of_unknowns[stations.end..]),
+        plates: sum(&of_observations[..images]),
+        observations: observations.iter().flatten().fold(0.0, |all, own| all + sum(&own.redundancy)),
+    })
+}
+
 /// Degrees of freedom (GIANT guide, Appendix E): observations are the image coordinates and what was observed beside them, the
 /// held components of control and, with constrained photos, the weighted unknowns of these.
 fn degrees_of_freedom(
@@ -438,7 +489,7 @@ fn degrees_of_freedom(
     let stations = problem.model.of_stations();
     let weighted_cameras = stations.filter(|&unknown| problem.is_weighted(unknown)).count();
     let weighted = match unit_variance {
-        UnitVariance::Constrained => counts.weighted,
+        UnitVariance::Constrained | UnitVariance::Redundancy => counts.weighted,
         UnitVariance::Free | UnitVariance::Unity => counts.weighted - weighted_cameras,
     };
     (counts.observations + weighted) as i64 - counts.unknowns as i64

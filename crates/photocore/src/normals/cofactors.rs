@@ -34,6 +34,19 @@ pub struct Cofactors {
     pub ties: Vec<f64>,
     /// Of the pairs of kept blocks that were asked for, one after the other; NaN where no equations touch both.
     pub pairs: Vec<f64>,
+    /// What the equations of each group have to do with each other, where that was asked for.
+    pub groups: Option<GroupCofactors>,
+}
+
+/// What the equations a of each group have to do with each other. All blocks are square, row by row, one after the other.
+#[derive(Debug, Clone)]
+pub struct GroupCofactors {
+    /// a Q a^T of every two equations of a group. The identity minus it is the cofactor matrix of residuals of unit weight.
+    pub shares: Vec<f64>,
+    /// The same with all unknowns known but those of the local block.
+    pub by_local: Vec<f64>,
+    /// Of each local block, all others being known.
+    pub alone: Vec<f64>,
 }
 
 impl Cofactors {
@@ -84,7 +97,32 @@ impl Cofactors {
             border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
             kept_border = blocks.filter_map(|block| inverse.block(block, layout.kept())).flatten().collect();
         }
-        Some(Self { local, kept, border, kept_border, equations, ties, pairs })
+        Some(Self { local, kept, border, kept_border, equations, ties, pairs, groups: None })
+    }
+}
+
+impl GroupCofactors {
+    /// Puts together what was found at each supernode, and last for the local blocks without equations; None without memory.
+    pub(super) fn collect(system: &System, control: &Control, found: &[AtHome]) -> Option<Self> {
+        let layout = &system.layout;
+        let (size, l) = (layout.rows() * layout.rows(), layout.local_dim());
+        let mut shares = control.allocated(zeros(layout.groups() * size))?;
+        let mut by_local = control.allocated(zeros(layout.groups() * size))?;
+        let mut alone = control.allocated(zeros(layout.locals() * l * l))?;
+        for (index, at_home) in found.iter().enumerate() {
+            let blocks = at_home.alone.chunks_exact(l * l);
+            let mut pairs = at_home.shares.chunks_exact(size).zip(at_home.by_local.chunks_exact(size));
+            for (&block, own) in system.incidence.locals_at(index).iter().zip(blocks) {
+                alone[block as usize * l * l..][..l * l].copy_from_slice(own);
+                for (&group, (together, own)) in
+                    system.incidence.groups_of(layout, block as usize).iter().zip(&mut pairs)
+                {
+                    shares[group as usize * size..][..size].copy_from_slice(together);
+                    by_local[group as usize * size..][..size].copy_from_slice(own);
+                }
+            }
+        }
+        Some(Self { shares, by_local, alone })
     }
 }
 
@@ -95,6 +133,10 @@ pub(super) struct AtHome {
     equations: Vec<f64>,
     /// Of the equations of the ties at home there, in their order: a square block for each.
     ties: Vec<f64>,
+    /// See [`GroupCofactors`]; in the order of the incidence too, empty where they are not asked for.
+    shares: Vec<f64>,
+    by_local: Vec<f64>,
+    alone: Vec<f64>,
     /// Time that it took.
     pub seconds: f64,
 }
@@ -112,12 +154,13 @@ impl AtHome {
         control: &Control,
         front: &[f64],
         height: usize,
+        by_group: bool,
     ) -> Self {
         let start = Instant::now();
         let layout = &system.layout;
         let stacks = system.incidence.stacks_at(index);
         let part = |stacks: Stacks<'_>| {
-            let (mut stack, mut others) = (Stack::default(), Others::default());
+            let (mut stack, mut others) = (Stack::default(), Others { by_group, ..Others::default() });
             let mut part = Self::default();
             for run in stacks.iter().take_while(|_| !control.stopped()) {
                 stack.gather(system, equations, run);
@@ -135,6 +178,9 @@ impl AtHome {
             parts.into_iter().fold(Self::default(), |mut all, part| {
                 all.local.extend(part.local);
                 all.equations.extend(part.equations);
+                all.shares.extend(part.shares);
+                all.by_local.extend(part.by_local);
+                all.alone.extend(part.alone);
                 all
             })
         };
@@ -180,6 +226,8 @@ struct Others {
     h: Vec<f64>,
     /// H Q, row by row.
     hq: Vec<f64>,
+    /// Whether to find [`GroupCofactors`] besides.
+    by_group: bool,
 }
 
 impl Others {
@@ -231,6 +279,9 @@ impl Others {
             unit[a] = 1.0;
             stack.triangles[t].forward::<L>(&mut unit, 1);
             stack.triangles[t].backward::<L>(&mut unit, 1);
+            if self.by_group {
+                found.alone.extend_from_slice(&unit);
+            }
             for b in 0..=a {
                 let value = unit[b] + dot(&self.hq[a * width..][..width], &self.h[b * width..][..width]);
                 (own[a][b], own[b][a]) = (value, value);
@@ -249,8 +300,78 @@ impl Others {
                         &own,
                     ));
                 }
+                if self.by_group {
+                    self.group::<R, L, D>(stack, slot, start, (t, k, p), rows, &own, found);
+                }
             }
         }
+    }
+
+    /// The blocks of [`GroupCofactors`] of group `k` of a slot, `p` of the pattern, for local block `t` of the stack, whose own equations
+    /// were the last that were found.
+    #[inline(always)]
+    fn group<const R: usize, const L: usize, const D: usize>(
+        &self,
+        stack: &Stack,
+        slot: &Slot,
+        start: usize,
+        (t, k, p): (usize, usize, usize),
+        rows: usize,
+        own: &[[f64; L]; L],
+        found: &mut AtHome,
+    ) {
+        let rows = size::<R>(rows);
+        let local = stack.local_rows::<L>(t, p, rows);
+        let diagonal = found.equations.len() - rows;
+        for i in 0..rows {
+            let mut first = local[i];
+            stack.triangles[t].forward::<L>(&mut first, 1);
+            for j in 0..rows {
+                let mut second = local[j];
+                stack.triangles[t].forward::<L>(&mut second, 1);
+                found.by_local.push(dot(&first, &second));
+                found.shares.push(match i == j {
+                    true => found.equations[diagonal + i],
+                    false => self.between::<R, L, D>(stack, slot, start, (t, k, p), (i, j), rows, own),
+                });
+            }
+        }
+    }
+
+    /// a Q b^T of two rows of a group.
+    #[inline(always)]
+    fn between<const R: usize, const L: usize, const D: usize>(
+        &self,
+        stack: &Stack,
+        slot: &Slot,
+        start: usize,
+        (t, k, p): (usize, usize, usize),
+        pair: (usize, usize),
+        rows: usize,
+        own: &[[f64; L]; L],
+    ) -> f64 {
+        let (rows, dim) = (size::<R>(rows), size::<D>(slot.dim));
+        let coefficients = &stack.slot_rows::<D>(slot, rows).rows.values;
+        let kept = |row: usize| {
+            let at = (t * slot.groups.len() + k) * rows + row;
+            (start, &coefficients[at * dim..][..dim])
+        };
+        let common =
+            |row: usize| stack.parts(p).iter().map(move |part| self.common(stack, (t, p, row), rows, part));
+        let of = |row: usize| std::iter::once(kept(row)).chain(common(row));
+        let (a, b) = (&stack.local_rows::<L>(t, p, rows)[pair.0], &stack.local_rows::<L>(t, p, rows)[pair.1]);
+        let mut q = (0..L).map(|d| a[d] * dot(&own[d], b)).sum::<f64>();
+        for (from, to, local) in [(pair.0, None, b), (pair.1, Some(pair.0), a)] {
+            for (first, values) in of(from) {
+                for d in 0..L {
+                    q -= local[d] * dot(&self.hq[d * self.width + first..][..values.len()], values);
+                }
+                if let Some(to) = to {
+                    q += of(to).map(|other| self.product((first, values), other)).sum::<f64>();
+                }
+            }
+        }
+        q
     }
 
     /// a Q a^T of one row of group `k` of a slot, `p` of the pattern, for local block `t` of the stack.

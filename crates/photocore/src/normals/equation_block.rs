@@ -17,27 +17,60 @@ struct Own {
     blocks: BTreeMap<usize, usize>,
 }
 
+/// Cofactors of equations a of one local block, whether or not they take part: with Q the inverse normal matrix.
+#[derive(Debug, Clone)]
+pub struct LocalCofactors {
+    /// a Q a^T of every two equations: square, row by row.
+    pub equations: Vec<f64>,
+    /// Q a^T of the unknowns of the local block, those of each equation together.
+    pub local: Vec<f64>,
+    /// The same of each kept block that the groups of the local block touch; the border is counted after the last.
+    pub others: Vec<(usize, Vec<f64>)>,
+}
+
+impl LocalCofactors {
+    /// How many equations there are.
+    pub fn rows(&self) -> usize {
+        self.equations.len().isqrt()
+    }
+
+    fn unknown(dim: usize, rows: usize, blocks: &BTreeMap<usize, usize>) -> Self {
+        let others = blocks.keys().map(|&block| (block, vec![f64::NAN; rows])).collect();
+        Self { equations: vec![f64::NAN; rows * rows], local: vec![f64::NAN; rows * dim], others }
+    }
+}
+
 impl System {
-    /// a Q a^T of every two equations of a local block: square, row by row, in the order of its groups and rows. NaN where they do not
-    /// determine the local block.
+    /// Cofactors of the equations of a local block, in the order of its groups and rows, and of further ones of its own unknowns alone.
+    /// NaN where the local block is not determined.
     ///
     /// The diagonal is in [`super::Cofactors::equations`]; besides it stands what x and y of an image, or all images of a point, have to
     /// do with each other. With Q_oo the inverse over all that the block is tied to, H = N_ll^-1 N_lo and C = B - A H,
-    /// it is C Q_oo C^T + A N_ll^-1 A^T. `equations` and `prior` must be those that the inverse comes from.
-    pub fn equation_block<E: Equations>(
+    /// a Q a^T is C Q_oo C^T + A N_ll^-1 A^T, Q a^T is Q_oo C^T for the others, N_ll^-1 A^T - H Q_oo C^T for the local block.
+    ///
+    /// * `equations`, `prior`: those that the inverse comes from;
+    /// * `asked`: the equations whose cofactors are asked for, which may have another weight;
+    /// * `further`: coefficients of the unknowns of the local block, one equation after the other.
+    pub fn local_cofactors<E: Equations, F: Equations>(
         &self,
         selected: &SelectedInverse,
         equations: &E,
         prior: &Prior,
+        asked: &F,
         local: usize,
-    ) -> Vec<f64> {
-        let Own { local: a, others: b, blocks } = self.own_equations(equations, local);
-        let rows = a.nrows();
-        let mut normal = a.transpose() * &a;
+        further: &[f64],
+    ) -> LocalCofactors {
+        let formed = self.own_equations(equations, local, &[]);
+        let Own { local: a, others: b, blocks } = self.own_equations(asked, local, further);
+        let (rows, dim) = (a.nrows(), a.ncols());
+        let mut normal = formed.local.transpose() * &formed.local;
         self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
-        let Ok(factor) = normal.llt(Side::Lower) else { return vec![f64::NAN; rows * rows] };
+        let Ok(factor) = normal.llt(Side::Lower) else {
+            return LocalCofactors::unknown(dim, rows, &blocks);
+        };
+        let coupling = factor.solve(formed.local.transpose() * &formed.others);
         let by_local = factor.solve(a.transpose());
-        let c = &b - &a * (&by_local * &b);
+        let c = &b - &a * &coupling;
         let mut q = Mat::<f64>::zeros(b.ncols(), b.ncols());
         for (&row, &first) in &blocks {
             for (&column, &left) in &blocks {
@@ -46,8 +79,18 @@ impl System {
                 values.iter().enumerate().for_each(|(k, &v)| q[(first + k / width, left + k % width)] = v);
             }
         }
-        let found = &c * q * c.transpose() + &a * by_local;
-        (0..rows * rows).map(|k| found[(k / rows, k % rows)]).collect()
+        let others = q * c.transpose();
+        let found = &c * &others + &a * &by_local;
+        let own = by_local - coupling * &others;
+        let of_block = |(&block, &first): (&usize, &usize)| {
+            let width = self.block_dim(block);
+            (block, (0..rows * width).map(|k| others[(first + k % width, k / width)]).collect())
+        };
+        LocalCofactors {
+            equations: (0..rows * rows).map(|k| found[(k / rows, k % rows)]).collect(),
+            local: (0..rows * dim).map(|k| own[(k % dim, k / dim)]).collect(),
+            others: blocks.iter().map(of_block).collect(),
+        }
     }
 
     /// Unknowns of a kept block, or of the border, which is counted after the last.
@@ -55,7 +98,7 @@ impl System {
         if block < self.layout.kept() { self.layout.kept_dim(block) } else { self.layout.border_dim() }
     }
 
-    fn own_equations<E: Equations>(&self, equations: &E, local: usize) -> Own {
+    fn own_equations<E: Equations>(&self, equations: &E, local: usize, further: &[f64]) -> Own {
         let layout = &self.layout;
         let (rows, l, groups) = (layout.rows(), layout.local_dim(), layout.groups_of(local));
         let touched = groups.clone().flat_map(|group| layout.blocks_of(group));
@@ -69,11 +112,11 @@ impl System {
             columns.extend(unknowns.zip(width..));
             width += self.block_dim(block);
         }
-        let mut own = Own {
-            local: Mat::zeros(groups.len() * rows, l),
-            others: Mat::zeros(groups.len() * rows, width),
-            blocks,
-        };
+        let count = groups.len() * rows + further.len() / l;
+        let mut own = Own { local: Mat::zeros(count, l), others: Mat::zeros(count, width), blocks };
+        for (k, &value) in further.iter().enumerate() {
+            own.local[(groups.len() * rows + k / l, k % l)] = value;
+        }
         for (index, group) in groups.enumerate() {
             let main = layout.kept_range(layout.kept_of(group));
             let mut parts = [l, main.len(), layout.common_width(group)].map(|width| vec![0.0; rows * width]);

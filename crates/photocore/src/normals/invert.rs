@@ -8,7 +8,7 @@ use std::time::Instant;
 use faer::{MatMut, MatRef};
 use rayon::ThreadPool;
 
-use super::cofactors::{AtHome, Cofactors};
+use super::cofactors::{AtHome, Cofactors, GroupCofactors};
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
@@ -41,8 +41,34 @@ impl System {
         prior: &Prior,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Inversion> {
+        self.inverted(pool, factor, equations, prior, between, false)
+    }
+
+    /// The same with what the equations of each group have to do with each other ([`Cofactors::groups`]).
+    ///
+    /// [`Cofactors::groups`]: super::Cofactors::groups
+    pub fn invert_by_groups<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        factor: Factor,
+        equations: &E,
+        prior: &Prior,
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Inversion> {
+        self.inverted(pool, factor, equations, prior, between, true)
+    }
+
+    fn inverted<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        factor: Factor,
+        equations: &E,
+        prior: &Prior,
+        between: Between<'_>,
+        by_group: bool,
+    ) -> ControlFlow<Stopped, Inversion> {
         watched(pool, between, |control| {
-            let walk = Walk { system: self, equations, prior, control };
+            let walk = Walk { system: self, equations, prior, control, by_group };
             walk.invert(factor.panels)
         })
     }
@@ -56,6 +82,7 @@ struct Walk<'a, E> {
     equations: &'a E,
     prior: &'a Prior,
     control: &'a Control,
+    by_group: bool,
 }
 
 impl<E: Equations> Walk<'_, E> {
@@ -84,7 +111,10 @@ impl<E: Equations> Walk<'_, E> {
         }
         found.push(self.at_home(count, &[], 0));
         let selected = SelectedInverse { panels };
-        let cofactors = Cofactors::collect(self.system, self.control, &selected, &found)?;
+        let mut cofactors = Cofactors::collect(self.system, self.control, &selected, &found)?;
+        if self.by_group {
+            cofactors.groups = Some(GroupCofactors::collect(self.system, self.control, &found)?);
+        }
         let inversion_share = if inversion > 0.0 { inversion / (inversion + rest) } else { 0.0 };
         Some(Inversion { cofactors, selected, inversion_share })
     }
@@ -123,7 +153,8 @@ impl<E: Equations> Walk<'_, E> {
     }
 
     fn at_home(&self, index: usize, front: &[f64], height: usize) -> AtHome {
-        AtHome::new(self.system, index, self.equations, self.prior, self.control, front, height)
+        let Self { system, equations, prior, control, by_group } = *self;
+        AtHome::new(system, index, equations, prior, control, front, height, by_group)
     }
 }
 

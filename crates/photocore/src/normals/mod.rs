@@ -69,8 +69,9 @@ mod vectorised;
 mod watch;
 mod workspace;
 
-pub use cofactors::Cofactors;
+pub use cofactors::{Cofactors, GroupCofactors};
 pub use deficiency::Deficiency;
+pub use equation_block::LocalCofactors;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
 pub use factor::Factor;
 pub use functions::{Function, Functions};

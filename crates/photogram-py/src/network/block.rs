@@ -118,6 +118,7 @@ fn block_network(
             "free" => UnitVariance::Free,
             "constrained" => UnitVariance::Constrained,
             "unity" => UnitVariance::Unity,
+            "redundancy" => UnitVariance::Redundancy,
             other => return Err(unknown("unit_variance", other)),
         },
         start: Start::Intersected,

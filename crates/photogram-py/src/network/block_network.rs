@@ -1,13 +1,15 @@
 //! A block as the core has it: adjusted, taken to other datums, asked for covariances.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
-use photocore::adjustment::DatumError;
-use photocore::network::{Covariances, Network, NetworkDatum, NetworkError as Failure, Of, Options};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
+use photocore::adjustment::{DatumError, GroupSquares, Probing};
+use photocore::network::{Covariances, Groups, Network, NetworkDatum, NetworkError as Failure, Of, Options};
 use pyo3::prelude::*;
 
 use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
+use super::trial::NetworkTrial;
 use super::{BlockError, failure};
+use crate::arrays::group_rows;
 use crate::options::unknown;
 use crate::work::{Workers, watched};
 
@@ -27,14 +29,14 @@ pub struct BlockNetwork {
 /// Covariances of an adjusted block, from one factor.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct BlockCovariances {
-    covariances: Covariances,
+    pub(super) covariances: Covariances,
     images: usize,
 }
 
 /// Something that has cofactors: its kind and its index.
-type OfRow = (String, usize);
+pub(super) type OfRow = (String, usize);
 
-fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
+pub(super) fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
     let of = |(kind, index): OfRow| match kind.as_str() {
         "photo" => Ok(Of::Photo(index)),
         "step" => Ok(Of::PhotoStep(index)),
@@ -46,26 +48,44 @@ fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
     rows.into_iter().map(of).collect()
 }
 
+/// Factors the normal equations of a network where its adjustment has ended.
+pub fn factored(
+    py: Python<'_>,
+    (network, options): (&Network, &Options),
+    state: &BlockState,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Result<BlockCovariances, Failure>> {
+    let images = network.images.len();
+    let found = watched(py, Workers::of(threads, images), progress, |pool, watch| {
+        network.covariances(options, &state.state, None, pool, watch)
+    })?;
+    Ok(found.map(|covariances| BlockCovariances { covariances, images }))
+}
+
 fn refused(error: &Failure) -> PyErr {
     BlockError::new_err(failure(error, "block"))
 }
 
 #[pymethods]
 impl BlockNetwork {
-    #[pyo3(signature = (*, datum, threads, progress))]
+    #[pyo3(signature = (*, datum, threads, progress, start = None))]
     fn adjust(
         &self,
         py: Python<'_>,
         datum: Option<DatumRow>,
         threads: usize,
         progress: Option<Py<PyAny>>,
+        start: Option<PyRef<'_, BlockState>>,
     ) -> PyResult<BlockSolution> {
         let workers = Workers::of(threads, self.network.images.len());
         let inner = datum.map(datum_of).transpose()?;
-        let solution = watched(py, workers, progress, |pool, watch| match &inner {
-            Some(NetworkDatum::Inner(inner)) => {
+        let start = start.map(|start| start.state.clone());
+        let solution = watched(py, workers, progress, |pool, watch| match (&inner, &start) {
+            (Some(NetworkDatum::Inner(inner)), _) => {
                 self.network.adjust_in_datum(&self.options, inner, pool, watch)
             }
+            (_, Some(start)) => self.network.adjust_again(&self.options, start, pool, watch),
             _ => self.network.adjust(&self.options, pool, watch),
         })?;
         solution.map(|solution| BlockSolution { solution, unknowns: 6 }).map_err(|error| refused(&error))
@@ -96,11 +116,17 @@ impl BlockNetwork {
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<BlockCovariances> {
+        let found = factored(py, (&self.network, &self.options), state, threads, progress)?;
+        found.map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn trial(&self, py: Python<'_>, state: &BlockState, threads: usize) -> PyResult<NetworkTrial> {
         let images = self.network.images.len();
-        let found = watched(py, Workers::of(threads, images), progress, |pool, watch| {
-            self.network.covariances(&self.options, &state.state, None, pool, watch)
+        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
+            self.network.trial(&self.options, &state.state, pool)
         })?;
-        found.map(|covariances| BlockCovariances { covariances, images }).map_err(|error| refused(&error))
+        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (state, *, threads))]
@@ -154,6 +180,80 @@ impl BlockCovariances {
         })?;
         PyArray1::from_vec(py, found.map_err(|error| refused(&error))?).reshape([count, count])
     }
+
+    #[pyo3(signature = (groups, *, classes, exact, vectors, seed, threads, progress))]
+    fn group_squares<'py>(
+        &self,
+        py: Python<'py>,
+        groups: GroupsRow<'py>,
+        classes: Option<usize>,
+        exact: usize,
+        vectors: usize,
+        seed: u64,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<SquaresRow<'py>> {
+        let groups = groups_of(groups)?;
+        let probing = Probing { exact, vectors, seed };
+        let workers = Workers::of(threads, self.images);
+        let found = watched(py, workers, progress, |pool, watch| match classes {
+            None => self.covariances.group_squares(&groups, &probing, pool, watch),
+            Some(classes) => {
+                let squares = self.covariances.own_squares(&groups, classes, &probing, pool, watch)?;
+                Ok(GroupSquares { equations: vec![], squares, exact: vec![] })
+            }
+        })?;
+        let GroupSquares { equations, squares, exact } = found.map_err(|error| refused(&error))?;
+        Ok((equations, PyArray1::from_vec(py, squares), exact))
+    }
+
+    #[pyo3(signature = (columns, *, threads, progress))]
+    fn project_images<'py>(
+        &self,
+        py: Python<'py>,
+        columns: PyReadonlyArrayDyn<'_, f64>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let count = columns.as_array().shape().first().copied().unwrap_or(0);
+        let columns: Vec<f64> = columns.as_array().iter().copied().collect();
+        let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
+            self.covariances.project_images(&columns, pool, watch)
+        })?;
+        let found = found.map_err(|error| refused(&error))?;
+        PyArray1::from_vec(py, found).reshape([count, self.images, 2])
+    }
+}
+
+/// Number of groups, and the group of each coordinate of images, component of points, unknown of poses, of each camera, common unknown and
+/// other observation; -1 for none.
+type GroupsRow<'py> = (
+    usize,
+    PyReadonlyArrayDyn<'py, i64>,
+    PyReadonlyArrayDyn<'py, i64>,
+    PyReadonlyArrayDyn<'py, i64>,
+    Vec<i64>,
+    Vec<i64>,
+    Vec<i64>,
+);
+
+/// Equations of each group, sums of squares, and which columns of them are exact.
+type SquaresRow<'py> = (Vec<usize>, Bound<'py, PyArray1<f64>>, Vec<bool>);
+
+fn groups_of(
+    (count, images, points, photos, cameras, commons, observations): GroupsRow<'_>,
+) -> PyResult<Groups> {
+    let number = |group: i64| usize::try_from(group).unwrap_or(usize::MAX);
+    let all = |groups: Vec<i64>| groups.into_iter().map(number).collect();
+    Ok(Groups {
+        count,
+        images: group_rows("images", &images)?,
+        points: group_rows("points", &points)?,
+        photos: group_rows("photos", &photos)?,
+        cameras: all(cameras),
+        commons: all(commons),
+        observations: all(observations),
+    })
 }
 
 impl BlockCovariances {

@@ -8,16 +8,79 @@ use photocore::network::{Camera, Network, NetworkError as Failure, Options, Phot
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::block_network::{BlockCovariances, factored};
 use super::solution::CollectionSolution;
-use super::{CollectionError, adjusted, failure, images, points, said};
+use super::state::BlockState;
+use super::trial::NetworkTrial;
+use super::{CollectionError, failure, images, points, said};
 use crate::arrays::{check_lengths, rows, slices, table};
 use crate::options::{named_loss, named_ordering, unknown};
+use crate::work::{Workers, watched};
 
 /// Adds the functions to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("CAMERAS", geometry::Camera::NAMES.to_vec())?;
     module.add_function(wrap_pyfunction!(collection_images, module)?)?;
-    module.add_function(wrap_pyfunction!(adjust_collection, module)?)
+    module.add_class::<CollectionNetwork>()?;
+    module.add_function(wrap_pyfunction!(collection_network, module)?)
+}
+
+/// A collection with the options of its adjustment.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct CollectionNetwork {
+    network: Network,
+    options: Options,
+    /// Of a photo: its pose and its camera.
+    unknowns: usize,
+}
+
+#[pymethods]
+impl CollectionNetwork {
+    #[pyo3(signature = (*, threads, progress, start = None))]
+    fn adjust(
+        &self,
+        py: Python<'_>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+        start: Option<PyRef<'_, BlockState>>,
+    ) -> PyResult<CollectionSolution> {
+        let workers = Workers::of(threads, self.network.images.len());
+        let start = start.map(|start| start.state.clone());
+        let solution = watched(py, workers, progress, |pool, watch| match &start {
+            None => self.network.adjust(&self.options, pool, watch),
+            Some(start) => self.network.adjust_again(&self.options, start, pool, watch),
+        })?;
+        let unknowns = self.unknowns;
+        solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads, progress))]
+    fn covariances(
+        &self,
+        py: Python<'_>,
+        state: &BlockState,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<BlockCovariances> {
+        let found = factored(py, (&self.network, &self.options), state, threads, progress)?;
+        found.map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn trial(&self, py: Python<'_>, state: &BlockState, threads: usize) -> PyResult<NetworkTrial> {
+        let images = self.network.images.len();
+        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
+            self.network.trial(&self.options, &state.state, pool)
+        })?;
+        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
+    }
+}
+
+fn refused(error: &Failure) -> PyErr {
+    match error {
+        Failure::Index(_) => PyValueError::new_err(said(error, "collection")),
+        error => CollectionError::new_err(failure(error, "collection")),
+    }
 }
 
 /// Parameters of a pose in vectors.
@@ -63,10 +126,9 @@ fn collection_images<'py>(
 #[pyfunction]
 #[pyo3(signature = (
     camera, photo_parameters, photo_sd, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, decrease,
-    max_iterations, covariance, loss, ordering, threads, memory, progress
+    max_iterations, covariance, loss, ordering, memory
 ))]
-fn adjust_collection(
-    py: Python<'_>,
+fn collection_network(
     camera: &str,
     photo_parameters: PyReadonlyArrayDyn<'_, f64>,
     photo_sd: PyReadonlyArrayDyn<'_, f64>,
@@ -81,10 +143,8 @@ fn adjust_collection(
     covariance: bool,
     loss: Option<(&str, f64)>,
     ordering: &str,
-    threads: usize,
     memory: Option<usize>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<CollectionSolution> {
+) -> PyResult<CollectionNetwork> {
     let given = photos(camera, "photo_parameters", &photo_parameters)?.collect::<PyResult<Vec<_>>>()?;
     let unknowns = POSE + model(camera)?.parameters.len();
     let sd = slices("photo_sd", &photo_sd, unknowns)?;
@@ -123,9 +183,5 @@ fn adjust_collection(
         memory,
         minimum: None,
     };
-    let solution = adjusted(py, &network, &options, threads, progress)?;
-    solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| match error {
-        Failure::Index(_) => PyValueError::new_err(said(&error, "collection")),
-        error => CollectionError::new_err(failure(&error, "collection")),
-    })
+    Ok(CollectionNetwork { network, options, unknowns })
 }

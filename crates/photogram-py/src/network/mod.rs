@@ -6,17 +6,15 @@ mod collection;
 mod first_values;
 mod solution;
 mod state;
+mod trial;
 
 use numpy::PyReadonlyArrayDyn;
-use photocore::network::{
-    Coarse, Combination, Image, Network, NetworkError as Failure, Options, Point, PosePart, Solution,
-};
+use photocore::network::{Coarse, Combination, Image, NetworkError as Failure, Point, PosePart};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 use crate::arrays::{check_lengths, indices, rows};
-use crate::work::{Workers, watched};
 
 create_exception!(
     _photocore,
@@ -39,6 +37,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     block_network::register(module)?;
     collection::register(module)?;
     first_values::register(module)?;
+    trial::register(module)?;
     solution::register(module)
 }
 
@@ -67,17 +66,6 @@ fn images(
     )?;
     let image = |i: usize| Image { photo: photos[i], point: points[i], xy: xy[i], sd: sd[i] };
     Ok((0..xy.len()).map(image).collect())
-}
-
-fn adjusted(
-    py: Python<'_>,
-    network: &Network,
-    options: &Options,
-    threads: usize,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<Result<Solution, Failure>> {
-    let workers = Workers::of(threads, network.images.len());
-    watched(py, workers, progress, |pool, watch| network.adjust(options, pool, watch))
 }
 
 /// What an undetermined combination moves: photos, cameras, common unknowns, parameters of cameras, parts of poses.

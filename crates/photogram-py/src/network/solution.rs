@@ -201,6 +201,11 @@ macro_rules! solution_class {
             }
 
             #[getter]
+            fn state(&self) -> BlockState {
+                BlockState { state: self.solution.state.clone() }
+            }
+
+            #[getter]
             fn datum(&self) -> Vec<(usize, usize)> {
                 self.solution.datum.clone()
             }
@@ -213,11 +218,6 @@ macro_rules! solution_class {
 solution_class! {
     /// An adjusted block.
     BlockSolution, "block", {
-        #[getter]
-        fn state(&self) -> BlockState {
-            BlockState { state: self.solution.state.clone() }
-        }
-
         #[getter]
         fn lost_digits(&self) -> f64 {
             self.solution.lost_digits
@@ -300,6 +300,11 @@ solution_class! {
         fn sums_of_squares(&self) -> (f64, f64, f64, f64) {
             let sums = self.solution.sums_of_squares;
             (sums.camera, sums.ground, sums.plates, sums.observations)
+        }
+
+        #[getter]
+        fn redundancies(&self) -> Option<(f64, f64, f64, f64)> {
+            self.solution.redundancies.map(|own| (own.camera, own.ground, own.plates, own.observations))
         }
 
         #[getter]

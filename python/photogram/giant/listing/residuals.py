@@ -78,7 +78,7 @@ def _entries(point: PointResiduals) -> list[list[str]]:
     return entries
 
 
-def statistics(sums: SumsOfSquares, degrees_of_freedom: int, variance: float | None) -> list[str]:
+def statistics(sums: SumsOfSquares, degrees_of_freedom: float, variance: float | None) -> list[str]:
     """Return the weighted sums of squares and the estimates for unit weight; `variance` None is undefined."""
     parts = {"CAMERA": sums.camera, "GROUND": sums.ground, "PLATES": sums.plates, "TOTAL": sums.total}
     lines = [
@@ -88,7 +88,7 @@ def statistics(sums: SumsOfSquares, degrees_of_freedom: int, variance: float | N
     return [
         "",
         *lines,
-        f"{'DEGREES OF FREEDOM':.<40} ={degrees_of_freedom:>12d}",
+        f"{'DEGREES OF FREEDOM':.<40} ={degrees_of_freedom:>12.0f}",
         "",
         "A POSTERIORI ESTIMATES FOR UNIT WEIGHT",
         *(

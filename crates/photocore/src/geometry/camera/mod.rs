@@ -245,6 +245,8 @@ cameras! { $
         RadTanThinPrismFisheye;
         SimpleDivision;
         Division;
+        Equisolid;
+        Stereographic;
         Eucm;
         AgisoftFrame;
         AgisoftFisheye;

@@ -92,6 +92,59 @@ impl RayProjection for Equidistant {
     }
 }
 
+/// (X, Y) 2 sin(theta / 2) / rho: equisolid, equal areas of the sky are equal areas of the image.
+#[derive(Debug, Clone, Copy)]
+pub struct Equisolid;
+
+impl RayProjection for Equisolid {
+    #[inline(always)]
+    fn project([x, y, z]: [f64; 3], _: [f64; 2]) -> Seen {
+        let d = (x * x + y * y + z * z).sqrt();
+        // 2 sin(theta / 2) / rho = (2 / (d (d + Z)))^(1/2).
+        let product = d * (d + z);
+        let h = (2.0 / product).sqrt();
+        let slope = -0.5 * h / product;
+        let (bend, along) = (slope * (2.0 + z / d), slope * (2.0 * z + d + z * z / d));
+        let by_ray =
+            [[h + x * x * bend, x * y * bend, x * along], [x * y * bend, h + y * y * bend, y * along]];
+        Seen { ab: [h * x, h * y], by_ray, by_own: [[0.0; 2]; 2] }
+    }
+
+    fn ray([a, b]: [f64; 2], _: [f64; 2]) -> Option<[f64; 3]> {
+        let quarter = 0.25 * (a * a + b * b);
+        let cosine = (1.0 - quarter).sqrt();
+        (quarter <= 1.0).then(|| [cosine * a, cosine * b, 1.0 - 2.0 * quarter])
+    }
+
+    /// All angles up to pi are seen.
+    fn faces(_: [f64; 3], _: [f64; 2]) -> bool {
+        true
+    }
+}
+
+/// (X, Y) 2 tan(theta / 2) / rho: stereographic, circles of the sky are circles of the image.
+#[derive(Debug, Clone, Copy)]
+pub struct Stereographic;
+
+/// alpha and beta of [`ExtendedUnified`] that make it stereographic: 2 tan(theta / 2) / rho = 1 / (d / 2 + Z / 2).
+const STEREOGRAPHIC: [f64; 2] = [0.5, 1.0];
+
+impl RayProjection for Stereographic {
+    #[inline(always)]
+    fn project(ray: [f64; 3], _: [f64; 2]) -> Seen {
+        ExtendedUnified::project(ray, STEREOGRAPHIC)
+    }
+
+    fn ray(ab: [f64; 2], _: [f64; 2]) -> Option<[f64; 3]> {
+        ExtendedUnified::ray(ab, STEREOGRAPHIC)
+    }
+
+    /// All angles below pi are seen.
+    fn faces(_: [f64; 3], _: [f64; 2]) -> bool {
+        true
+    }
+}
+
 /// (X, Y) / Z times atan(2 r tan(omega / 2)) / (r omega), r being its length (Devernay and Faugeras 2001).
 #[derive(Debug, Clone, Copy)]
 pub struct FieldOfView;

@@ -5,7 +5,8 @@
 
 use super::inverse::{Matrix2, RadialFactor, RadialLimit, from_radial};
 use super::projections::{
-    Central, DivisionByRadius, Equidistant, ExtendedUnified, FieldOfView, RayProjection, Seen,
+    Central, DivisionByRadius, Equidistant, Equisolid as EquisolidRays, ExtendedUnified, FieldOfView,
+    RayProjection, Seen, Stereographic as StereographicRays,
 };
 use super::radial_tangential::{Bent, RadialTangential};
 use super::{CameraModel, Image, Unit};
@@ -404,6 +405,16 @@ cameras_of_vision! {
     Division[5] = "division", DivisionByRadius, false, 0,
         "(A, B) = (P1, -P2) 2 / (-P3 + sqrt(P3^2 - 4 k (P1^2 + P2^2))), image = (fx A + cx, fy B + cy)",
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k": Own(0)];
+    /// A fisheye that shows equal areas of the sky as equal areas, as most lenses of all-sky cameras do.
+    Equisolid[6] = "equisolid", EquisolidRays, false, 0,
+        "(a, b) = 2 sin(theta / 2) (P1, -P2) / rho, rho = hypot(P1, P2), theta = atan2(rho, -P3), r^2 = a^2 + b^2, \
+         (A, B) = (a, b) (1 + k1 r^2 + k2 r^4), image = (fx A + cx, fy B + cy)",
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2)];
+    /// A fisheye that shows circles of the sky as circles.
+    Stereographic[6] = "stereographic", StereographicRays, false, 0,
+        "(a, b) = 2 tan(theta / 2) (P1, -P2) / rho, rho = hypot(P1, P2), theta = atan2(rho, -P3), r^2 = a^2 + b^2, \
+         (A, B) = (a, b) (1 + k1 r^2 + k2 r^4), image = (fx A + cx, fy B + cy)",
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2)];
     /// EUCM of COLMAP: the extended unified camera (Khomutenko, Garcia and Martinet 2016).
     Eucm[6] = "eucm", ExtendedUnified, false, 0,
         "d = sqrt(beta (P1^2 + P2^2) + P3^2), (A, B) = (P1, -P2) / (alpha d - (1 - alpha) P3), image = (fx A + cx, fy B + cy)",

@@ -1,6 +1,7 @@
-//! The camera: from standard coordinates to the plate, with partials (NOAA TR NOS 55, equations 38 to 41).
+//! The camera: from standard coordinates to the plate, with partials (NOAA TR NOS 55, equations 38 to 41), or to the image of any other
+//! lens.
 
-use crate::geometry::{Displacement, Distortion, Matrix3, Vector3, pointing_with_partials};
+use crate::geometry::{Camera as Lens, Displacement, Distortion, Matrix3, Vector3, pointing_with_partials};
 
 /// Number of interior parameters.
 pub const INTERIOR: usize = 13;
@@ -26,6 +27,9 @@ pub enum Decentering {
 /// The kind of a camera: what is not estimated.
 #[derive(Debug, Clone, Copy)]
 pub struct Kind {
+    /// Another model than that of plates: the interior parameters are its own, then as many zeros as are left; x counts right, y down.
+    /// Its values do not matter.
+    pub lens: Option<Lens>,
     /// Order of scale and distortion.
     pub form: Form,
     /// Parameters of the decentering distortion.
@@ -34,13 +38,21 @@ pub struct Kind {
     pub common_scale: bool,
 }
 
+impl Kind {
+    /// Where the principal distances of x and y stand among the interior parameters; every lens that has two begins with them.
+    pub fn scales(&self) -> [usize; 2] {
+        if self.lens.is_some() { [0, 1] } else { [3, 4] }
+    }
+}
+
 /// A camera at given values of its interior parameters.
 #[derive(Debug, Clone, Copy)]
 pub struct Camera {
     kind: Kind,
-    /// epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3.
+    /// epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3; or those of the lens.
     interior: [f64; INTERIOR],
     distortion: Distortion,
+    lens: Option<Lens>,
 }
 
 /// An image and its partials; the first index is x or y.
@@ -81,15 +93,17 @@ impl Camera {
     /// A camera with the given interior parameters.
     pub fn new(kind: Kind, mut interior: [f64; INTERIOR]) -> Self {
         if kind.common_scale {
-            interior[4] = interior[3];
+            let [x, y] = kind.scales();
+            interior[y] = interior[x];
         }
+        let lens = kind.lens.and_then(|lens| lens.with_parameters(&interior[..lens.parameter_names().len()]));
         let [k4, k5, phi] = [interior[10], interior[11], interior[12]];
         let (profile, direction) = match kind.decentering {
             Decentering::Polar => ([k4, k5], [phi.cos(), phi.sin()]),
             Decentering::Cartesian => ([1.0, phi], [k4, k5]),
         };
         let radial = [interior[7], interior[8], interior[9]];
-        Self { kind, interior, distortion: Distortion { radial, profile, direction } }
+        Self { kind, interior, distortion: Distortion { radial, profile, direction }, lens }
     }
 
     /// epsilon, xp, yp, cx, cy, dx, dy, and the rest.
@@ -111,8 +125,41 @@ impl Camera {
         }
     }
 
+    /// The image of standard coordinates through another lens, with all partials.
+    fn through(&self, lens: &Lens, attitude: &Attitude, standard: [f64; 2]) -> PlateImage {
+        // A direction has y down and looks along z; that of a photo y up and looks along -z.
+        let turned = |matrix: &Matrix3| {
+            let [m, n, q] = Attitude::turned(matrix, standard);
+            Vector3::new(m, -n, -q)
+        };
+        let u = turned(&attitude.matrix);
+        let seen = lens.linearize(&u);
+        let xy = if lens.faces(&u) { seen.xy } else { [f64::NAN; 2] };
+        let along = attitude.matrix;
+        let axes = [0, 1].map(|k| Vector3::new(along[(0, k)], -along[(1, k)], -along[(2, k)]));
+        let angles = attitude.partials.each_ref().map(turned);
+        let mut interior = seen.by_parameters.map(|row| {
+            let mut all = [0.0; INTERIOR];
+            all[..row.len()].copy_from_slice(&row);
+            all
+        });
+        if self.kind.common_scale {
+            let [x, y] = self.kind.scales();
+            interior.iter_mut().for_each(|row| row[x] += std::mem::take(&mut row[y]));
+        }
+        PlateImage {
+            xy,
+            standard: seen.by_u.map(|row| axes.map(|axis| row.dot(&axis))),
+            pointing: seen.by_u.map(|row| angles.map(|angle| row.dot(&angle))),
+            interior,
+        }
+    }
+
     /// The image of standard coordinates, with all partials.
     pub fn linearize(&self, attitude: &Attitude, standard: [f64; 2]) -> PlateImage {
+        if let Some(lens) = &self.lens {
+            return self.through(lens, attitude, standard);
+        }
         let [m, n, q] = Attitude::turned(&attitude.matrix, standard);
         // A direction behind the camera has no image.
         let q = if q > 0.0 { q } else { f64::NAN };
@@ -210,7 +257,12 @@ impl Camera {
 
     /// Frees a measured image from distortion (report's section on the inverse): the undistorted image, the changes of the last
     /// pass, and whether they fell below `tolerance`.
+    ///
+    /// The image of another lens stays as it is: [`Camera::standard`] asks the lens.
     pub fn undistorted(&self, xy: [f64; 2], tolerance: f64, passes: usize) -> ([f64; 2], [f64; 2], bool) {
+        if self.lens.is_some() {
+            return (xy, [0.0; 2], true);
+        }
         let found = self.distortion.undistort(self.upright(xy), tolerance, passes);
         let (_, scale) = self.scales();
         let [_, xp, yp, _, _, dx, dy, ..] = self.interior;
@@ -218,11 +270,14 @@ impl Camera {
         (image, found.changes, found.converged)
     }
 
-    /// Standard coordinates of an undistorted image (equation 44).
+    /// Standard coordinates of an undistorted image (equation 44); not finite where a lens has no ray.
     pub fn standard(&self, matrix: &Matrix3, undistorted: [f64; 2]) -> [f64; 2] {
         let [_, xp, yp, cx, cy, ..] = self.interior;
-        let (u, v) = ((undistorted[0] - xp) / cx, (undistorted[1] - yp) / cy);
-        let [xi, eta, zenith] = matrix.tr_mul(&Vector3::new(u, v, 1.0)).into();
+        let ray = match &self.lens {
+            Some(lens) => lens.direction(undistorted).map_or([f64::NAN; 3], |u| [u.x, -u.y, -u.z]),
+            None => [(undistorted[0] - xp) / cx, (undistorted[1] - yp) / cy, 1.0],
+        };
+        let [xi, eta, zenith] = matrix.tr_mul(&Vector3::from(ray)).into();
         [xi / zenith, eta / zenith]
     }
 }

@@ -19,7 +19,7 @@
 //! };
 //!
 //! let station = Station::new(0.6, 0.0, Air::new(290.0, 750.0));
-//! let kind = Kind { form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: true };
+//! let kind = Kind { lens: None, form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: true };
 //! let (attitude, time) = ([0.2, -0.1, 0.6], 1.0);
 //! let mut common = [0.0; COMMON];
 //! (common[3], common[4]) = (0.3, 0.3); // principal distances in metres
@@ -181,6 +181,9 @@ pub enum StellarError {
     /// An image names a star or an attitude that is not there, or weights a parameter that is not.
     #[error("{0} names a star, an attitude or a parameter that is not there")]
     Index(String),
+    /// A lens with more parameters than there is room for.
+    #[error("the lens has more than {INTERIOR} parameters")]
+    Lens,
     /// A weight matrix that is not positive definite.
     #[error("the weight matrix of {0} is not positive definite")]
     Weight(String),
@@ -308,6 +311,9 @@ impl Calibration {
         if self.axis.is_some_and(|axis| axis.pointing >= counts.1) {
             return Err(StellarError::Index("the axis".into()));
         }
+        if self.kind.lens.is_some_and(|lens| lens.parameter_names().len() > INTERIOR) {
+            return Err(StellarError::Lens);
+        }
         let Weights { parameters, values, root } = &self.weights;
         let count = parameters.len();
         let known = parameters.iter().all(|&parameter| parameter < self.parameters());
@@ -337,7 +343,7 @@ impl Calibration {
             Some([[first, _], [_, second]]) => [unit / first, unit / second],
             None => [free(self.stars[star].fixed); 2],
         };
-        let scale = if self.kind.common_scale { Some(3 * self.pointings.len() + 4) } else { None };
+        let scale = self.kind.common_scale.then(|| 3 * self.pointings.len() + self.kind.scales()[1]);
         let held = self.fixed.iter().enumerate().map(|(k, &fixed)| free(fixed || Some(k) == scale));
         Ok(Problem {
             observation_sd: vec![unit; layout.equations()],

@@ -1,0 +1,172 @@
+//! Tests of groups of observations for a gross error, from the cofactor matrix of their residuals.
+//!
+//! With ~v the residuals of a group over their standard deviations and R their cofactor matrix (its eigenvalues are the redundancy numbers
+//! of directions), the sum of squares falls by T = ~v^T R^- ~v when the group is left out, ~d = R^- ~v being the error that it then shows.
+//! T is chi-square with as many degrees of freedom as R has rank (Cook and Weisberg 1982; Teunissen 2000). The rank is lower than the number
+//! of observations where an error in some direction shows in no residual: across the only base of a point, for one.
+
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+
+/// Redundancy of a direction from which on an error along it shows.
+pub const VISIBLE: f64 = 1e-6;
+
+/// A group of observations as the hypothesis that it holds a gross error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupTest {
+    /// Directions in which an error shows.
+    pub rank: usize,
+    /// T: by how much the sum of squares falls without the group.
+    pub statistic: f64,
+    /// ~d: the estimated error, in standard deviations; in directions that do not show it is zero.
+    pub error: Vec<f64>,
+    /// R^-, row by row: the cofactors of the estimated error.
+    pub cofactors: Vec<f64>,
+    /// The smallest redundancy of a direction that shows; NaN where none does.
+    pub least: f64,
+    /// The largest part of a direction's redundancy that others than the own point take up, in that redundancy: h of the sharp bound of
+    /// correlations, |rho| <= root of the product of both h. NaN where it is not known what the own point takes up.
+    pub shared: f64,
+}
+
+impl GroupTest {
+    /// Of residuals of unit weight with their cofactor matrix, row by row.
+    ///
+    /// * `known`: the same matrix with all unknowns known but those of the own point, where that is asked for.
+    pub fn new(residuals: &[f64], cofactors: &[f64], known: Option<&[f64]>) -> Self {
+        match residuals.len() {
+            2 => Self::of_two(residuals, cofactors, known),
+            _ => Self::of_any(residuals, cofactors, known),
+        }
+    }
+
+    /// The same test in closed form: nearly all groups are images.
+    fn of_two(residuals: &[f64], cofactors: &[f64], known: Option<&[f64]>) -> Self {
+        let v = Vector2::from_column_slice(residuals);
+        let r = Matrix2::from_row_slice(cofactors);
+        let (values, vectors) = eigen(&r);
+        let shown = |k: usize| values[k] > VISIBLE;
+        let along = vectors.tr_mul(&v);
+        let scaled = |k: usize| if shown(k) { along[k] / values[k] } else { 0.0 };
+        let error = vectors * Vector2::new(scaled(0), scaled(1));
+        let inverse = values.map(|value| if value > VISIBLE { value.recip() } else { 0.0 });
+        let inverse_matrix = vectors * Matrix2::from_diagonal(&inverse) * vectors.transpose();
+        let shared = known.map_or(f64::NAN, |known| {
+            let root = inverse.map(f64::sqrt);
+            let half = vectors * Matrix2::from_diagonal(&root);
+            let ratio = half.tr_mul(&(Matrix2::from_row_slice(known) - r)) * half;
+            if shown(0) { eigen(&ratio).0[0].max(0.0) } else { f64::NAN }
+        });
+        Self {
+            rank: (0..2).filter(|&k| shown(k)).count(),
+            statistic: (0..2).map(|k| along[k] * scaled(k)).sum(),
+            error: error.as_slice().to_vec(),
+            cofactors: inverse_matrix.as_slice().to_vec(),
+            least: (0..2).rev().find(|&k| shown(k)).map_or(f64::NAN, |k| values[k]),
+            shared,
+        }
+    }
+
+    fn of_any(residuals: &[f64], cofactors: &[f64], known: Option<&[f64]>) -> Self {
+        let count = residuals.len();
+        let r = DMatrix::from_row_slice(count, count, cofactors);
+        let eigen = r.clone().symmetric_eigen();
+        let shown: Vec<usize> = (0..count).filter(|&k| eigen.eigenvalues[k] > VISIBLE).collect();
+        let values = DVector::from_iterator(shown.len(), shown.iter().map(|&k| eigen.eigenvalues[k]));
+        let vectors = eigen.eigenvectors.select_columns(&shown);
+        let along = vectors.tr_mul(&DVector::from_column_slice(residuals));
+        let error = &vectors * along.component_div(&values);
+        let root = DMatrix::from_diagonal(&values.map(|value| value.sqrt().recip()));
+        let half = &vectors * root;
+        let shared = known.filter(|_| !shown.is_empty()).map_or(f64::NAN, |known| {
+            let taken = DMatrix::from_row_slice(count, count, known) - &r;
+            (half.tr_mul(&taken) * &half).symmetric_eigenvalues().max().max(0.0)
+        });
+        Self {
+            rank: shown.len(),
+            statistic: along.component_div(&values).dot(&along),
+            error: error.as_slice().to_vec(),
+            cofactors: (&half * half.transpose()).as_slice().to_vec(),
+            least: values.iter().copied().reduce(f64::min).unwrap_or(f64::NAN),
+            shared,
+        }
+    }
+}
+
+/// Eigenvalues, the larger first, and eigenvectors of a symmetric matrix.
+fn eigen(matrix: &Matrix2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+    let (a, b, c) = (matrix[(0, 0)], matrix[(0, 1)], matrix[(1, 1)]);
+    let half = ((a - c) / 2.0).hypot(b);
+    let larger = f64::midpoint(a, c) + half;
+    let smaller = if larger > 0.0 { (a * c - b * b) / larger } else { larger - 2.0 * half };
+    // Of the two rows of matrix - larger the one that keeps its digits.
+    let along = if a > c { Vector2::new(larger - c, b) } else { Vector2::new(b, larger - a) };
+    let along = along.try_normalize(0.0).unwrap_or(Vector2::x());
+    let vectors = Matrix2::from_columns(&[along, Vector2::new(-along.y, along.x)]);
+    (Vector2::new(larger, smaller), vectors)
+}
+
+/// The largest canonical correlation of two groups of residuals: the largest singular value of R_g^-1/2 R_gh R_h^-1/2.
+///
+/// An error of one of them moves the test value of the other by this share of its own: from 0.9 on the two cannot be told apart.
+///
+/// * `first`, `second`: their cofactor matrices, row by row;
+/// * `between`: the cofactors of the first with the second, row by row.
+pub fn canonical_correlation(first: &[f64], second: &[f64], between: &[f64]) -> f64 {
+    let half = |values: &[f64]| {
+        let count = values.len().isqrt();
+        let eigen = DMatrix::from_row_slice(count, count, values).symmetric_eigen();
+        let root = eigen.eigenvalues.map(|value| if value > VISIBLE { value.sqrt().recip() } else { 0.0 });
+        eigen.eigenvectors * DMatrix::from_diagonal(&root)
+    };
+    let (first, second) = (half(first), half(second));
+    let between = DMatrix::from_row_slice(first.nrows(), second.nrows(), between);
+    (first.tr_mul(&between) * second).singular_values().max().min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// R of a group as a part of a projector, and residuals in its range.
+    fn block(rows: usize) -> (Vec<f64>, Vec<f64>) {
+        let a = DMatrix::from_fn(9, 3, |i, j| ((3 * i + 7 * j + i * j) as f64).sin());
+        let q = a.tr_mul(&a).try_inverse().unwrap();
+        let r = DMatrix::identity(9, 9) - &a * q * a.transpose();
+        let v = &r * DVector::from_fn(9, |i, _| (i as f64 * 1.7).cos());
+        let own = r.view((0, 0), (rows, rows)).into_owned();
+        (v.rows(0, rows).iter().copied().collect(), own.transpose().as_slice().to_vec())
+    }
+
+    #[test]
+    fn closed_form_and_eigenvectors_agree() {
+        let (v, r) = block(2);
+        let known = [1.0 - 0.01, 0.02, 0.02, 1.0 - 0.03];
+        let (two, any) = (GroupTest::of_two(&v, &r, Some(&known)), GroupTest::of_any(&v, &r, Some(&known)));
+        assert_eq!(two.rank, any.rank);
+        let pairs = [(two.statistic, any.statistic), (two.least, any.least), (two.shared, any.shared)];
+        let vectors = two.error.iter().zip(&any.error).chain(two.cofactors.iter().zip(&any.cofactors));
+        for (a, b) in pairs.into_iter().chain(vectors.map(|(a, b)| (*a, *b))) {
+            assert!((a - b).abs() < 1e-12 * b.abs().max(1.0), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn an_error_that_shows_in_one_direction_has_rank_one() {
+        let (c, s) = (0.8, 0.6);
+        let r = [0.3 * c * c, 0.3 * c * s, 0.3 * c * s, 0.3 * s * s];
+        let found = GroupTest::new(&[2.0 * c, 2.0 * s], &r, None);
+        assert_eq!(found.rank, 1);
+        assert!((found.statistic - 4.0 / 0.3).abs() < 1e-12);
+        assert!((found.error[0] - 2.0 * c / 0.3).abs() < 1e-12 && (found.least - 0.3).abs() < 1e-15);
+        let nothing = GroupTest::new(&[0.0, 0.0], &[0.0; 4], None);
+        assert_eq!((nothing.rank, nothing.statistic), (0, 0.0));
+        assert!(nothing.least.is_nan());
+    }
+
+    #[test]
+    fn errors_that_cannot_be_told_apart_are_correlated_by_one() {
+        let rho = canonical_correlation(&[0.3], &[0.2], &[0.06_f64.sqrt()]);
+        assert!((rho - 1.0).abs() < 1e-12);
+        assert!((canonical_correlation(&[0.5], &[0.5], &[-0.1]) - 0.2).abs() < 1e-12);
+    }
+}

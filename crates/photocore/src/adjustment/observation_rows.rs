@@ -1,0 +1,143 @@
+//! The equations of all observations as sparse rows of unit weight: what is asked of them one by one, by way of solutions.
+
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::problem::{Linearized, Model, Problem, Weighted};
+use crate::normals::{Equations, GroupRows, TieRows};
+
+/// Equations a x = l of unit weight: first those of observations, in the order of groups and rows, then of ties and rows; then one for each
+/// unknown, that of it as an observation of itself, empty where it is none.
+#[derive(Debug)]
+pub struct ObservationRows {
+    starts: Vec<usize>,
+    unknowns: Vec<u32>,
+    coefficients: Vec<f64>,
+    constants: Vec<f64>,
+}
+
+impl ObservationRows {
+    /// At the given values, without the columns of unknowns that are fixed or held.
+    pub fn new<M: Model>(problem: &Problem<M>, values: &[f64], held: &[usize], pool: &ThreadPool) -> Self {
+        let layout = problem.layout();
+        let equations = pool.install(|| Linearized::new(problem, values, held, None));
+        let of_locals = problem.for_locals(pool, |buffers, local| {
+            let mut found = Self::empty();
+            for group in layout.groups_of(local) {
+                let mut rows = buffers.rows(layout, group);
+                equations.write(local, group, &mut rows);
+                let GroupRows { constant, local: own, kept, common } = rows;
+                let columns: Vec<usize> = layout
+                    .local_range(local)
+                    .chain(layout.kept_range(layout.kept_of(group)))
+                    .chain(layout.common_columns(group))
+                    .collect();
+                for (row, &constant) in constant.iter().enumerate() {
+                    let of = |part: &'_ [f64]| part.len() / layout.rows();
+                    let parts = [&*own, &*kept, &*common];
+                    let values = parts.iter().flat_map(|part| part[row * of(part)..][..of(part)].to_vec());
+                    found.push(columns.iter().copied().zip(values), constant);
+                }
+            }
+            found
+        });
+        let of_ties = problem.for_ties(|tie, rows| {
+            let mut found = Self::empty();
+            equations.write_tie(tie, rows);
+            let columns: Vec<usize> = layout.tie_columns(tie).collect();
+            let TieRows { constant, coefficients } = rows;
+            for (&constant, row) in constant.iter().zip(coefficients.chunks_exact(columns.len())) {
+                found.push(columns.iter().copied().zip(row.iter().copied()), constant);
+            }
+            found
+        });
+        let mut all = Self::empty();
+        of_locals.into_iter().chain(of_ties).for_each(|part| all.append(part));
+        let weighted = problem.weighted(values);
+        let fixed = |unknown: usize| problem.sd[unknown] == 0.0 || held.contains(&unknown);
+        for unknown in 0..values.len() {
+            let (row, constant) = problem.prior_row(&problem.sd, values, &weighted, unknown);
+            all.push(row.into_iter().filter(|&(column, _)| !fixed(column)), constant);
+        }
+        all
+    }
+
+    fn empty() -> Self {
+        Self { starts: vec![0], unknowns: vec![], coefficients: vec![], constants: vec![] }
+    }
+
+    fn push(&mut self, row: impl Iterator<Item = (usize, f64)>, constant: f64) {
+        for (unknown, value) in row.filter(|&(_, value)| value != 0.0) {
+            self.unknowns.push(unknown as u32);
+            self.coefficients.push(value);
+        }
+        self.starts.push(self.unknowns.len());
+        self.constants.push(constant);
+    }
+
+    fn append(&mut self, part: Self) {
+        let first = self.unknowns.len();
+        self.starts.extend(part.starts[1..].iter().map(|start| first + start));
+        self.unknowns.extend(part.unknowns);
+        self.coefficients.extend(part.coefficients);
+        self.constants.extend(part.constants);
+    }
+
+    /// Observed minus computed of every row.
+    pub fn constants(&self) -> &[f64] {
+        &self.constants
+    }
+
+    /// The unknowns of a row, with their coefficients.
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> {
+        let range = self.starts[row]..self.starts[row + 1];
+        self.unknowns[range.clone()]
+            .iter()
+            .zip(&self.coefficients[range])
+            .map(|(&i, &value)| (i as usize, value))
+    }
+
+    /// A x for some rows.
+    pub fn times(&self, rows: &[usize], x: &[f64], pool: &ThreadPool) -> Vec<f64> {
+        let product = |&row: &usize| self.row(row).map(|(unknown, value)| value * x[unknown]).sum::<f64>();
+        pool.install(|| rows.par_iter().with_min_len(1024).map(product).collect())
+    }
+
+    /// A^T e of one row: a right-hand side over all unknowns.
+    pub fn right(&self, row: usize, unknowns: usize) -> Vec<f64> {
+        let mut right = vec![0.0; unknowns];
+        self.row(row).for_each(|(unknown, value)| right[unknown] += value);
+        right
+    }
+}
+
+impl<M> Problem<M> {
+    /// The equation of an unknown as an observation of itself, of unit weight: coefficients and observed minus computed; empty where it is
+    /// none.
+    ///
+    /// * `sd`: standard deviations of all unknowns;
+    /// * `weighted`: what the model says of them at the given values ([`Model::weighted`]).
+    pub fn prior_row(
+        &self,
+        sd: &[f64],
+        values: &[f64],
+        weighted: &[Weighted],
+        unknown: usize,
+    ) -> (Vec<(usize, f64)>, f64) {
+        if !(sd[unknown] > 0.0 && sd[unknown].is_finite()) {
+            return (vec![], 0.0);
+        }
+        let place = weighted.partition_point(|own| own.unknowns().end <= unknown);
+        match weighted.get(place).filter(|own| own.unknowns().contains(&unknown)) {
+            Some(own) => {
+                let k = unknown - own.first;
+                let row = own.unknowns().zip(own.rows().nth(k).unwrap_or_default().iter().copied());
+                (row.collect(), own.constant[k])
+            }
+            None => {
+                let weight = sd[unknown].recip();
+                (vec![(unknown, weight)], weight * (self.prior[unknown] - values[unknown]))
+            }
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! What the residuals make of errors: products with R = I - A Q A^T, A being the equations in unit weight.
+
+use std::ops::{ControlFlow, Range};
+
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::factored::{Factored, linearized};
+use super::problem::{Linearized, Model, Problem, Weighted};
+use super::result::AdjustError;
+use super::walk::Buffers;
+use crate::normals::{Equations, TieRows};
+
+/// Parts that the walk over the local blocks is made of, whatever the number of threads: so sums have the same bits.
+const PARTS: usize = 16;
+
+/// What an equation takes of the unknowns.
+type Taken = Vec<(usize, f64)>;
+
+impl<M> Problem<M> {
+    /// How many equations there are: those of the groups and of the ties, row by row, then one for each unknown as an observation of
+    /// itself, which is empty unless it is weighted.
+    pub fn equations(&self) -> usize {
+        self.observation_sd.len() + self.sd.len()
+    }
+}
+
+impl Factored {
+    /// R z for columns z over the equations of [`Problem::equations`], one after the other; so are the products: what errors z, in
+    /// standard deviations, leave as residuals. The same bits for any number of threads; a datum does not matter.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn project<M: Model>(
+        &self,
+        problem: &Problem<M>,
+        mut columns: Vec<f64>,
+        pool: &ThreadPool,
+        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Vec<f64>, AdjustError> {
+        let rows = Rows::new(self, problem, pool);
+        let rights = pool.install(|| rows.transposed(&columns));
+        let solutions = self.solve_for(problem, &rights, pool, between)?;
+        drop(rights);
+        pool.install(|| rows.subtract(&solutions, &mut columns));
+        Ok(columns)
+    }
+
+    /// Whether each equation of [`Problem::equations`] is one: those of unknowns are where these are weighted, and not held.
+    pub fn is_equation<M>(&self, problem: &Problem<M>) -> Vec<bool> {
+        let mut found = vec![true; problem.observation_sd.len()];
+        found.extend((0..problem.sd.len()).map(|i| problem.is_weighted(i) && !self.held.contains(&i)));
+        found
+    }
+}
+
+/// The equations at adjusted values, in unit weight.
+struct Rows<'a, M: Model> {
+    problem: &'a Problem<M>,
+    equations: Linearized<'a, M>,
+    /// Which unknowns are fixed or held.
+    fixed: Vec<bool>,
+    /// Those that are weighted together with others.
+    together: Vec<Weighted>,
+    /// Which are weighted by themselves.
+    alone: Vec<bool>,
+}
+
+impl<'a, M: Model> Rows<'a, M> {
+    fn new(factored: &Factored, problem: &'a Problem<M>, pool: &ThreadPool) -> Self {
+        let Factored { values, held, loss, .. } = factored;
+        let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
+        held.iter().for_each(|&unknown| fixed[unknown] = true);
+        let together = problem.weighted(values);
+        let mut alone: Vec<bool> = (0..fixed.len()).map(|i| problem.is_weighted(i) && !fixed[i]).collect();
+        together.iter().for_each(|own| alone[own.unknowns()].fill(false));
+        let equations = linearized(problem, *loss, values, held, pool);
+        Self { problem, equations, fixed, together, alone }
+    }
+
+    /// The local blocks of a part.
+    fn locals(&self, part: usize) -> Range<usize> {
+        let locals = self.problem.layout().locals();
+        part * locals / PARTS..(part + 1) * locals / PARTS
+    }
+
+    /// A^T z for every column, over all unknowns.
+    fn transposed(&self, columns: &[f64]) -> Vec<f64> {
+        let (layout, height) = (self.problem.layout(), self.problem.equations());
+        let (unknowns, others) = (layout.unknowns(), layout.all_locals().end);
+        let count = columns.len() / height.max(1);
+        let part = |part: usize| {
+            let locals = self.locals(part);
+            let (first, width) = (layout.local_dim() * locals.start, layout.local_dim() * locals.len());
+            let mut own = vec![0.0; count * width];
+            let mut shared = vec![0.0; count * (unknowns - others)];
+            self.each_row_of(locals, |row, taken| {
+                for (column, z) in columns.chunks_exact(height).map(|all| all[row]).enumerate() {
+                    for &(unknown, value) in taken.iter().filter(|_| z != 0.0) {
+                        match unknown.checked_sub(others) {
+                            None => own[column * width + unknown - first] += value * z,
+                            Some(other) => shared[column * (unknowns - others) + other] += value * z,
+                        }
+                    }
+                }
+            });
+            (first, width, own, shared)
+        };
+        let parts: Vec<_> = (0..PARTS).into_par_iter().map(part).collect();
+        let mut rights = vec![0.0; count * unknowns];
+        for (first, width, own, shared) in parts {
+            for (column, right) in rights.chunks_exact_mut(unknowns.max(1)).enumerate() {
+                right[first..first + width].copy_from_slice(&own[column * width..][..width]);
+                let sums = &shared[column * (unknowns - others)..][..unknowns - others];
+                right[others..].iter_mut().zip(sums).for_each(|(right, sum)| *right += sum);
+            }
+        }
+        self.each_other_row(|row, taken| {
+            for (right, z) in rights.chunks_exact_mut(unknowns).zip(columns.chunks_exact(height)) {
+                taken.iter().for_each(|&(unknown, value)| right[unknown] += value * z[row]);
+            }
+        });
+        rights
+    }
+
+    /// z - A x for every column.
+    fn subtract(&self, solutions: &[f64], columns: &mut [f64]) {
+        let (unknowns, height) = (self.problem.layout().unknowns().max(1), self.problem.equations());
+        let along =
+            |taken: &Taken, x: &[f64]| taken.iter().map(|&(unknown, value)| value * x[unknown]).sum::<f64>();
+        let part = |part: usize| {
+            let mut found = Vec::new();
+            self.each_row_of(self.locals(part), |_, taken| {
+                found.extend(solutions.chunks_exact(unknowns).map(|x| along(taken, x)));
+            });
+            found
+        };
+        let parts: Vec<Vec<f64>> = (0..PARTS).into_par_iter().map(part).collect();
+        let count = solutions.len() / unknowns;
+        for (row, products) in parts.iter().flat_map(|part| part.chunks_exact(count.max(1))).enumerate() {
+            products
+                .iter()
+                .enumerate()
+                .for_each(|(column, product)| columns[column * height + row] -= product);
+        }
+        self.each_other_row(|row, taken| {
+            for (column, x) in columns.chunks_exact_mut(height).zip(solutions.chunks_exact(unknowns)) {
+                column[row] -= along(taken, x);
+            }
+        });
+    }
+
+    /// Tells of the rows of some local blocks: their number, and what they take.
+    fn each_row_of(&self, locals: Range<usize>, mut tell: impl FnMut(usize, &Taken)) {
+        let layout = self.problem.layout();
+        let (mut buffers, mut taken) = (Buffers::default(), Taken::new());
+        for local in locals {
+            for group in layout.groups_of(local) {
+                let mut rows = buffers.rows(layout, group);
+                self.equations.write(local, group, &mut rows);
+                for row in 0..layout.rows() {
+                    let of = |values: &[f64]| {
+                        let width = values.len() / layout.rows();
+                        row * width..(row + 1) * width
+                    };
+                    taken.clear();
+                    taken.extend(layout.local_range(local).zip(rows.local[of(rows.local)].iter().copied()));
+                    let kept = layout.kept_range(layout.kept_of(group));
+                    taken.extend(kept.zip(rows.kept[of(rows.kept)].iter().copied()));
+                    let common = layout.common_columns(group);
+                    taken.extend(common.zip(rows.common[of(rows.common)].iter().copied()));
+                    tell(group * layout.rows() + row, &taken);
+                }
+            }
+        }
+    }
+
+    /// The same of ties and of weighted unknowns.
+    fn each_other_row(&self, mut tell: impl FnMut(usize, &Taken)) {
+        let layout = self.problem.layout();
+        let first = layout.groups() * layout.rows();
+        let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
+        for tie in 0..layout.ties().len() {
+            let (rows, columns) = (layout.tie_rows(tie), layout.tie_columns(tie).collect::<Vec<usize>>());
+            constant.resize(rows.len(), 0.0);
+            coefficients.resize(rows.len() * columns.len(), 0.0);
+            self.equations
+                .write_tie(tie, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients });
+            for (row, values) in rows.zip(coefficients.chunks_exact(columns.len().max(1))) {
+                tell(first + row, &columns.iter().copied().zip(values.iter().copied()).collect());
+            }
+        }
+        let first = self.problem.observation_sd.len();
+        for (unknown, _) in self.alone.iter().enumerate().filter(|(_, alone)| **alone) {
+            tell(first + unknown, &vec![(unknown, self.problem.sd[unknown].recip())]);
+        }
+        for own in &self.together {
+            for (row, unknown) in own.rows().zip(own.unknowns()).filter(|&(_, i)| self.problem.is_weighted(i))
+            {
+                let taken = own.unknowns().zip(row.iter().copied()).filter(|&(other, _)| !self.fixed[other]);
+                tell(first + unknown, &taken.collect());
+            }
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! A problem where some observations are tried without: adjusted from its last values, with all that tests of groups need.
+//!
+//! What is left out has an infinite standard deviation: its equations stand in the normal equations with weight zero, so that pattern,
+//! order and symbolic factorisation stay, and cofactors of what is out are inside the pattern too.
+
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::options::{Event, Options, Phase, Status};
+use super::problem::{Linearized, Model, Problem};
+use super::result::AdjustError;
+use super::run::{Watch, adjust_by_groups, unless_stopped};
+use crate::normals::{Cofactors, Equations, LocalCofactors, Prior, SelectedInverse, TieRows};
+
+/// A problem at adjusted values, with cofactors of everything inside the pattern of its normal equations.
+#[derive(Debug)]
+pub struct Tried {
+    /// The unknowns, in the order of the layout.
+    pub values: Vec<f64>,
+    /// Those of them that were held for a datum.
+    pub held: Vec<usize>,
+    /// Observed minus computed, also of what is left out, in the units of the observations.
+    pub residuals: Vec<f64>,
+    /// Cofactors, those of groups among them.
+    pub cofactors: Cofactors,
+    /// Weighted sum of squares of what takes part.
+    pub sum_of_squares: f64,
+    /// How the iterations have ended.
+    pub status: Status,
+    /// How many there were.
+    pub iterations: usize,
+    /// Local blocks that have run to where they harm all others (see [`Model::collapsed`]).
+    pub collapsed: Vec<usize>,
+    selected: SelectedInverse,
+}
+
+/// Cofactors of the equations a of a tie, whether or not they take part.
+#[derive(Debug, Clone)]
+pub struct TieCofactors {
+    /// a Q a^T: square, row by row.
+    pub equations: Vec<f64>,
+    /// Q a^T of each kept block that the tie touches: its unknowns, those of each equation together.
+    pub blocks: Vec<(usize, Vec<f64>)>,
+}
+
+impl Tried {
+    /// Adjusts a problem from its initial values.
+    ///
+    /// # Errors
+    /// Those of [`super::adjust`]; values that leave unknowns undetermined.
+    pub fn adjust<M: Model>(
+        problem: &Problem<M>,
+        options: &Options,
+        pool: &ThreadPool,
+        watch: Watch<'_>,
+    ) -> Result<Self, AdjustError> {
+        let options = Options { covariance: true, loss: None, ..*options };
+        let found = adjust_by_groups(problem, &options, pool, watch)?;
+        let (Some(cofactors), Some(selected)) = (found.cofactors, found.selected) else {
+            return Err(found.undetermined.unwrap_or(AdjustError::NotFinite));
+        };
+        Ok(Self {
+            sum_of_squares: total(problem, &found.residuals, &found.unknowns),
+            values: found.unknowns,
+            held: found.datum,
+            residuals: found.residuals,
+            cofactors,
+            status: found.status,
+            iterations: found.iterations.len(),
+            collapsed: found.collapsed,
+            selected,
+        })
+    }
+
+    /// Takes a problem as it stands at given values, some unknowns held there.
+    ///
+    /// # Errors
+    /// Values that leave unknowns undetermined; an interruption, no memory.
+    pub fn at<M: Model>(
+        problem: &Problem<M>,
+        values: Vec<f64>,
+        held: Vec<usize>,
+        pool: &ThreadPool,
+        watch: Watch<'_>,
+    ) -> Result<Self, AdjustError> {
+        let total_locals = problem.layout().locals();
+        let mut between = |done| watch(Event::Progress { phase: Phase::Form, done, total: total_locals });
+        let equations = pool.install(|| Linearized::new(problem, &values, &held, None));
+        let prior = problem.prior_equations(&values, &held);
+        let system = &problem.system;
+        let factor = unless_stopped(system.factor(pool, &equations, &prior, 0.0, &mut between))?;
+        if !factor.deficient_locals.is_empty() {
+            return Err(AdjustError::UndeterminedLocals(factor.deficient_locals.clone()));
+        }
+        if let Some(deficiency) = factor.deficiency() {
+            return Err(AdjustError::Undetermined(deficiency.blocks()));
+        }
+        let found = unless_stopped(system.invert_by_groups(pool, factor, &equations, &prior, &mut between))?;
+        let mut cofactors = found.cofactors;
+        problem.finish_cofactors(&mut cofactors, &held, &values);
+        let residuals = problem.residuals(pool, &values);
+        Ok(Self {
+            sum_of_squares: total(problem, &residuals, &values),
+            values,
+            held,
+            residuals,
+            cofactors,
+            status: Status::Converged,
+            iterations: 0,
+            collapsed: vec![],
+            selected: found.selected,
+        })
+    }
+
+    /// Observations that take part, those of unknowns themselves among them, minus unknowns.
+    pub fn degrees_of_freedom<M>(&self, problem: &Problem<M>) -> i64 {
+        let out = problem.observation_sd.iter().filter(|sd| sd.is_infinite()).count();
+        problem.counts(self.held.len()).degrees_of_freedom() - out as i64
+    }
+
+    /// Cofactors of all equations of some local blocks, with the given standard deviations; with those of their weighted unknowns, where
+    /// `further` gives these (see [`crate::normals::System::local_cofactors`]).
+    pub fn of_locals<M: Model>(
+        &self,
+        problem: &Problem<M>,
+        observation_sd: &[f64],
+        locals: &[usize],
+        further: impl Fn(usize) -> Vec<f64> + Sync,
+        pool: &ThreadPool,
+    ) -> Vec<LocalCofactors> {
+        let (formed, asked, prior) = self.equations(problem, observation_sd, pool);
+        let of = |&local: &usize| {
+            let further = further(local);
+            problem.system.local_cofactors(&self.selected, &formed, &prior, &asked, local, &further)
+        };
+        pool.install(|| locals.par_iter().map(of).collect())
+    }
+
+    /// Cofactors of the equations of some ties, with the given standard deviations.
+    pub fn of_ties<M: Model>(
+        &self,
+        problem: &Problem<M>,
+        observation_sd: &[f64],
+        ties: &[usize],
+        pool: &ThreadPool,
+    ) -> Vec<TieCofactors> {
+        let (_, asked, _) = self.equations(problem, observation_sd, pool);
+        ties.iter().map(|&tie| self.of_tie(problem, &asked, tie)).collect()
+    }
+
+    fn of_tie<M: Model>(&self, problem: &Problem<M>, asked: &Linearized<'_, M>, tie: usize) -> TieCofactors {
+        let layout = problem.layout();
+        let (each, width) = (&layout.ties()[tie], layout.tie_columns(tie).count());
+        let (mut constant, mut coefficients) = (vec![0.0; each.rows], vec![0.0; each.rows * width]);
+        asked.write_tie(tie, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients });
+        let mut first = 0;
+        let place = |&block: &u32| {
+            let own = (block as usize, first, layout.kept_dim(block as usize));
+            first += own.2;
+            own
+        };
+        let blocks: Vec<(usize, usize, usize)> = each.kept.iter().map(place).collect();
+        let mut along = vec![0.0; each.rows * width];
+        for &(row_block, to, height) in &blocks {
+            for &(column_block, from, count) in &blocks {
+                let values = self.selected.block(row_block, column_block).unwrap_or_default();
+                for (k, row) in values.chunks_exact(count.max(1)).enumerate() {
+                    for equation in 0..each.rows {
+                        let own = &coefficients[equation * width + from..][..count];
+                        along[equation * width + to + k] +=
+                            row.iter().zip(own).map(|(q, a)| q * a).sum::<f64>();
+                    }
+                }
+                debug_assert!(values.is_empty() || values.len() == height * count);
+            }
+        }
+        let row = |values: &'_ [f64], i: usize| values[i * width..(i + 1) * width].to_vec();
+        let product = |i: usize, j: usize| -> f64 {
+            row(&along, i).iter().zip(row(&coefficients, j)).map(|(x, y)| x * y).sum()
+        };
+        let of_block = |&(block, first, count): &(usize, usize, usize)| {
+            (block, (0..each.rows).flat_map(|i| along[i * width + first..][..count].to_vec()).collect())
+        };
+        TieCofactors {
+            equations: (0..each.rows * each.rows).map(|k| product(k / each.rows, k % each.rows)).collect(),
+            blocks: blocks.iter().map(of_block).collect(),
+        }
+    }
+
+    /// The equations that take part, those that are asked for, and the weighted unknowns.
+    fn equations<'a, M: Model>(
+        &self,
+        problem: &'a Problem<M>,
+        observation_sd: &'a [f64],
+        pool: &ThreadPool,
+    ) -> (Linearized<'a, M>, Linearized<'a, M>, Prior) {
+        let at = || pool.install(|| Linearized::new(problem, &self.values, &self.held, None));
+        (at(), at().with_deviations(observation_sd), problem.prior_equations(&self.values, &self.held))
+    }
+}
+
+fn total<M: Model>(problem: &Problem<M>, residuals: &[f64], values: &[f64]) -> f64 {
+    problem.sum_of_squares(residuals) + problem.prior_sum_of_squares(values, 0..values.len())
+}

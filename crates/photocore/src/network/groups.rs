@@ -1,0 +1,148 @@
+//! Groups of the observations of a network, and what errors of some leave as residuals of others.
+
+use std::ops::ControlFlow;
+
+use rayon::ThreadPool;
+
+use super::NetworkError;
+use super::covariance::Covariances;
+use super::model::Owner;
+use crate::adjustment::{AdjustError, EquationGroups, Event, GroupSquares, Phase, Probing};
+
+/// Groups of the observations of a network: a number for each, in the order of the network; that many groups or more for none.
+#[derive(Debug, Clone, Default)]
+pub struct Groups {
+    /// How many there are.
+    pub count: usize,
+    /// Of x and y of every image.
+    pub images: Vec<[usize; 2]>,
+    /// Of the components of every point.
+    pub points: Vec<[usize; 3]>,
+    /// Of the six unknowns of every photo's pose.
+    pub photos: Vec<[usize; 6]>,
+    /// Of the parameters of every camera.
+    pub cameras: Vec<usize>,
+    /// Of the unknowns of every common one.
+    pub commons: Vec<usize>,
+    /// Of every other observation.
+    pub observations: Vec<usize>,
+}
+
+impl Covariances {
+    /// Sums of `R_ij^2` over every two groups of observations, R being what takes their errors, in standard deviations, to residuals.
+    ///
+    /// # Errors
+    /// Groups that are not of the network, an interruption.
+    pub fn group_squares(
+        &self,
+        groups: &Groups,
+        probing: &Probing,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<GroupSquares, NetworkError> {
+        let groups = self.equation_groups(groups)?;
+        let problem = &self.assembled.problem;
+        let total = problem.layout().locals();
+        let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
+        let found = self.factored.group_squares(problem, &groups, probing, pool, &mut between);
+        found.map_err(|error| self.named(error))
+    }
+
+    /// The same within each of many groups, which share the columns of so many classes (see [`crate::adjustment::Factored::own_squares`]).
+    ///
+    /// # Errors
+    /// Those of [`Covariances::group_squares`].
+    pub fn own_squares(
+        &self,
+        groups: &Groups,
+        classes: usize,
+        probing: &Probing,
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Vec<f64>, NetworkError> {
+        let groups = self.equation_groups(groups)?;
+        let problem = &self.assembled.problem;
+        let total = problem.layout().locals();
+        let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
+        let found = self.factored.own_squares(problem, &groups, classes, probing, pool, &mut between);
+        found.map_err(|error| self.named(error))
+    }
+
+    /// What errors of the images leave as their residuals, both in standard deviations: columns of x and y of every image, one column
+    /// after the other. Images that took no part have neither.
+    ///
+    /// # Errors
+    /// Columns that are not of the images, an interruption.
+    pub fn project_images(
+        &self,
+        columns: &[f64],
+        pool: &ThreadPool,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Vec<f64>, NetworkError> {
+        let problem = &self.assembled.problem;
+        let (width, height) = (2 * self.images, problem.equations());
+        if width == 0 || !columns.len().is_multiple_of(width) {
+            return Err(NetworkError::Partials { unknowns: width, numbers: columns.len() });
+        }
+        let order = &problem.model.order;
+        let mut z = vec![0.0; columns.len() / width * height];
+        for (z, column) in z.chunks_exact_mut(height).zip(columns.chunks_exact(width)) {
+            for (row, &image) in order.iter().enumerate() {
+                z[2 * row..][..2].copy_from_slice(&column[2 * image..][..2]);
+            }
+        }
+        let total = problem.layout().locals();
+        let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
+        let u = self.factored.project(problem, z, pool, &mut between).map_err(|error| self.named(error))?;
+        let mut found = vec![0.0; columns.len()];
+        for (found, u) in found.chunks_exact_mut(width).zip(u.chunks_exact(height)) {
+            for (row, &image) in order.iter().enumerate() {
+                found[2 * image..][..2].copy_from_slice(&u[2 * row..][..2]);
+            }
+        }
+        Ok(found)
+    }
+
+    fn named(&self, error: AdjustError) -> NetworkError {
+        NetworkError::new(error, &self.assembled)
+    }
+
+    /// The groups of the equations of the adjustment.
+    fn equation_groups(&self, groups: &Groups) -> Result<EquationGroups, NetworkError> {
+        let problem = &self.assembled.problem;
+        let model = &problem.model;
+        let given = [groups.images.len(), groups.points.len(), groups.photos.len(), groups.cameras.len()];
+        let own = [self.images, self.point.len(), self.camera_of_photo.len(), self.photo_of_camera.len()];
+        let others = [groups.commons.len(), groups.observations.len()];
+        if given != own || others != [model.commons.len(), self.observations] {
+            return Err(NetworkError::State);
+        }
+        let mut of = Vec::with_capacity(problem.equations());
+        of.extend(model.order.iter().flat_map(|&image| groups.images[image]));
+        for tied in &model.observations {
+            of.extend(std::iter::repeat_n(groups.observations[tied.index], tied.root.nrows()));
+        }
+        let first = of.len();
+        of.resize(problem.equations(), groups.count);
+        for (place, &point) in self.assembled.points.iter().enumerate() {
+            for (unknown, group) in model.of_point(place).zip(groups.points[point]) {
+                of[first + unknown] = group;
+            }
+        }
+        for block in 0..model.stations() {
+            let unknowns = model.of_block(block).map(|unknown| first + unknown);
+            match model.owner(block) {
+                Owner::Photo(photo) => {
+                    let own = groups.photos[photo].into_iter();
+                    let camera = groups.cameras[self.camera_of_photo[photo]];
+                    unknowns
+                        .zip(own.chain(std::iter::repeat(camera)))
+                        .for_each(|(row, group)| of[row] = group);
+                }
+                Owner::Camera(camera) => unknowns.for_each(|row| of[row] = groups.cameras[camera]),
+                Owner::Common(common) => unknowns.for_each(|row| of[row] = groups.commons[common]),
+            }
+        }
+        Ok(EquationGroups { count: groups.count, of })
+    }
+}

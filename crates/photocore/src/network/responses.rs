@@ -1,0 +1,203 @@
+//! What single observations have to do with everything else: columns of R, effects on chosen unknowns, the unknown that an error moves most.
+//! Each takes a solution of the normal equations.
+
+use std::ops::ControlFlow;
+
+use nalgebra::{DMatrix, Vector3};
+use rayon::ThreadPool;
+
+use super::NetworkError;
+use super::covariance::{Covariances, Of};
+use super::model::Owner;
+use super::suspects::{Home, Row};
+use super::trial::Trial;
+use crate::adjustment::{AdjustError, NormalEquations, ObservationRows};
+use crate::geometry::{AttitudeNumbers, Matrix3};
+
+/// Right-hand sides at a time.
+const TOGETHER: usize = 16;
+
+/// What an unknown belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UnknownOf {
+    /// One of the six numbers of a photo's pose, or a parameter of its own camera after these.
+    Photo(usize),
+    /// A parameter of a camera that several photos share.
+    Camera(usize),
+    /// A component of a common unknown.
+    Common(usize),
+    /// A coordinate of a point.
+    Point(usize),
+}
+
+/// The unknown that an error moves most, in its standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moved {
+    /// What it belongs to.
+    pub of: UnknownOf,
+    /// Its number there.
+    pub component: usize,
+    /// By how much an error of one standard deviation moves it, in its unit.
+    pub effect: f64,
+    /// The same in its standard deviations (a priori unit weight).
+    pub in_sd: f64,
+}
+
+impl Trial {
+    /// The columns of R that belong to the rows of some suspects: for each of these rows the cofactors of its residual with those of all
+    /// rows of all suspects, one after the other.
+    ///
+    /// # Errors
+    /// Nothing was adjusted before; an interruption, no memory.
+    pub fn responses(&self, suspects: &[usize], pool: &ThreadPool) -> Result<Vec<f64>, NetworkError> {
+        let all = self.rows_of(0..self.suspects.len());
+        let asked: Vec<usize> =
+            suspects.iter().flat_map(|&index| self.row_starts[index]..self.row_starts[index + 1]).collect();
+        let mut columns = Vec::with_capacity(all.len() * asked.len());
+        let rows: Vec<usize> = asked.iter().map(|&row| all[row]).collect();
+        self.solutions(&rows, pool, |index, solution, equations| {
+            let first = columns.len();
+            columns.extend(equations.times(&all, solution, pool).into_iter().map(|share| -share));
+            columns[first + asked[index]] += 1.0;
+        })?;
+        Ok(columns)
+    }
+
+    /// For each row of some suspects the unknown that an error in it moves most.
+    ///
+    /// # Errors
+    /// Those of [`Trial::responses`].
+    pub fn most_moved(&self, suspects: &[usize], pool: &ThreadPool) -> Result<Vec<Moved>, NetworkError> {
+        let rows: Vec<usize> = suspects.iter().flat_map(|&index| self.rows_of(index..index + 1)).collect();
+        let turns = self.turns()?;
+        let sd = self.unknown_sd(&turns)?;
+        let mut found = Vec::with_capacity(rows.len());
+        self.solutions(&rows, pool, |_, solution, _| {
+            let mut moved = solution.to_vec();
+            turns.iter().for_each(|(first, turn)| turned(&mut moved[*first..first + 3], turn));
+            let ratio = |unknown: usize| {
+                if sd[unknown] > 0.0 { (moved[unknown] / sd[unknown]).abs() } else { 0.0 }
+            };
+            let most =
+                (0..moved.len()).fold(0, |most, next| if ratio(next) > ratio(most) { next } else { most });
+            let (of, component) = self.unknown(most);
+            found.push(Moved { of, component, effect: moved[most], in_sd: ratio(most) });
+        })?;
+        Ok(found)
+    }
+
+    /// What errors of one standard deviation in every row of all suspects do to functions of the unknowns: for each function a number for
+    /// each row.
+    ///
+    /// `partials`: of each function by the unknowns of what `of` names, as in [`Covariances::propagate`].
+    ///
+    /// # Errors
+    /// Those of [`Covariances::propagate`].
+    pub fn influences(
+        &self,
+        covariances: &Covariances,
+        partials: &[f64],
+        of: &[Of],
+        pool: &ThreadPool,
+    ) -> Result<Vec<f64>, NetworkError> {
+        let found = self.found()?;
+        let problem = &self.assembled.problem;
+        let rows = ObservationRows::new(problem, &found.values, &found.held, pool);
+        let all = self.rows_of(0..self.suspects.len());
+        let mut influences = Vec::new();
+        for solution in covariances.solutions(partials, of, pool)? {
+            influences.extend(rows.times(&all, &solution, pool));
+        }
+        Ok(influences)
+    }
+
+    /// Hands out Q a^T of some rows a, one after the other, with all rows.
+    fn solutions(
+        &self,
+        of: &[usize],
+        pool: &ThreadPool,
+        mut take: impl FnMut(usize, &[f64], &ObservationRows),
+    ) -> Result<(), NetworkError> {
+        let (found, problem) = (self.found()?, &self.assembled.problem);
+        let go_on = &mut |_| ControlFlow::Continue(());
+        let failed = |error: AdjustError| NetworkError::new(error, &self.assembled);
+        let normal =
+            NormalEquations::form(problem, &found.values, &found.held, pool, go_on).map_err(failed)?;
+        let equations = ObservationRows::new(problem, &found.values, &found.held, pool);
+        let unknowns = problem.layout().unknowns();
+        for (batch, some) in of.chunks(TOGETHER).enumerate() {
+            let rights: Vec<f64> = some.iter().flat_map(|&row| equations.right(row, unknowns)).collect();
+            let solutions = normal.solve_for(&rights, go_on).map_err(failed)?;
+            for (i, solution) in solutions.chunks_exact(unknowns).enumerate() {
+                take(batch * TOGETHER + i, solution, &equations);
+            }
+        }
+        Ok(())
+    }
+
+    /// The rows of some suspects among those of [`ObservationRows`].
+    fn rows_of(&self, suspects: std::ops::Range<usize>) -> Vec<usize> {
+        let equations = self.assembled.problem.layout().equations();
+        let number = |&(row, _): &(Row, usize)| match row {
+            Row::Equation(equation) => equation,
+            Row::Unknown(unknown) => equations + unknown,
+        };
+        self.suspects[suspects].iter().flat_map(|suspect| suspect.rows.iter().map(number)).collect()
+    }
+
+    /// For each photo that steps by a rotation vector where its angles stand, and what makes steps of these of it.
+    fn turns(&self) -> Result<Vec<(usize, Matrix3)>, NetworkError> {
+        let (values, model) = (&self.found()?.values, &self.assembled.problem.model);
+        let turn = |photo: usize| {
+            let numbers = AttitudeNumbers::OmegaPhiKappa(model.turning_sense(photo)?);
+            let first = model.of_block(photo).start + 3;
+            let rates = numbers.rates([values[first], values[first + 1], values[first + 2]]);
+            Some((first, rates.try_inverse()?))
+        };
+        Ok((0..model.cameras.len()).filter_map(turn).collect())
+    }
+
+    /// Standard deviations of all unknowns (a priori unit weight), those of angles where photos step by a rotation vector.
+    fn unknown_sd(&self, turns: &[(usize, Matrix3)]) -> Result<Vec<f64>, NetworkError> {
+        let (found, model) = (self.found()?, &self.assembled.problem.model);
+        let mut sd = vec![0.0; found.values.len()];
+        let mut put = |first: usize, q: &DMatrix<f64>| {
+            q.diagonal().iter().enumerate().for_each(|(k, value)| sd[first + k] = value.max(0.0).sqrt());
+        };
+        for point in 0..model.points.len() {
+            put(model.of_point(point).start, &self.cofactors_at(found, Home::Point(point)));
+        }
+        for block in 0..model.stations() {
+            let first = model.of_block(block).start;
+            let mut q = self.cofactors_at(found, Home::Block(block));
+            if let Some((_, turn)) = turns.iter().find(|own| own.0 == first + 3) {
+                let own = turn * q.fixed_view::<3, 3>(3, 3) * turn.transpose();
+                q.fixed_view_mut::<3, 3>(3, 3).copy_from(&own);
+            }
+            put(first, &q);
+        }
+        Ok(sd)
+    }
+
+    /// What an unknown belongs to, and its number there.
+    fn unknown(&self, unknown: usize) -> (UnknownOf, usize) {
+        let (model, points) = (&self.assembled.problem.model, &self.assembled.points);
+        let stations = model.of_stations();
+        if let Some(kept) = stations.contains(&unknown).then(|| unknown - stations.start) {
+            let block = model.first.partition_point(|&start| start <= kept) - 1;
+            let of = match model.owner(block) {
+                Owner::Photo(photo) => UnknownOf::Photo(photo),
+                Owner::Camera(camera) => UnknownOf::Camera(camera),
+                Owner::Common(common) => UnknownOf::Common(common),
+            };
+            return (of, kept - model.first[block]);
+        }
+        let among = if unknown < stations.start { unknown } else { unknown - stations.len() };
+        (UnknownOf::Point(points[among / 3]), among % 3)
+    }
+}
+
+fn turned(step: &mut [f64], turn: &Matrix3) {
+    let angles = turn * Vector3::from_column_slice(step);
+    step.copy_from_slice(angles.as_slice());
+}

@@ -1,0 +1,165 @@
+//! The groups of observations of a network that are tested together for a gross error: an image, the control of a point, the position or
+//! the attitude of a photo, an observation beside images.
+
+use smallvec::SmallVec;
+
+use super::Network;
+use super::model::Owner;
+use super::problem::Assembled;
+use crate::geometry::PoseNumbers;
+
+/// What a group of observations is of: indices into the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Subject {
+    /// Both coordinates of an image.
+    Image(usize),
+    /// The weighted components of a point.
+    Control(usize),
+    /// The weighted components of a photo's position.
+    Position(usize),
+    /// The same of its attitude.
+    Attitude(usize),
+    /// An observation beside images.
+    Observation(usize),
+    /// The weighted parameters of a camera.
+    Camera(usize),
+    /// The weighted components of a common unknown.
+    Common(usize),
+}
+
+/// One observation of a group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Row {
+    /// An equation, in the order of groups and rows, then of ties and rows.
+    Equation(usize),
+    /// An unknown as an observation of itself.
+    Unknown(usize),
+}
+
+/// Where the unknowns of a group stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Home {
+    /// A group of equations, of a local block.
+    Group { group: usize, point: usize },
+    /// A tie.
+    Tie(usize),
+    /// The unknowns of a point, as the model numbers them.
+    Point(usize),
+    /// Those of a photo, camera or common unknown: its kept block.
+    Block(usize),
+}
+
+/// Observations that are tested together.
+#[derive(Debug, Clone)]
+pub(super) struct Suspect {
+    pub subject: Subject,
+    pub home: Home,
+    /// Each with the component that it is.
+    pub rows: SmallVec<[(Row, usize); 3]>,
+}
+
+impl Network {
+    /// The groups of observations that take part: images in their order, then control, positions, attitudes, observations beside images,
+    /// cameras, common unknowns.
+    pub(super) fn suspects(&self, assembled: &Assembled) -> Vec<Suspect> {
+        let mut all = images(assembled);
+        all.extend(of_points(assembled));
+        all.extend(self.of_photos(assembled));
+        all.extend(observations(assembled));
+        all.extend(self.of_blocks(assembled));
+        all
+    }
+
+    fn of_photos(&self, assembled: &Assembled) -> Vec<Suspect> {
+        let model = &assembled.problem.model;
+        let halves = match self.poses {
+            PoseNumbers::Angles(_) => [0..3, 3..6],
+            PoseNumbers::Vectors => [3..6, 0..3],
+        };
+        let subjects: [fn(usize) -> Subject; 2] = [Subject::Position, Subject::Attitude];
+        let half = |(subject, half): (fn(usize) -> Subject, std::ops::Range<usize>)| {
+            (0..self.photos.len()).filter_map(move |photo| {
+                let first = model.of_block(photo).start + half.start;
+                weighted(assembled, subject(photo), Home::Block(photo), first..first + 3)
+            })
+        };
+        subjects.into_iter().zip(halves).flat_map(half).collect()
+    }
+
+    /// The weighted parameters of cameras and components of common unknowns.
+    fn of_blocks(&self, assembled: &Assembled) -> Vec<Suspect> {
+        let model = &assembled.problem.model;
+        let with_camera = (0..model.cameras.len()).filter(|&photo| model.has_own_camera(photo));
+        let own = with_camera.filter_map(|photo| {
+            let block = model.of_block(photo);
+            let subject = Subject::Camera(self.photos[photo].camera);
+            weighted(assembled, subject, Home::Block(photo), block.start + 6..block.end)
+        });
+        let shared = (model.cameras.len()..model.stations()).filter_map(|block| {
+            let subject = match model.owner(block) {
+                Owner::Camera(camera) => Subject::Camera(camera),
+                Owner::Common(common) => Subject::Common(common),
+                Owner::Photo(_) => return None,
+            };
+            weighted(assembled, subject, Home::Block(block), model.of_block(block))
+        });
+        own.chain(shared).collect()
+    }
+}
+
+fn images(assembled: &Assembled) -> Vec<Suspect> {
+    let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
+    let groups = layout.groups();
+    let mut all = Vec::with_capacity(model.images.len());
+    for (point, images) in model.start.windows(2).enumerate() {
+        for place in images[0]..images[1] {
+            let first = layout.rows() * place;
+            let home = match place.checked_sub(groups) {
+                None => Home::Group { group: place, point },
+                Some(tie) => Home::Tie(tie),
+            };
+            let rows = (0..2).map(|k| (Row::Equation(first + k), k)).collect();
+            all.push(Suspect { subject: Subject::Image(model.order[place]), home, rows });
+        }
+    }
+    all.sort_unstable_by_key(|suspect| match suspect.subject {
+        Subject::Image(image) => image,
+        _ => usize::MAX,
+    });
+    all
+}
+
+fn of_points(assembled: &Assembled) -> Vec<Suspect> {
+    let of = |(place, &point): (usize, &usize)| {
+        let unknowns = assembled.problem.model.of_point(place);
+        Some((point, weighted(assembled, Subject::Control(point), Home::Point(place), unknowns)?))
+    };
+    let mut all: Vec<(usize, Suspect)> = assembled.points.iter().enumerate().filter_map(of).collect();
+    all.sort_unstable_by_key(|&(point, _)| point);
+    all.into_iter().map(|(_, suspect)| suspect).collect()
+}
+
+fn observations(assembled: &Assembled) -> Vec<Suspect> {
+    let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
+    let first = layout.groups() * layout.rows();
+    let of = |(i, tied): (usize, &super::observations::TiedObservation)| {
+        let tie = model.tied_images() + i;
+        let rows = layout.tie_rows(tie).enumerate().map(|(k, row)| (Row::Equation(first + row), k)).collect();
+        Suspect { subject: Subject::Observation(tied.index), home: Home::Tie(tie), rows }
+    };
+    model.observations.iter().enumerate().map(of).collect()
+}
+
+/// The weighted ones of some unknowns as observations of themselves; None where none is.
+fn weighted(
+    assembled: &Assembled,
+    subject: Subject,
+    home: Home,
+    unknowns: std::ops::Range<usize>,
+) -> Option<Suspect> {
+    let of = |(k, unknown): (usize, usize)| {
+        assembled.problem.is_weighted(unknown).then_some((Row::Unknown(unknown), k))
+    };
+    let rows: SmallVec<[(Row, usize); 3]> = unknowns.enumerate().filter_map(of).collect();
+    (!rows.is_empty()).then_some(Suspect { subject, home, rows })
+}

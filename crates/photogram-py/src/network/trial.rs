@@ -1,0 +1,234 @@
+//! A network tried without some of its observations.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use photocore::adjustment::Loss;
+use photocore::network::{Moved, NetworkError as Failure, Out, Standing, Subject, Trial, UnknownOf};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::block_network::{BlockCovariances, OfRow, of_rows};
+use crate::arrays::table;
+use crate::options::named_loss;
+use crate::solution::status_name;
+use crate::work::{Workers, watched};
+
+/// Adds the class to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<NetworkTrial>()
+}
+
+/// A network tried without some of its observations.
+#[pyclass(module = "photogram._photocore")]
+pub struct NetworkTrial {
+    trial: Trial,
+    images: usize,
+    threads: usize,
+    refused: fn(&Failure) -> PyErr,
+}
+
+/// Status, iterations, weighted sum of squares, degrees of freedom, points that ran into a station.
+type StandingRow = (&'static str, usize, f64, i64, Vec<usize>);
+
+fn standing_row(standing: Standing) -> StandingRow {
+    let Standing { status, iterations, sum_of_squares, degrees_of_freedom, collapsed } = standing;
+    (status_name(status), iterations, sum_of_squares, degrees_of_freedom, collapsed)
+}
+
+/// Statistic, rows that are out, error and its standard deviation of each.
+type PredictionRow = (f64, Vec<usize>, Vec<f64>, Vec<f64>);
+
+impl NetworkTrial {
+    pub fn new(trial: Trial, images: usize, threads: usize, refused: fn(&Failure) -> PyErr) -> Self {
+        Self { trial, images, threads, refused }
+    }
+
+    fn workers(&self) -> Workers {
+        Workers::of(self.threads, self.images)
+    }
+}
+
+fn subject(subject: Subject) -> (u8, i64) {
+    let (kind, index) = match subject {
+        Subject::Image(index) => (0, index),
+        Subject::Control(index) => (1, index),
+        Subject::Position(index) => (2, index),
+        Subject::Attitude(index) => (3, index),
+        Subject::Observation(index) => (4, index),
+        Subject::Camera(index) => (5, index),
+        Subject::Common(index) => (6, index),
+    };
+    (kind, index as i64)
+}
+
+#[pymethods]
+impl NetworkTrial {
+    #[getter]
+    fn subjects<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i64>>) {
+        let (kinds, indices): (Vec<u8>, Vec<i64>) = self.trial.subjects().map(subject).unzip();
+        (PyArray1::from_vec(py, kinds), PyArray1::from_vec(py, indices))
+    }
+
+    #[getter]
+    fn row_starts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let starts = self.trial.row_starts().iter().map(|&start| start as i64);
+        PyArray1::from_vec(py, starts.collect())
+    }
+
+    #[getter]
+    fn components<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_vec(py, self.trial.components().map(|component| component as i64).collect())
+    }
+
+    #[getter]
+    fn deviations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.trial.deviations().collect())
+    }
+
+    fn stand(&mut self, py: Python<'_>, held: Vec<usize>) -> PyResult<StandingRow> {
+        let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
+        let found = watched(py, workers, None, |pool, watch| trial.stand(&held, pool, watch))?;
+        found.map(standing_row).map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (rows, points, photos, *, tolerance, progress))]
+    fn adjust(
+        &mut self,
+        py: Python<'_>,
+        rows: PyReadonlyArray1<'_, bool>,
+        points: Vec<usize>,
+        photos: Vec<usize>,
+        tolerance: Option<f64>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<StandingRow> {
+        let rows: Vec<bool> = rows.as_array().iter().copied().collect();
+        let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
+        let out = Out { rows: &rows, points: &points, photos: &photos };
+        let found = watched(py, workers, progress, |pool, watch| trial.adjust(out, tolerance, pool, watch))?;
+        found.map(standing_row).map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (loss, scale, *, iterations, progress))]
+    fn resist<'py>(
+        &mut self,
+        py: Python<'py>,
+        loss: &str,
+        scale: f64,
+        iterations: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let Some(loss): Option<Loss> = named_loss(Some((loss, scale)))? else {
+            return Ok(PyArray1::from_vec(py, vec![]));
+        };
+        let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
+        let found =
+            watched(py, workers, progress, |pool, watch| trial.resist(loss, iterations, pool, watch))?;
+        Ok(PyArray1::from_vec(py, found.map_err(|error| refused(&error))?))
+    }
+
+    fn tests<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.tests(pool))?;
+        let tests = found.map_err(|error| (self.refused)(&error))?;
+        let all = PyDict::new(py);
+        all.set_item("active", PyArray1::from_vec(py, tests.active))?;
+        let rank = tests.rank.into_iter().map(|rank| rank as i64).collect();
+        all.set_item("rank", PyArray1::from_vec(py, rank))?;
+        for (name, values) in [
+            ("statistic", tests.statistic),
+            ("least", tests.least),
+            ("shared", tests.shared),
+            ("residual", tests.residual),
+            ("cofactors", tests.cofactors),
+            ("error", tests.error),
+            ("error_sd", tests.error_sd),
+        ] {
+            all.set_item(name, PyArray1::from_vec(py, values))?;
+        }
+        Ok(all)
+    }
+
+    fn predictions(&self, py: Python<'_>, suspects: Vec<usize>) -> PyResult<Vec<Option<PredictionRow>>> {
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.predictions(&suspects, pool))?;
+        let predictions = found.map_err(|error| (self.refused)(&error))?;
+        Ok(predictions
+            .into_iter()
+            .map(|own| own.map(|own| (own.statistic, own.rows, own.error, own.error_sd)))
+            .collect())
+    }
+
+    #[allow(clippy::type_complexity, reason = "a tuple of arrays for each point")]
+    fn on_points<'py>(
+        &self,
+        py: Python<'py>,
+        points: Vec<usize>,
+    ) -> PyResult<Vec<(Vec<usize>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)>> {
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.on_points(&points, pool))?;
+        let rows = found.map_err(|error| (self.refused)(&error))?;
+        rows.into_iter()
+            .map(|own| {
+                let count = own.residual.len();
+                let cofactors = PyArray1::from_vec(py, own.cofactors).reshape([count, count])?;
+                Ok((own.suspects, PyArray1::from_vec(py, own.residual), cofactors))
+            })
+            .collect()
+    }
+
+    fn effects<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.effects(&suspects, pool))?;
+        table(py, found.map_err(|error| (self.refused)(&error))?)
+    }
+
+    fn responses<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.responses(&suspects, pool))?;
+        let columns = found.map_err(|error| (self.refused)(&error))?;
+        let rows = self.trial.row_starts().last().copied().unwrap_or_default();
+        let count = columns.len() / rows.max(1);
+        PyArray1::from_vec(py, columns).reshape([count, rows])
+    }
+
+    fn most_moved(
+        &self,
+        py: Python<'_>,
+        suspects: Vec<usize>,
+    ) -> PyResult<Vec<(&'static str, usize, usize, f64, f64)>> {
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.most_moved(&suspects, pool))?;
+        let row = |moved: Moved| {
+            let (kind, index) = match moved.of {
+                UnknownOf::Photo(index) => ("photo", index),
+                UnknownOf::Camera(index) => ("camera", index),
+                UnknownOf::Common(index) => ("unknown", index),
+                UnknownOf::Point(index) => ("point", index),
+            };
+            (kind, index, moved.component, moved.effect, moved.in_sd)
+        };
+        Ok(found.map_err(|error| (self.refused)(&error))?.into_iter().map(row).collect())
+    }
+
+    fn influences<'py>(
+        &self,
+        py: Python<'py>,
+        covariances: &BlockCovariances,
+        partials: PyReadonlyArray2<'_, f64>,
+        of: Vec<OfRow>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let count = partials.as_array().nrows();
+        let partials: Vec<f64> = partials.as_array().iter().copied().collect();
+        let of = of_rows(of)?;
+        let found = watched(py, self.workers(), None, |pool, _| {
+            self.trial.influences(&covariances.covariances, &partials, &of, pool)
+        })?;
+        let influences = found.map_err(|error| (self.refused)(&error))?;
+        let rows = influences.len() / count.max(1);
+        PyArray1::from_vec(py, influences).reshape([count, rows])
+    }
+
+    fn inseparable(
+        &self,
+        py: Python<'_>,
+        points: Vec<usize>,
+        limit: f64,
+    ) -> PyResult<Vec<(usize, usize, f64)>> {
+        let found =
+            watched(py, self.workers(), None, |pool, _| self.trial.inseparable(&points, limit, pool))?;
+        found.map_err(|error| (self.refused)(&error))
+    }
+}

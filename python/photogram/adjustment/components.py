@@ -1,0 +1,226 @@
+"""Variance components of blocks (and, by what is registered here, of collections)."""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.adjustment.adjustment import adjust, adjusted_again
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import shown
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.network.block import Block
+from photogram.network.observations.observation import Observation
+from photogram.results.components import VarianceComponents
+from photogram.results.group_sums import Left, Probing, factored, observables
+from photogram.results.grouping import Grouping, GroupsArgument, grouped
+from photogram.results.network import AdjustedNetwork
+from photogram.results.result import Result
+from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
+
+__all__ = ["Weighing", "variance_components", "weighing"]
+
+NOTHING = 1e-6
+"""A redundancy that is rounding."""
+OTHERS = "all other observations"
+"""What is in no group."""
+SHARPER = 1e-2
+"""Of the tolerance of components, that of the adjustments in standard deviations."""
+
+
+class Weighing(ABC):
+    """A network that is adjusted again and again with other weights, each time from where it stood."""
+
+    network: Any
+    result: AdjustedNetwork
+    first: AdjustedNetwork
+
+    @abstractmethod
+    def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedNetwork:
+        """Adjust with the variances of (G,) groups multiplied by factors."""
+
+    @abstractmethod
+    def total(self) -> tuple[float, float]:
+        """Return degrees of freedom and weighted sum of squares of all observations."""
+
+    @abstractmethod
+    def factored(self) -> _photocore.BlockCovariances:
+        """Return the factor of the normal equations as they are now."""
+
+
+class _Block(Weighing):
+    result: Result
+
+    def __init__(self, block: Block, threads: int | None, tolerance: float) -> None:
+        self.given = self.network = block
+        self.threads = threads
+        self.result = self.first = adjust(block, tolerance=tolerance, threads=threads)
+
+    def adjust(self, grouping: Grouping, factors: Floats) -> Result:
+        self.network = scaled(self.given, grouping, factors)
+        self.result = adjusted_again(
+            self.network, self.result.options, self.result.state, threads=self.threads
+        )
+        return self.result
+
+    def total(self) -> tuple[float, float]:
+        return float(self.result.degrees_of_freedom), self.result.sums_of_squares.total
+
+    def factored(self) -> _photocore.BlockCovariances:
+        return factored(self.result)
+
+
+@singledispatch
+def weighing(network: object, *, threads: int | None, tolerance: float) -> Weighing:
+    """Return what adjusts a block or a collection with other weights."""
+    raise InputError(f"no block or collection: {shown(network)}")
+
+
+@weighing.register
+def _(network: Block, *, threads: int | None, tolerance: float) -> Weighing:
+    return _Block(network, threads, tolerance)
+
+
+def scaled(block: Block, grouping: Grouping, factors: Floats) -> Block:
+    """Return a block with the variances of groups multiplied by factors."""
+    roots = np.sqrt(factors)
+    of_photos = grouping.factors(roots, grouping.photos)
+    of_observations = grouping.factors(factors, grouping.observations)
+    observations = [
+        each if factor == 1 else _scaled(each, float(factor))
+        for each, factor in zip(block.observations, of_observations, strict=True)
+    ]
+    return block.replace(
+        image_sd=block.image_sd * grouping.factors(roots, grouping.images),
+        point_sd=block.point_sd * grouping.factors(roots, grouping.points),
+        photo_position_sd=block.photo_position_sd * of_photos[:, :3],
+        photo_attitude_sd=block.photo_attitude_sd * of_photos[:, 3:],
+        observations=observations,
+    )
+
+
+def _scaled(observation: Observation, factor: float) -> Observation:
+    """Return an observation with its covariance matrix multiplied; of the same common unknowns."""
+    found = copy.copy(observation)
+    changes = {"precision": observation.precision * factor}
+    for name, by in (("sd", np.sqrt(factor)), ("covariance", factor)):
+        given = getattr(observation, name, None)
+        if given is not None:
+            changes[name] = np.asarray(given) * by
+    for name, value in changes.items():
+        object.__setattr__(found, name, value)
+    return found
+
+
+def variance_components(
+    network: object,
+    groups: GroupsArgument = "kind",
+    *,
+    held: Sequence[str] = (),
+    tolerance: float = 1e-4,
+    max_steps: int = 100,
+    least_redundancy: float = LEAST_REDUNDANCY,
+    level: float = 0.05,
+    equality: bool = True,
+    probing: Probing | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, Floats], None] | None = None,
+) -> VarianceComponents:
+    """Estimate by which factors the variances of groups of observations are wrong, all at once.
+
+    Steps of Foerstner's, every fifth of Helmert's, to the fixed point of both: in every group the weighted
+    sum of squares is the sum of the redundancy numbers. Each adjustment starts from the last. Take gross
+    errors out first (docs/weights.md).
+
+    Parameters
+    ----------
+    network
+        The block or collection.
+    groups
+        `kind`, `camera`, `strip`, `photo`, `point class`, `rays`, `component` (x and y; plan and height of
+        control; positions and attitudes), several of these for all combinations, or a mapping with labels of
+        one's own for `images`, `control`, `stations`, `observations`.
+    held
+        Groups that keep their variances.
+    tolerance, max_steps, least_redundancy, level, equality
+        As of `photogram.statistics.components.estimate`.
+    probing
+        How the Helmert matrix is found: its seed, and how many vectors.
+    threads
+        As of :func:`photogram.adjust`.
+    progress
+        Told after each adjustment of its number and the factors; what it raises ends the work.
+
+    Returns
+    -------
+    Components with standard deviations, intervals and tests, what was merged or held and why, and the network
+    with the new weights and its adjustment.
+
+    Raises
+    ------
+    InputError
+        What is no network, groups that there are not, no redundancy at all.
+    AdjustmentError, RankError
+        As of the adjustment.
+    """
+    if not 0 < tolerance < 1:
+        raise InputError(f"the tolerance of components is between 0 and 1, not {tolerance:g}")
+    if max_steps < 1:
+        raise InputError("there must be one step at least")
+    probing = probing or Probing()
+    grouping = grouped(observables(network), groups)
+    names = grouping.groups.names
+    if unknown := [name for name in held if name not in names]:
+        raise InputError(f"no group is called {shown(unknown[0])}; there are {', '.join(names[:20])}")
+    own = weighing(network, threads=threads, tolerance=min(1e-5, SHARPER * tolerance))
+    number = 0
+
+    def adjusted(factors: Floats) -> Left:
+        nonlocal number
+        result = own.adjust(grouping, factors[:-1]) if number else own.first
+        if not np.isfinite(result.redundancy[result.used_images]).all():
+            raise InputError("the network is not determined: there are no redundancy numbers")
+        if progress is not None:
+            progress(number, factors[:-1].copy())
+        number += 1
+        return Left(result, grouping, *own.total(), own.factored, probing)
+
+    found = estimate(
+        adjusted,
+        replace(
+            grouping.groups,
+            names=(*names, OTHERS),
+            parents=(*grouping.groups.parents, ""),
+            images=(*grouping.groups.images, False),
+            held={names.index(name): "as asked" for name in held} | {len(names): "its weights are given"},
+        ),
+        tolerance=tolerance,
+        max_steps=max_steps,
+        least_redundancy=least_redundancy,
+        level=level,
+        equality=equality,
+    )
+    if not any(each.redundancy > 0 for each in found.components):
+        raise InputError("the network has no redundancy: nothing can be said of its weights")
+    last = own.adjust(grouping, found.factors[:-1])
+    return VarianceComponents(_without_nothing(found), own.network, last, own.first)
+
+
+def _without_nothing(found: Estimate) -> Estimate:
+    """Leave out the group of all others where there are none."""
+    keep = [each.name != OTHERS or each.redundancy > NOTHING for each in found.components]
+    components = tuple(each for each, kept in zip(found.components, keep, strict=True) if kept)
+    messages = [each for each in found.messages if keep[-1] or not each.startswith(OTHERS)]
+    matrix = found.matrix[np.ix_(keep, keep)]
+    return replace(found, components=components, messages=messages, matrix=matrix, factors=found.factors[:-1])
+
+
+check_arguments(globals(), ["variance_components"])

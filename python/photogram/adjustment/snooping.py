@@ -1,0 +1,226 @@
+"""Data snooping of a block: gross errors found one after the other and taken out."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.adjustment.adjustment import Progress, UnitVariance, adjust, core_threads
+from photogram.adjustment.network_trial import (
+    ATTITUDE,
+    CONTROL,
+    IMAGE,
+    OBSERVATION,
+    POSITION,
+    NetworkTrial,
+)
+from photogram.adjustment.suspects import block_suspects
+from photogram.arguments.arrays import number, one_of, truth_value, whole_number
+from photogram.arguments.types import Floats
+from photogram.errors import AdjustmentError, InputError
+from photogram.messages import Message
+from photogram.network.block import Block, checked
+from photogram.network.core import block_network
+from photogram.network.observations import observation_rows
+from photogram.results.result import Result
+from photogram.results.snooped import Snooped
+from photogram.statistics.distributions import LEVEL
+from photogram.statistics.snooping.snooping import Settings, snooped
+from photogram.statistics.snooping.suspects import LostSupportError, Out
+
+__all__ = ["block_trial", "settings_of", "snoop"]
+
+TOLERANCE = 1e-3
+"""Of the standard deviations: an adjustment between two rounds need not be better."""
+EXACT = 1e-9
+"""The same where R of all rows is used: a small network."""
+
+
+@singledispatch
+def snoop(
+    block: Any,
+    *,
+    level: float = LEVEL,
+    fdr: float | None = None,
+    unit_weight: str = "known",
+    robust: bool | None = None,
+    parts: bool = True,
+    max_rounds: int = 20,
+    unit_variance: UnitVariance = "constrained",
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Snooped:
+    """Take gross errors out of a block, or of a collection, one after the other.
+
+    Every image (x and y together), control point (plan, height or all), component of a weighted station and
+    observation beside images is tested as a group; the least probable goes first, and the others are tested
+    without it. After each round the network is adjusted, and what is out is tested against the rest: what
+    agrees comes back. docs/blunders.md has the formulas, and how well it works.
+
+    Parameters
+    ----------
+    block
+        The block, or a :class:`photogram.collection.Collection`.
+    level
+        Probability that any good observation is taken out of a network without gross errors (Bonferroni; the
+        number of tests is that of the start in all rounds).
+    fdr
+        A false discovery rate in place of `level`: the limit rises with every group that is out.
+    unit_weight
+        `known`: the given standard deviations are right, tests are chi-square. `unknown`: they are right but
+        for a common factor, tests are F. With `known`, standard deviations that are more than twice too small
+        by the median of all test values are multiplied by that factor for the tests.
+    robust
+        Whether to start from a robust adjustment (Huber's loss, then Cauchy's), whose outliers are then
+        tested; None where many observations disagree, or the plain adjustment does not converge.
+    parts
+        Whether a part of a control point (height, plan) or of a weighted station may go alone; otherwise all
+        of it goes.
+    max_rounds
+        Rounds at the most.
+    unit_variance, threads
+        See :func:`photogram.adjust`.
+    progress
+        Told of the adjustments before and after.
+
+    Returns
+    -------
+    The adjusted network without what was taken out, and the log.
+
+    Raises
+    ------
+    RankError, AdjustmentError, OutOfMemoryError
+        As :func:`photogram.adjust`.
+    InputError
+        An option that cannot be.
+    KeyboardInterrupt
+        Ctrl-C.
+    """
+    raise InputError(f"snoop takes a Block or a Collection, not {type(block).__name__}")
+
+
+def settings_of(
+    level: float, fdr: float | None, unit_weight: str, robust: bool | None, max_rounds: int
+) -> Settings:
+    """Return checked options.
+
+    Raises
+    ------
+    InputError
+        One that cannot be.
+    """
+    one_of("unit_weight", unit_weight, ("known", "unknown"))
+    if robust is not None:
+        truth_value("robust", robust)
+    family = number("level", level) if fdr is None else number("fdr", fdr)
+    if not 0 < family < 1:
+        raise InputError(
+            f"{'level' if fdr is None else 'fdr'} is a probability between 0 and 1, not {family:g}"
+        )
+    if whole_number("max_rounds", max_rounds) < 1:
+        raise InputError("there must be one round at least")
+    return Settings(
+        level=family,
+        fdr=fdr is not None,
+        known=unit_weight == "known",
+        robust=robust,
+        max_rounds=max_rounds,
+    )
+
+
+@snoop.register
+def _snoop_block(
+    block: Block,
+    *,
+    level: float = LEVEL,
+    fdr: float | None = None,
+    unit_weight: str = "known",
+    robust: bool | None = None,
+    parts: bool = True,
+    max_rounds: int = 20,
+    unit_variance: UnitVariance = "constrained",
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Snooped:
+    checked(block)
+    settings = settings_of(level, fdr, unit_weight, robust, max_rounds)
+    first = adjust(block, unit_variance=unit_variance, covariance=False, threads=threads, progress=progress)
+    if not first.converged and robust is not False:
+        first = adjust(block, loss="huber", covariance=False, threads=threads, progress=progress)
+    trial = block_trial(first, threads, parts=parts)
+    try:
+        outcome = snooped(trial, settings)
+    except LostSupportError as lost:
+        raise AdjustmentError(f"the block cannot be tested: {lost}") from lost
+    cleaned = _without(block, first, outcome.out, trial.core)
+    result = adjust(cleaned, unit_variance=unit_variance, threads=threads, progress=progress)
+    remarks = [Message(remark) for remark in outcome.remarks]
+    result = dataclasses.replace(result, messages=[*remarks, *result.messages])
+    return Snooped(result=result, outcome=outcome, suspects=trial.suspects, settings=settings)
+
+
+def block_trial(result: Result, threads: int | None = None, *, parts: bool = True) -> NetworkTrial:
+    """Return an adjusted block as snooping asks it."""
+    block = result.block
+    options = dataclasses.replace(result.options, covariance=True, loss=None)
+    core = block_network(block, options).trial(result.state, threads=core_threads(threads))
+    deviations = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
+    suspects = block_suspects(block, core, parts=parts)
+    trial = NetworkTrial(
+        core=core,
+        suspects=suspects,
+        images=np.stack([block.image_photos, block.image_points], axis=1),
+        supported=np.asarray(np.isfinite(deviations).all(axis=1)),
+        tolerance=TOLERANCE,
+    )
+    if trial.whole:
+        trial.tolerance = EXACT
+    return trial
+
+
+def _without(block: Block, first: Result, out: Out, core: _photocore.NetworkTrial) -> Block:
+    """Return a block without what is out, from adjusted values on."""
+    kinds, subjects = core.subjects
+    starts, components = core.row_starts, core.components
+    group = np.repeat(np.arange(len(kinds)), np.diff(starts))
+    gone = {kind: out.rows & (kinds[group] == kind) for kind in range(OBSERVATION + 1)}
+    subject = subjects[group]
+    images = np.ones(len(block.image_xy), dtype=bool)
+    images[subject[gone[IMAGE]]] = False
+    point_sd = block.point_sd.copy()
+    point_sd[subject[gone[CONTROL]], components[gone[CONTROL]]] = np.inf
+    position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
+    position_sd[subject[gone[POSITION]], components[gone[POSITION]]] = np.inf
+    attitude_sd[subject[gone[ATTITUDE]], components[gone[ATTITUDE]]] = np.inf
+    rows = [
+        row
+        for own, _ in observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
+        for row in own
+    ]
+    dropped = {rows[index] for index in subject[gone[OBSERVATION]].tolist()}
+    positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
+    return block.replace(
+        photo_positions=np.where(position_sd == 0, block.photo_positions, first.photo_positions),
+        photo_attitudes=np.where(attitude_sd == 0, block.photo_attitudes, first.photo_attitudes),
+        photo_positions_observed=_observed(block.photo_positions, positions, position_sd),
+        photo_attitudes_observed=_observed(block.photo_attitudes, attitudes, attitude_sd),
+        photo_position_sd=position_sd,
+        photo_attitude_sd=attitude_sd,
+        point_sd=point_sd,
+        image_photos=block.image_photos[images],
+        image_points=block.image_points[images],
+        image_xy=block.image_xy[images],
+        image_sd=block.image_sd[images],
+        observations=[each for row, each in enumerate(block.observations) if row not in dropped],
+    )
+
+
+def _observed(initial: Floats, observed: Floats | None, sd: Floats) -> Floats | None:
+    """Return what was observed; nothing where nothing is weighted."""
+    weighted = bool((np.isfinite(sd) & (sd > 0)).any())
+    return initial if observed is None and weighted else observed

@@ -1,0 +1,156 @@
+"""What the groups of observations of a block are called, and what may go alone of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.adjustment.network_trial import (
+    ATTITUDE,
+    CONTROL,
+    IMAGE,
+    KINDS,
+    OBSERVATION,
+    POSITION,
+    image_loads,
+)
+from photogram.arguments.types import Indices
+from photogram.network.block import Block
+from photogram.network.observations import Observation, observation_rows
+from photogram.statistics.snooping.suspects import Suspects
+
+__all__ = ["block_suspects", "observations_of_core"]
+
+ANGLES = ("omega", "phi", "kappa")
+
+
+def block_suspects(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> Suspects:
+    """Return the groups of observations of a block as the core has them.
+
+    Parameters
+    ----------
+    parts
+        Whether a part of a control point or of a station may go alone.
+    """
+    return _Named(block, core, parts).suspects()
+
+
+def observations_of_core(block: Block) -> list[Observation]:
+    """Return the observations beside images in the order of the core: kind by kind."""
+    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
+    return [block.observations[row] for rows, _ in groups for row in rows]
+
+
+class _Named:
+    def __init__(self, block: Block, core: _photocore.NetworkTrial, parts: bool) -> None:
+        self.block, self.apart = block, parts
+        self.kinds, self.subjects = core.subjects
+        self.starts, self.components = core.row_starts, core.components
+        self.axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
+        self.photos_of_point = image_loads(block.image_points, block.image_photos)
+        self.point_row = {name: row for row, name in enumerate(block.point_ids)}
+        self.photo_row = {name: row for row, name in enumerate(block.photo_ids)}
+        self.observations = observations_of_core(block)
+
+    def suspects(self) -> Suspects:
+        kinds, subjects, block = self.kinds, self.subjects, self.block
+        points = np.full(len(kinds), -1)
+        photos = np.full(len(kinds), -1)
+        image = kinds == IMAGE
+        points[image] = block.image_points[subjects[image]]
+        photos[image] = block.image_photos[subjects[image]]
+        points[kinds == CONTROL] = subjects[kinds == CONTROL]
+        station = (kinds == POSITION) | (kinds == ATTITUDE)
+        photos[station] = subjects[station]
+        return Suspects(
+            row_starts=self.starts,
+            kinds=kinds.astype(np.int64),
+            kind_names=KINDS,
+            points=points,
+            photos=photos,
+            loads=self.loads,
+            removable=np.asarray(kinds <= OBSERVATION),
+            parts=self.parts,
+            name=self.name,
+            row_name=self.row_name,
+            unit=self.unit,
+        )
+
+    def loads(self, group: int) -> Indices:
+        """Return the photos that a group has to do with."""
+        kind, subject = int(self.kinds[group]), int(self.subjects[group])
+        if kind == IMAGE:
+            return self.photos_of_point(int(self.block.image_points[subject]))
+        if kind == CONTROL:
+            return self.photos_of_point(subject)
+        if kind in (POSITION, ATTITUDE):
+            return np.array([subject])
+        if kind != OBSERVATION:
+            return np.arange(len(self.block.photo_ids))
+        observation = self.observations[subject]
+        seen = [self.photos_of_point(self.point_row[name]) for name in observation.points]
+        own = np.array([self.photo_row[name] for name in observation.photos], dtype=np.int64)
+        return np.unique(np.concatenate([own, *seen]))
+
+    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
+        """Return what may go alone: plan, height or all of control, single components of stations."""
+        if not self.apart:
+            return None
+        kind = int(self.kinds[group])
+        components = self.components[self.starts[group] : self.starts[group + 1]].tolist()
+        if kind == CONTROL and len(components) == 3:
+            return [(0, 1, 2), (2,), (0, 1)]
+        if kind in (CONTROL, POSITION, ATTITUDE) and len(components) > 1:
+            return [(row,) for row in range(len(components))]
+        return None
+
+    def name(self, group: int) -> str:
+        """Return what a group is called."""
+        kind, subject = int(self.kinds[group]), int(self.subjects[group])
+        block = self.block
+        if kind == IMAGE:
+            point = block.point_ids[block.image_points[subject]]
+            return f"image of point {point} on photo {block.photo_ids[block.image_photos[subject]]}"
+        if kind == CONTROL:
+            return f"control point {block.point_ids[subject]}"
+        if kind in (POSITION, ATTITUDE):
+            return f"{KINDS[kind]} of photo {block.photo_ids[subject]}"
+        if kind == OBSERVATION:
+            return self.observations[subject].name
+        if KINDS[kind] == "camera":
+            return f"parameters of {block.camera_names[subject]}"
+        return f"unknown {block.unknowns[subject].name}"
+
+    def _group(self, row: int) -> int:
+        return int(np.searchsorted(self.starts, row, "right")) - 1
+
+    def row_name(self, row: int) -> str:
+        """Return what a row is."""
+        group, component = self._group(row), int(self.components[row])
+        kind = int(self.kinds[group])
+        if kind == IMAGE:
+            return "xy"[component]
+        if kind in (CONTROL, POSITION):
+            return self.axes[component]
+        if kind == ATTITUDE:
+            return ANGLES[component]
+        if kind == OBSERVATION:
+            observation = self.observations[int(self.subjects[group])]
+            return observation.components(geographic=self.block.geographic)[component]
+        return str(component)
+
+    def unit(self, row: int) -> str:
+        """Return the unit of a row."""
+        group, component = self._group(row), int(self.components[row])
+        kind, linear = int(self.kinds[group]), self.block.linear_unit
+        if kind == IMAGE:
+            return self.block.image_unit
+        if kind in (CONTROL, POSITION):
+            return "rad" if self.block.geographic and component < 2 else linear
+        if kind == ATTITUDE:
+            return "rad"
+        if kind == OBSERVATION:
+            return self.observations[int(self.subjects[group])].units(linear)[component]
+        return ""

@@ -1,0 +1,227 @@
+"""The check of a network: mistakes of whole sets, then gross errors, then blunders, then what is odd.
+
+The order is that of Appendix H of the guide (Elassal and Malhotra, NOAA 1987), by intersection first and by
+adjustment then; before it, units, axes and angles of everything are asked for, because one such mistake looks
+like a blunder in every observation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from photogram.adjustment.first_values import FirstValues, first_values
+from photogram.arguments.arrays import shown
+from photogram.checks.adjusting import Adjuster
+from photogram.checks.control import control
+from photogram.checks.control_sets import doubtful, explain, free_model
+from photogram.checks.conventions import conventions, further
+from photogram.checks.editing import HOPELESS, Edited, blunder_section, edit, without_photos
+from photogram.checks.findings import Check, Finding, Level, Section
+from photogram.checks.gross import Suspects, disproved, gross, without
+from photogram.checks.heights import two_ray_heights
+from photogram.checks.key_numbers import key_numbers
+from photogram.checks.orientation import orientation, spare_explained
+from photogram.checks.residuals import residuals
+from photogram.checks.stations import stations
+from photogram.checks.structure import structure_section
+from photogram.checks.views import View, kept_images
+from photogram.checks.words import Words
+from photogram.errors import AdjustmentError, InputError
+from photogram.network.block import Block
+from photogram.network.rays import Rays
+
+__all__ = ["Manner", "check", "check_block"]
+
+FINAL_STATIONS = 5.0
+"""Stations count as adjusted when half the residuals are below so many standard deviations."""
+MOST_SETS = 5
+"""Mistakes in the control as a whole that are put right one upon the other, at the most."""
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a block is checked.
+
+    Attributes
+    ----------
+    options
+        Of :func:`photogram.adjust`.
+    words
+        What things are called.
+    intersect_only
+        Why stations are kept as they are; empty where they are adjusted.
+    """
+
+    options: dict[str, Any] = field(default_factory=dict)
+    words: Words = field(default_factory=Words)
+    intersect_only: str = ""
+
+
+@singledispatch
+def check(network: object, *, threads: int | None = None) -> Check:
+    """Look for mistakes and gross errors in a network: units, axes, signs, names, images, control, stations.
+
+    Nothing is changed. What an earlier step explains (feet for metres, a mirrored photo) is put right for the
+    later ones, and what it finds wrong is left out of them, so that every error shows by itself and one
+    mistake is named once.
+
+    Parameters
+    ----------
+    network
+        A block with any observations, a project of GIANT files, or a collection of photos. Photos of a block
+        may be without poses: they are given first values then.
+    threads
+        Threads of the adjustment; the findings do not depend on it. Default: all processors.
+
+    Returns
+    -------
+    The findings, section by section, with a report and a JSON document. Grave ones make results wrong or
+    impossible.
+
+    Raises
+    ------
+    InputError
+        What is no network.
+
+    Examples
+    --------
+    >>> from photogram import check, simulate
+    >>> block = simulate(strips=2, photos_per_strip=5).block
+    >>> check(block).grave
+    []
+    >>> feet = block.point_positions * [1, 1, 1 / 0.3048]
+    >>> [finding.kind for finding in check(block.replace(point_positions=feet)).grave]
+    ['control-set']
+    """
+    del threads
+    raise InputError(f"a check is of a block, a project or a collection, not of {shown(network)}")
+
+
+@check.register
+def _(network: Block, *, threads: int | None = None) -> Check:
+    return Check(network.title, *check_block(network, Manner({"threads": threads})))
+
+
+def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
+    """Check a block; returns the sections, and the adjustment where there was one."""
+    # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        if np.isfinite(block.photo_positions).all() and np.isfinite(block.photo_attitudes).all():
+            return _checked(block, manner)
+        started, section = _started(block)
+        if started is None:
+            return [section], None
+        sections, result = _checked(started, manner)
+        return [section, *sections], result
+
+
+def _started(block: Block) -> tuple[Block | None, Section]:
+    """Give photos without poses their first values."""
+    section = Section("First values", "Photos without positions or attitudes are started from their images.")
+    try:
+        found: FirstValues = first_values(block)
+        usable = found.usable()
+    except (AdjustmentError, InputError) as error:
+        section.findings.append(Finding("no-first-values", "grave", f"nothing can be checked: {error}"))
+        return None, section
+    section.lines.append(f"{len(found.sources)} of {len(block.photo_ids)} photos have first values")
+    for photo, why in found.missing.items():
+        text = f"photo {photo} could not be started: {why}"
+        section.findings.append(Finding("no-first-values", "grave", text, [photo]))
+    return usable, section
+
+
+def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
+    words, adjusted = manner.words, Adjuster(manner.options)
+    sets, view, exact = conventions(View.of(block))
+    upright, seen = orientation(view.seen, words, view.unit)
+    oriented = view.of_seen(seen)
+    if oriented is view and not sets.findings:
+        further(sets, view)
+    errors, suspects = gross(oriented.seen, oriented.unit)
+    if not manner.intersect_only:
+        oriented, changed = _control_set(sets, oriented, suspects, adjusted)
+        if changed:
+            errors, suspects = gross(oriented.seen, oriented.unit)
+    if suspects.photos.any():
+        spare_explained(upright, oriented.seen, suspects.photos)
+    edited = _edited(oriented, suspects, manner, adjusted)
+    misleading: set[str] = set()
+    if edited.last is not None and edited.last.converged and edited.spread < HOPELESS:
+        cleared = disproved(oriented.seen, suspects, edited.last)
+        if cleared.any():
+            suspects = replace(suspects, images=suspects.images & ~cleared)
+            block = oriented.seen
+            points = block.image_points[cleared]
+            on = block.image_photos[np.isin(block.image_points, points)]
+            misleading = {block.photo_ids[photo] for photo in on.tolist()}
+            errors.findings = without(block, errors.findings, cleared)
+            edited = _edited(oriented, suspects, manner, adjusted)
+    # What the adjustment has explained or disproved.
+    settled = {name for pair in edited.exchanged for name in pair} | set(edited.cleared)
+    errors.findings = [
+        each for each in errors.findings if each.kind != "control-difference" or not settled & {*each.points}
+    ]
+    sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
+    sections += _after_adjustment(oriented, edited, misleading, words)
+    if not exact:
+        for section in sections:
+            if section is not sets:
+                section.findings = [replace(each, level="look") for each in section.findings]
+    return sections, edited.last
+
+
+def _control_set(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) -> tuple[View, bool]:
+    """Put right what is wrong with the control as a whole; returns the view, and whether it has changed."""
+    changed = False
+    for _ in range(MOST_SETS):
+        block = view.block
+        if not np.isfinite(block.point_sd).any():
+            break
+        good = without_photos(kept_images(block, ~view.images(suspects.images)), suspects.photos)
+        if not doubtful(adjusted.tried(good)):
+            break
+        model = free_model(good, adjusted)
+        found = None if model is None else explain(model)
+        if found is None:
+            break
+        values = {"likelihood_ratio": found.judged.likelihood, "times_smaller": found.judged.fall}
+        level: Level = "grave" if found.judged.accepted else "look"
+        section.findings.append(Finding("control-set", level, found.text, values=values))
+        if level == "look":
+            break
+        view, changed = view.changed(found.change), True
+    return view, changed
+
+
+def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) -> Edited:
+    """Adjust the block, or intersect it when that is the job and its stations are good enough."""
+    suspects = replace(suspects, images=view.images(suspects.images))
+    if not manner.intersect_only:
+        return edit(view.block, suspects, adjusted)
+    met = Rays.of(view.seen).intersect()
+    ratio = met.sizes / view.seen.image_sd.mean(axis=1)
+    if np.isfinite(ratio).any() and np.nanmedian(ratio) < FINAL_STATIONS:
+        return edit(view.block, suspects, adjusted.otherwise(fix_photos=True))
+    reason = f"{manner.intersect_only}, and the stations are not adjusted ones"
+    return Edited(None, None, reason, math.nan, blunder_section(), asked=False)
+
+
+def _after_adjustment(view: View, edited: Edited, misleading: Collection[str], words: Words) -> list[Section]:
+    """Return the sections that rest on the adjustment, as far as there is one."""
+    result = edited.last
+    if result is None or not result.converged:
+        return [stations(view.block, None), key_numbers(edited, words)]
+    return [
+        control(edited, words),
+        stations(view.block, result, misleading),
+        residuals(result, edited.spread),
+        two_ray_heights(result),
+        key_numbers(edited, words),
+    ]

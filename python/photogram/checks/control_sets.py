@@ -1,0 +1,433 @@
+"""Control as a whole against the model that the photos make without it: units, axes, mirror images.
+
+With the control left out the images make a free model: positions Y of the control points with their joint
+covariance C_Y, in a datum of its own. Control X with covariance C_X is compared with it by a similarity,
+
+    Omega = min over m, R, t of e' (C_X + C_Y)^-1 e,     e = X - (m R Y + t)
+
+which in a linear model is what the adjustment with that control would add to the sum of squares. So a
+hypothesis about the whole control (heights in feet, X and Y exchanged ...) costs a fit of seven parameters
+and no adjustment.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from photogram.adjustment.hypotheses import FOOT
+from photogram.adjustment.regression import spread
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.checks.adjusting import Adjuster
+from photogram.checks.editing import tests
+from photogram.checks.predictions import freed
+from photogram.checks.robust import critical, mad_sd
+from photogram.network.block import Block
+from photogram.network.observations import Control
+from photogram.network.rays import LocalAxes, local_axes
+from photogram.results.result import Result
+from photogram.statistics.likelihood import Judged, judged
+
+__all__ = ["Explained", "FreeModel", "doubtful", "explain", "free_model"]
+
+MOST = 60
+"""Control points that are compared."""
+FEWEST = 3
+TRIPLES = 400
+"""Threes of them that are tried."""
+CLEARLY = 2 * math.log(20)
+"""What explaining it by single points must cost more: odds of 20."""
+PAIRS = 15
+"""Pairs that are exchanged on trial."""
+GROWTHS = 5
+NEAR = 6.0
+"""Standard deviations within which a point agrees with a similarity."""
+STEPS = 30
+CONVERGED = 1e-9
+MANY = 2
+"""Control points that do not fit, for control as a whole to be doubted."""
+
+EXCHANGED = "X and Y exchanged"
+
+Change = Callable[[Floats], Floats]
+"""Makes of (n, 3) coordinates as given those that were meant."""
+
+
+@dataclass(frozen=True)
+class _Set:
+    kind: str
+    text: str
+    change: Change
+
+    def meant(self, block: Block) -> Block:
+        """Return a block with the control that was meant."""
+        held = np.isfinite(block.point_sd).any(axis=1, keepdims=True)
+        positions = np.where(held, self.change(block.point_positions), block.point_positions)
+        order = [1, 0, 2] if self.kind == EXCHANGED else [0, 1, 2]
+        return block.replace(point_positions=positions, point_sd=block.point_sd[:, order])
+
+
+def _scaled(*factors: float) -> Change:
+    return lambda positions: positions * factors
+
+
+SETS = (
+    _Set("feet in heights", "heights of the control are in feet, all else in metres", _scaled(1, 1, FOOT)),
+    _Set(
+        "metres in heights",
+        "heights of the control are in metres, all else in feet",
+        _scaled(1, 1, 1 / FOOT),
+    ),
+    _Set("feet in X", "X of the control is in feet, all else in metres", _scaled(FOOT, 1, 1)),
+    _Set("feet in Y", "Y of the control is in feet, all else in metres", _scaled(1, FOOT, 1)),
+    _Set("feet in X and Y", "X and Y of the control are in feet, heights in metres", _scaled(FOOT, FOOT, 1)),
+    _Set(
+        EXCHANGED,
+        "X and Y of the control are exchanged (or it is a mirror image otherwise)",
+        lambda positions: positions[:, [1, 0, 2]],
+    ),
+)
+"""Hypotheses about all control; in geographic space only those on heights, and the exchange."""
+
+
+@dataclass(frozen=True, eq=False)
+class FreeModel:
+    """Control points in the model that is free of them.
+
+    Attributes
+    ----------
+    block
+        The block with its control.
+    axes
+        Its metric axes.
+    points
+        (k,) the control points.
+    held
+        (k, 3) which of their components are held.
+    model
+        (k, 3) their positions in the model, in the axes.
+    given
+        (k, 3) the same in the block's own coordinates.
+    covariance
+        (3k, 3k) of `model`.
+    per_unit
+        (3,) units of the axes of a unit of each coordinate, about.
+    """
+
+    block: Block
+    axes: LocalAxes
+    points: Indices
+    held: Bools
+    model: Floats
+    given: Floats
+    covariance: Floats
+    per_unit: Floats
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Of the comparison."""
+        return int(self.held.sum()) - 7
+
+    def omega(self, change: Change | None = None) -> float:
+        """Return what is left of the control under a hypothesis; infinite where it cannot be fitted."""
+        return self._omega(self._target(change))
+
+    def _omega(self, target: Floats) -> float:
+        if not np.isfinite(target).all():
+            return math.inf
+        starts = [_Similarity.start(self.model, target)]
+        full = self.held.all(axis=1)
+        if full.sum() >= FEWEST:
+            starts.append(_closest(self.model[full], target[full]).about(self.model[full], self.model))
+        rows = np.flatnonzero(self.held.ravel())
+        return min(self._fitted(each, target, rows)[0] for each in starts)
+
+    def two_exchanged(self) -> float:
+        """Return what is left of the control when the best two points are exchanged."""
+        target, (_, similarity) = self._target(None), self._nearest()
+        placed = similarity.of(self.model)
+        pairs = [
+            pair
+            for pair in combinations(range(len(target)), 2)
+            if (self.held[pair[0]] == self.held[pair[1]]).all()
+        ]
+
+        def apart(pair: tuple[int, int]) -> float:
+            own, swapped = target[list(pair)], target[list(pair[::-1])]
+            at = placed[list(pair)]
+            return float(((at - swapped) ** 2).sum() - ((at - own) ** 2).sum())
+
+        left = math.inf
+        for pair in sorted(pairs, key=apart)[:PAIRS]:
+            swapped = target.copy()
+            swapped[list(pair)] = target[list(pair[::-1])]
+            left = min(left, self._omega(swapped))
+        return left
+
+    def some_wrong(self) -> float:
+        """Return what explaining the misfit by wrong points costs.
+
+        That is Omega of the others and, for each wrong one, 2 ln(3 k) for its being one of k, and for each of
+        its errors, which may be anything, 2 ln(error / standard deviation). The points that are right are
+        those of the similarity of three points to which most others are nearest.
+        """
+        target, full = self._target(None), np.flatnonzero(self.held.all(axis=1))
+        deviations = self._deviations
+        if len(full) < FEWEST:
+            return math.inf
+        nearest, _ = self._nearest()
+        sizes = np.abs(nearest).max(axis=1)
+        right = sizes <= np.sort(sizes[full])[max(len(full) // 2, FEWEST - 1)]
+        for _ in range(GROWTHS):
+            rows = np.flatnonzero((self.held & right[:, np.newaxis]).ravel())
+            some = full[right[full]]
+            start = _closest(self.model[some], target[some]).about(self.model[some], self.model)
+            omega, similarity = self._fitted(start, target, rows)
+            misses = np.where(self.held, (target - similarity.of(self.model)) / deviations, 0.0)
+            now = np.abs(misses).max(axis=1) < NEAR
+            if right[full].sum() < FEWEST or now[full].sum() < FEWEST or (now == right).all():
+                break
+            right = now
+        gone = np.flatnonzero((self.held & ~right[:, np.newaxis]).ravel())
+        tests = self._left_out(similarity, target, gone)
+        count = int((~right).sum()) * math.log(3 * len(right))
+        return omega + 2 * (count + float(np.log(np.maximum(np.abs(tests), 1.0)).sum()))
+
+    @property
+    def _deviations(self) -> Floats:
+        """(k, 3) of the differences of control and model, without what a similarity takes."""
+        own = np.sqrt(np.maximum(np.diag(self.covariance), 0)).reshape(-1, 3)
+        return np.asarray(np.hypot(own, self.per_unit * self.block.point_sd[self.points]))
+
+    def _nearest(self) -> tuple[Floats, _Similarity]:
+        """Return (k, 3) misses of the similarity of three points to which most are nearest, and this one."""
+        target, deviations = self._target(None), self._deviations
+        best, nearest = math.inf, (np.zeros(target.shape), _Similarity.start(self.model, target))
+        for three in _triples(np.flatnonzero(self.held.all(axis=1))):
+            similarity = _closest(self.model[three], target[three]).about(self.model[three], self.model)
+            misses = np.where(self.held, (target - similarity.of(self.model)) / deviations, 0.0)
+            cost = float(np.log1p(misses**2).sum())
+            if cost < best:
+                best, nearest = cost, (misses, similarity)
+        return nearest
+
+    def _left_out(self, similarity: _Similarity, target: Floats, gone: Indices) -> Floats:
+        """Return the errors of some components in their standard deviations, as the others predict them."""
+        rows = np.flatnonzero(self.held.ravel())
+        error, design, own = self._equations(similarity, target, rows)
+        weighted = np.linalg.solve(own, design)
+        projector = np.linalg.inv(own) - weighted @ np.linalg.pinv(design.T @ weighted) @ weighted.T
+        place = np.searchsorted(rows, gone)
+        cofactor = np.linalg.pinv(projector[np.ix_(place, place)])
+        errors = cofactor @ (projector @ error)[place]
+        tests: Floats = errors / np.sqrt(np.maximum(np.diag(cofactor), np.finfo(np.float64).tiny))
+        return tests
+
+    def _equations(
+        self, similarity: _Similarity, target: Floats, rows: Indices
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return misclosures, partials (shift, scale, rotation) and covariance matrix of some rows."""
+        turned = similarity.scale * (self.model - self.model.mean(axis=0)) @ similarity.rotation.T
+        whole = np.kron(np.eye(len(turned)), similarity.scale * similarity.rotation)
+        variances = ((self.per_unit * self.block.point_sd[self.points]).ravel()[rows]) ** 2
+        own = (whole @ self.covariance @ whole.T)[np.ix_(rows, rows)] + np.diag(variances)
+        return (target - similarity.of(self.model)).ravel()[rows], _similarity_partials(turned)[rows], own
+
+    def _target(self, change: Change | None) -> Floats:
+        """(k, 3) control as it was meant, in the axes."""
+        supplied = self.block.point_positions[self.points]
+        meant = supplied if change is None else change(supplied)
+        # A component that is not held says nothing: it is where the model has it.
+        return self.axes.positions(np.where(self.held, meant, self.given))
+
+    def _fitted(self, similarity: _Similarity, target: Floats, rows: Indices) -> tuple[float, _Similarity]:
+        """Return Omega of some rows, and the similarity, after Gauss-Newton steps."""
+        before = math.inf
+        for _ in range(STEPS):
+            error, design, own = self._equations(similarity, target, rows)
+            try:
+                root = np.linalg.cholesky(own)
+            except np.linalg.LinAlgError:
+                return math.inf, similarity
+            whitened = np.linalg.solve(root, design)
+            right = np.linalg.solve(root, error)
+            step = np.linalg.lstsq(whitened, right, rcond=None)[0]
+            left = right - whitened @ step
+            now = float(left @ left)
+            if abs(before - now) <= CONVERGED * max(now, 1.0):
+                return now, similarity
+            before = now
+            similarity = similarity.moved(step)
+        return before, similarity
+
+
+def _triples(points: Indices) -> list[Indices]:
+    """Return threes of some points: all, or some drawn at random from a fixed seed."""
+    if math.comb(len(points), 3) <= TRIPLES:
+        return [np.array(three) for three in combinations(points.tolist(), 3)]
+    random = np.random.default_rng(0)
+    return [random.permutation(points)[:3] for _ in range(TRIPLES)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Similarity:
+    scale: float
+    rotation: Floats
+    shift: Floats
+
+    @classmethod
+    def start(cls, model: Floats, target: Floats) -> _Similarity:
+        """Return the shift that brings points onto others in the mean."""
+        return cls(1.0, np.eye(3), target.mean(axis=0) - model.mean(axis=0))
+
+    def of(self, model: Floats) -> Floats:
+        """(k, 3) where points of the model come; turned and scaled about their mean."""
+        centre = model.mean(axis=0)
+        placed: Floats = self.scale * (model - centre) @ self.rotation.T + centre + self.shift
+        return placed
+
+    def about(self, some: Floats, model: Floats) -> _Similarity:
+        """Return the same similarity, as one about the mean of all points that was one about that of some."""
+        from_some, to_all = some.mean(axis=0), model.mean(axis=0)
+        moved = self.scale * (to_all - from_some) @ self.rotation.T + from_some + self.shift - to_all
+        return _Similarity(self.scale, self.rotation, moved)
+
+    def moved(self, step: Floats) -> _Similarity:
+        """Return it after a step of translation, scale and rotation, about the mean of all points."""
+        return _Similarity(
+            self.scale * math.exp(float(np.clip(step[3], -1, 1))),
+            _rotation(step[4:]) @ self.rotation,
+            self.shift + step[:3],
+        )
+
+
+def _closest(model: Floats, target: Floats) -> _Similarity:
+    """Return the similarity that brings points closest to others, unweighted (Umeyama 1991)."""
+    x, y = model - model.mean(axis=0), target - target.mean(axis=0)
+    left, sizes, right = np.linalg.svd(y.T @ x)
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    scale = float((sizes * signs).sum() / max((x**2).sum(), np.finfo(np.float64).tiny))
+    return _Similarity(max(scale, 1e-6), (left * signs) @ right, target.mean(axis=0) - model.mean(axis=0))
+
+
+def _rotation(vector: Floats) -> Floats:
+    """Return the rotation by a vector (Rodrigues)."""
+    angle = float(np.linalg.norm(vector))
+    cross = np.array(
+        [[0.0, -vector[2], vector[1]], [vector[2], 0.0, -vector[0]], [-vector[1], vector[0], 0.0]]
+    )
+    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / 2 / np.pi) ** 2
+    turned: Floats = np.eye(3) + first * cross + second * cross @ cross
+    return turned
+
+
+def doubtful(first: Result | None) -> bool:
+    """Whether control as a whole may be wrong: it does not converge with the images, or much does not fit."""
+    if first is None or not first.converged:
+        return True
+    values = tests(first)
+    size = max(mad_sd(first.standardized), np.finfo(np.float64).tiny)
+    limit = critical(sum(int((each > 0).sum()) for each in values.values())) * size
+    held = np.isfinite(first.block.point_sd)
+    fixed = held & (first.block.point_sd == 0)
+    beyond = (values["control"] > limit).any(axis=1)
+    return bool(beyond.sum() >= MANY or (fixed.any() and size > MANY))
+
+
+def free_model(block: Block, adjusted: Adjuster) -> FreeModel | None:
+    """Return the control points in the model that the rest of the block makes; None where it makes none."""
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    points = spread(np.flatnonzero(np.isfinite(block.point_sd).any(axis=1) & (rays >= 2)), MOST)
+    if len(points) < FEWEST:
+        return None
+    rest = freed(block, np.arange(len(block.point_ids))).replace(
+        observations=[each for each in block.observations if not isinstance(each, Control)]
+    )
+    result = adjusted.otherwise(unit_variance="unity").tried(rest)
+    if result is None:
+        return None
+    points = points[result.used_points[points]]
+    held = np.isfinite(block.point_sd[points])
+    if not result.converged or held.sum() <= 7:
+        return None
+    axes = local_axes(block)
+    per_unit = np.ones(3)
+    given = result.point_positions[points]
+    if block.spheroid is not None:
+        a = block.spheroid.a
+        per_unit = np.array([a * math.cos(float(given[:, 1].mean())), a, 1.0])
+    scale = np.tile(per_unit, len(points))
+    names = [block.point_ids[point] for point in points.tolist()]
+    covariance = result.covariance(("point", names)) * scale * scale[:, np.newaxis]
+    model = axes.positions(given)
+    shape = max(mad_sd(result.standardized), 1.0) ** 2 * _of_shape(covariance, model)
+    return FreeModel(block, axes, points, held, model, given, shape, per_unit)
+
+
+def _of_shape(covariance: Floats, model: Floats) -> Floats:
+    """Return a covariance matrix with that of shape, and as much of what a similarity changes.
+
+    A similarity is found anyhow; what the datum of the model says of it would only cost digits.
+    """
+    basis, _ = np.linalg.qr(_similarity_partials(model - model.mean(axis=0)))
+    across = np.eye(len(covariance)) - basis @ basis.T
+    shape = across @ covariance @ across
+    found: Floats = shape + np.trace(shape) / len(shape) * basis @ basis.T
+    return found
+
+
+def _similarity_partials(turned: Floats) -> Floats:
+    """(3k, 7) partials of points, counted from their mean, by shift, scale and rotation."""
+    design = np.zeros((len(turned), 3, 7))
+    design[:, :, :3] = np.eye(3)
+    design[:, :, 3] = turned
+    for axis in range(3):
+        design[:, :, 4 + axis] = np.cross(np.eye(3)[axis], turned)
+    return design.reshape(-1, 7)
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What is wrong with the control as a whole.
+
+    Attributes
+    ----------
+    kind
+        In a word or two.
+    text
+        In a sentence.
+    judged
+        How sure it is.
+    change
+        Makes of the block what was meant.
+    """
+
+    kind: str
+    text: str
+    judged: Judged
+    change: Callable[[Block], Block]
+
+
+def explain(model: FreeModel) -> Explained | None:
+    """Return the mistake in the control as a whole that explains why it does not fit, if there is one."""
+    sets = [
+        each
+        for each in SETS
+        if model.block.spheroid is None or "heights" in each.kind or each.kind == EXCHANGED
+    ]
+    changed = [model.omega(each.change) for each in sets]
+    verdict = judged(model.omega(), changed, model.degrees_of_freedom)
+    if verdict is None or min(changed) + CLEARLY > min(model.some_wrong(), model.two_exchanged()):
+        return None
+    best = [sets[place] for place in verdict.best]
+    if model.held.all(axis=1).sum() < FEWEST:
+        # Nothing tells a mistake in all from one in some.
+        verdict = replace(verdict, accepted=False)
+    word = "probably" if verdict.accepted else "it cannot be told which" if len(best) > 1 else "possibly"
+    text = f"{word}{':' if len(best) > 1 else ''} {'; or '.join(each.text for each in best)}"
+    text += f": the control would miss the model of the photos by {verdict.fall:.3g} times less"
+    return Explained(best[0].kind, text, verdict, best[0].meant)

@@ -1,0 +1,93 @@
+"""The numbers by which the adjustment of a check is judged (Appendix H)."""
+
+from __future__ import annotations
+
+import math
+
+from photogram.checks.editing import Edited
+from photogram.checks.findings import Finding, Level, Section
+from photogram.checks.robust import mad_sd
+from photogram.checks.words import Words, small_unit
+from photogram.results.result import Result
+
+__all__ = ["key_numbers"]
+
+VARIANCE = (0.5, 2.0)
+"""Variance of unit weight between which the weights count as realistic."""
+
+
+def key_numbers(edited: Edited, words: Words) -> Section:
+    """Return the numbers by which a run is judged."""
+    section = Section(
+        "Key numbers",
+        "The variance of unit weight approaches 1 when residuals and standard deviations agree.",
+    )
+    first, last = edited.first, edited.last
+    if first is None or last is None:
+        level: Level = "grave" if edited.asked else "look"
+        section.findings.append(Finding("no-adjustment", level, f"no adjustment: {edited.reason}"))
+        return section
+    _statuses(first, last, section)
+    rows = [("as it is", first)] if first is last else [("as it is", first), ("without what is named", last)]
+    for name, result in rows:
+        variance = result.variance_of_unit_weight
+        shown = f"{variance:.4f}" if variance is not None else "undefined"
+        section.lines.append(
+            f"{f'variance of unit weight, {name}':<50}{shown}"
+            f" ({result.degrees_of_freedom} degrees of freedom)"
+        )
+    _variance(last, section)
+    section.lines.append(
+        f"{'weighted sum of squares, initial':<50}{last.initial_weighted_sum_of_squares:.4g}"
+    )
+    section.lines += [
+        f"{f'weighted sum of squares, iteration {each.number}':<50}{each.weighted_sum_of_squares:.4g}"
+        for each in last.iterations
+    ]
+    _weights(last, words, section)
+    return section
+
+
+def _statuses(first: Result, last: Result, section: Section) -> None:
+    section.lines.append(f"{'status':<50}{last.status} after {len(last.iterations)} iterations")
+    if not last.converged:
+        text = f"the adjustment has {last.status}: the data are bad or the geometry is weak"
+        section.findings.append(Finding("not-converged", "grave", text))
+    elif not first.converged:
+        text = f"with the observations named above the adjustment has {first.status}"
+        section.findings.append(Finding("not-converged", "look", text))
+
+
+def _variance(result: Result, section: Section) -> None:
+    variance = result.variance_of_unit_weight
+    if variance is None:
+        section.findings.append(Finding("no-redundancy", "grave", "there are no degrees of freedom"))
+    elif not VARIANCE[0] < variance < VARIANCE[1] and result.unit_variance != "unity":
+        text = (
+            f"the variance of unit weight is {variance:.3f}: if no gross or systematic error is left, the"
+            f" standard deviations should be {math.sqrt(variance):.2f} times what they are"
+        )
+        section.findings.append(
+            Finding("weights", "look", text, values={"variance_of_unit_weight": variance})
+        )
+
+
+def _weights(result: Result, words: Words, section: Section) -> None:
+    unit, factor = small_unit(result.block.image_unit)
+    low, high = (
+        factor * float(value) for value in (result.block.image_sd.min(), result.block.image_sd.max())
+    )
+    section.lines.append(f"{'standard deviations of image coordinates':<50}{low:g} to {high:g} {unit}")
+    spread = mad_sd(result.standardized)
+    section.lines.append(
+        f"{'the same as the residuals have them':<50}{low * spread:.3g} to {high * spread:.3g} {unit}"
+    )
+    usual = words.usual_um
+    if usual is not None and unit == "um" and (low < usual[0] or high > usual[1]):
+        text = (
+            f"standard deviations of image coordinates are usually {usual[0]:g} to {usual[1]:g} um:"
+            " are these meant?"
+        )
+        section.findings.append(
+            Finding("weights", "look", text, values={"least_um": low, "largest_um": high})
+        )

@@ -1,0 +1,98 @@
+"""A block as the first steps of a check see it: straight rays of cameras without distortion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from photogram.adjustment.hypotheses import Change
+from photogram.arguments.types import Bools, Indices
+from photogram.network.block import Block
+from photogram.network.directions import seen_without_lenses
+
+__all__ = ["View", "kept_images"]
+
+_SHARED = (
+    "photo_positions",
+    "photo_attitudes",
+    "photo_position_sd",
+    "photo_positions_observed",
+    "photo_to_ground",
+    "point_positions",
+    "point_sd",
+)
+"""What a block and its view have in common beside images."""
+
+
+def kept_images(block: Block, kept: Indices | Bools) -> Block:
+    """Return a block with some of its images, by their rows or a mask."""
+    names = ("image_photos", "image_points", "image_xy", "image_sd")
+    return block.replace(**{name: getattr(block, name)[kept] for name in names})
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A block, and what its cameras would have seen without their lenses.
+
+    Attributes
+    ----------
+    block
+        What is adjusted: images that no camera can have seen are left out.
+    seen
+        Without distortion, and without the images of photos on frames, which have no poses of their own.
+        Photos and points are those of `block`.
+    rows
+        (k,) rows of the images of `seen` among those of `block`.
+    unseen
+        How many images no camera can have seen.
+    """
+
+    block: Block
+    seen: Block
+    rows: Indices
+    unseen: int = 0
+
+    @classmethod
+    def of(cls, block: Block) -> Self:
+        """Return the view of a block whose photos have poses."""
+        if not block.cameras and not block.mounts:
+            return cls(block, block, np.arange(len(block.image_xy)))
+        plain, visible = seen_without_lenses(block)
+        unseen = int((~visible).sum())
+        block = kept_images(block, np.flatnonzero(visible)) if unseen else block
+        mounted = np.isin(block.photo_ids, [each.photo for each in block.mounts])
+        rows = np.flatnonzero(~mounted[block.image_photos])
+        return cls(block, kept_images(plain.replace(mounts=()), rows), rows, unseen)
+
+    @property
+    def unit(self) -> str:
+        """Of image coordinates."""
+        return self.block.image_unit
+
+    def images(self, of_seen: Bools) -> Bools:
+        """(m,) which images of `block` are meant by (k,) those of `seen`."""
+        found = np.zeros(len(self.block.image_xy), dtype=bool)
+        found[self.rows] = of_seen
+        return found
+
+    def changed(self, change: Change) -> Self:
+        """Return the view of the block that was meant."""
+        return self.of_seen(change(self.seen))
+
+    def of_seen(self, meant: Block) -> Self:
+        """Return the view of the block that was meant, `seen` put right.
+
+        Where its images are others than those of cameras with lenses, the block has no lenses any more: they
+        could have distorted anything else.
+        """
+        if meant is self.seen:
+            return self
+        if self.seen is self.block:
+            return replace(self, block=meant, seen=meant)
+        same = meant.image_xy is self.seen.image_xy or np.array_equal(meant.image_xy, self.seen.image_xy)
+        if same and np.array_equal(meant.known_distances("checks"), self.seen.known_distances("checks")):
+            block = self.block.replace(**{name: getattr(meant, name) for name in _SHARED})
+            return replace(self, block=block, seen=meant)
+        return replace(self, block=meant, seen=meant, rows=np.arange(len(meant.image_xy)))

@@ -1,0 +1,44 @@
+"""What the verdict on an adjusted collection rests on."""
+
+from __future__ import annotations
+
+from photogram.collection.adjusted import AdjustedCollection
+from photogram.results.findings import ROBUST, has_redundancy, unseen
+from photogram.results.observed import tested
+from photogram.show.ways import findings_of
+from photogram.statistics.findings import Findings, by_t
+from photogram.statistics.limits import global_test
+from photogram.statistics.outliers import Observations
+
+__all__ = ["collection_findings", "names", "tested_observations"]
+
+
+@findings_of.register(AdjustedCollection)
+def collection_findings(result: AdjustedCollection) -> Findings:
+    """Return the tests of a collection.
+
+    Standard deviations of pixels are guesses: single observations are tested against all others.
+    """
+    omega, freedom = result.weighted_sum_of_squares, result.degrees_of_freedom
+    return Findings(
+        status=result.status,
+        observations=[by_t(each, omega, freedom) for each in tested_observations(result)],
+        degrees_of_freedom=freedom,
+        global_test=None if result.loss else global_test(omega, freedom),
+        untested=ROBUST if result.loss else "no degrees of freedom",
+        computed=has_redundancy(result),
+        remarks=unseen(result),
+    )
+
+
+def tested_observations(result: AdjustedCollection) -> list[Observations]:
+    """Return all observations with their standardized residuals, kind by kind."""
+    collection = result.collection
+    return tested(result, collection.image_photos, *names(result), collection.parameters, "XYZ")
+
+
+def names(result: AdjustedCollection) -> tuple[list[str], list[str]]:
+    """Return what photos and points are called: numbers from 0."""
+    return [str(photo) for photo in range(len(result.photo_parameters))], [
+        str(point) for point in range(len(result.point_positions))
+    ]

@@ -1,0 +1,64 @@
+"""What the verdict on a calibrated comparator rests on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.comparator.calibration import Calibration
+from photogram.comparator.joint import JointFit
+from photogram.show.ways import findings_of
+from photogram.statistics.findings import Findings, Systematic, Tested
+
+__all__ = ["comparator_findings"]
+
+FAR = 3.0
+"""A grid that differs from its values by so many times their standard deviation is another grid."""
+
+
+@findings_of.register(Calibration)
+def comparator_findings(calibration: Calibration) -> Findings:
+    """Return the tests of a calibration: readings have no standard deviation of their own, t decides."""
+    screening = calibration.screening
+    places = [
+        (case.number, point, axis)
+        for case in calibration.cases
+        for point in case.placed.points.tolist()
+        for axis in "xy"
+    ]
+
+    def name(index: tuple[int, ...]) -> str:
+        case, point, axis = places[index[0]]
+        return f"{axis} of point {point} of case {case}"
+
+    values = np.vstack(screening.ratios).ravel()
+    readings = Tested("readings of the grid", values, name, "t", second=max(screening.freedom - 1, 1))
+    return Findings(
+        status="converged",
+        observations=[readings],
+        degrees_of_freedom=screening.freedom,
+        untested="readings have no standard deviation of their own",
+        spoiled=""
+        if calibration.usable
+        else f"outliers change corrected coordinates by {screening.change_um:.1f} um (root mean square),"
+        f" and a coordinate is uncertain by {screening.sigma_um:.3f} um",
+        systematic=_grids(calibration.joint) if calibration.joint else [],
+    )
+
+
+def _grids(joint: JointFit) -> list[Systematic]:
+    """Return the tests of the corrections of the plates against their standard deviations."""
+    return [
+        Systematic(
+            name=f"corrections of plate {plate}",
+            sentence=f"the grid of plate {plate} is off by {own.test.factor:.3g} standard deviations",
+            statistic="s^2",
+            distribution="chi2/f",
+            dof=(own.test.degrees_of_freedom,),
+            value=own.test.variance,
+            probability=own.test.probability_above,
+            level=own.test.level / 2,
+            large=own.test.factor > FAR,
+        )
+        for plate, own in joint.plates.items()
+        if own.test is not None
+    ]

@@ -1,0 +1,52 @@
+"""Strips of photos, told from where they were taken."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+
+__all__ = ["strips_of"]
+
+
+def strips_of(positions: Floats) -> list[Indices]:
+    """Cut the photos, in their order, into strips: where the flight turns or jumps.
+
+    Parameters
+    ----------
+    positions
+        (P, 3) in metric axes.
+    """
+    plan = positions[:, :2]
+    steps = np.linalg.norm(np.diff(plan, axis=0), axis=1)
+    usual = float(np.median(steps)) if steps.size else 0.0
+
+    def follows(before: int, start: int, next_: int, gaps: int) -> bool:
+        step = plan[next_] - plan[before]
+        if np.linalg.norm(step) > 2.5 * gaps * usual:
+            return False
+        course = plan[before] - plan[start]
+        # Within 45 degrees of the course so far.
+        return before == start or bool(
+            step @ course > np.sqrt(0.5) * np.linalg.norm(step) * np.linalg.norm(course)
+        )
+
+    strips: list[list[int]] = []
+    last = 0
+    for photo in range(len(plan)):
+        if strips and follows(last, strips[-1][0], photo, photo - last):
+            strips[-1].append(photo)
+            last = photo
+        # One photo out of line breaks no strip when the next one is back on course.
+        elif (
+            strips
+            and len(strips[-1]) > 1
+            and last == photo - 1
+            and photo + 1 < len(plan)
+            and follows(last, strips[-1][0], photo + 1, 2)
+        ):
+            strips[-1].append(photo)
+        else:
+            strips.append([photo])
+            last = photo
+    return [np.array(strip, dtype=np.int64) for strip in strips]

@@ -1,0 +1,175 @@
+"""Variance components of an adjusted network, and the ways to show them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from photogram import _photocore
+from photogram.io import json
+from photogram.results.network import AdjustedNetwork
+from photogram.show.sections import Section, composed, headline
+from photogram.show.ways import Shown, columns_of, document_of, report_of
+from photogram.statistics.components import Component, Estimate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["VarianceComponents"]
+
+
+@dataclass(frozen=True, eq=False)
+class VarianceComponents(Shown):
+    """Variance components of groups of observations.
+
+    Attributes
+    ----------
+    estimate
+        The components, the Helmert matrix, steps and messages.
+    network
+        The block or collection with all standard deviations multiplied by the roots of the components.
+    result
+        Its adjustment.
+    first
+        The adjustment with the given standard deviations.
+    """
+
+    estimate: Estimate
+    network: Any
+    result: AdjustedNetwork
+    first: AdjustedNetwork
+
+    @property
+    def components(self) -> tuple[Component, ...]:
+        """The components, estimated and held."""
+        return self.estimate.components
+
+    @property
+    def worth_changing(self) -> list[Component]:
+        """Those that differ significantly, and by more than 25 percent of the standard deviation, from 1."""
+        return [each for each in self.components if each.worth_changing]
+
+    def __getitem__(self, name: str) -> Component:
+        """Return the component of a group."""
+        for each in self.components:
+            if name == each.name or name in each.members:
+                return each
+        raise KeyError(name)
+
+    def table(self) -> pd.DataFrame:
+        """Return the components as a data frame."""
+        return self._table("component")
+
+
+@columns_of.register(VarianceComponents)
+def _columns(found: VarianceComponents, what: str) -> dict[str, Any]:
+    """`group`, its sums, `factor` of the variance with its deviation and interval, `held` where it is."""
+    del what
+    rows, reference = found.components, found.estimate.reference
+    return {
+        "group": [each.name for each in rows],
+        "observations": [each.count for each in rows],
+        "redundancy": [each.redundancy for each in rows],
+        "sum_of_squares": [each.squares for each in rows],
+        "factor": [each.factor for each in rows],
+        "sd_factor": [each.sd for each in rows],
+        "least_sd_factor": [each.least_sd for each in rows],
+        "low": [each.interval[0] for each in rows],
+        "high": [each.interval[1] for each in rows],
+        "factor_of_sd": [each.factor_of_sd for each in rows],
+        "factor_to_images": [each.factor / reference for each in rows],
+        "test_value": [each.test_value for each in rows],
+        "probability": [each.probability for each in rows],
+        "significant": [each.significant for each in rows],
+        "held": [each.held for each in rows],
+    }
+
+
+@document_of.register(VarianceComponents)
+def _document(found: VarianceComponents) -> bytes:
+    """Return the components as JSON (UTF-8)."""
+    estimate = found.estimate
+    columns = _columns(found, "component")
+    names = list(columns)
+    equality = estimate.equality
+    return json.to_json(
+        {
+            "program": f"photogram {_photocore.__version__}",
+            "converged": estimate.converged,
+            "level": estimate.level,
+            "components": [dict(zip(names, row, strict=True)) for row in zip(*columns.values(), strict=True)],
+            "helmert_matrix": estimate.matrix.tolist(),
+            "all_equal": None
+            if equality is None
+            else {
+                "likelihood_ratio": equality[0],
+                "degrees_of_freedom": equality[1],
+                "probability": equality[2],
+            },
+            "steps": [
+                {"factors": factors.tolist(), "squares": squares.tolist(), "redundancy": redundancy.tolist()}
+                for factors, squares, redundancy in estimate.steps
+            ],
+            "messages": estimate.messages,
+        }
+    )
+
+
+@report_of.register(VarianceComponents)
+def _report(found: VarianceComponents) -> str:
+    """Return the components as text: what to do first."""
+    sections: list[Section] = [
+        ("Verdict", _verdict(found)),
+        ("Variance components", component_lines(found)),
+        ("Groups that were merged or held", list(found.estimate.messages)),
+    ]
+    return composed(headline("variance components"), sections)
+
+
+def _verdict(found: VarianceComponents) -> list[str]:
+    estimate = found.estimate
+    if not estimate.converged:
+        return ["the components have not converged: do not use them"]
+    worth = found.worth_changing
+    lines = [
+        f"standard deviations of {each.name} are too {'small' if each.factor > 1 else 'large'} by a factor of"
+        f" {max(each.factor_of_sd, 1 / each.factor_of_sd):.2f} (95 percent: {_of_sd(each)})"
+        for each in worth
+    ]
+    lines = lines or ["the given standard deviations stand: no component is significant and far from 1"]
+    if estimate.equality is not None:
+        ratio, freedom, probability = estimate.equality
+        lines.append(
+            f"that all are equal has the probability {probability:.2g} (likelihood ratio {ratio:.2f},"
+            f" {freedom} degrees of freedom)"
+        )
+    return lines
+
+
+def _of_sd(each: Component) -> str:
+    ends = [math.sqrt(end) for end in each.interval]
+    if each.factor < 1:
+        ends = [1 / end for end in reversed(ends)]
+    return f"{ends[0]:.2f} to {ends[1]:.2f}"
+
+
+def component_lines(found: VarianceComponents) -> list[str]:
+    """Write a line for each component: plain numbers, but for the number of observations."""
+    reference = found.estimate.reference
+    columns = ("redundancy", "v P v", "component", "sd", "from", "to", "to images", "factor of sd", "p")
+    lines = [f"{'group':<34}{'number':>8}" + "".join(f"{column:>13}" for column in columns)]
+    for each in found.components:
+        parts = (
+            each.redundancy,
+            each.squares,
+            each.factor,
+            each.sd,
+            *each.interval,
+            each.factor / reference,
+            each.factor_of_sd,
+        )
+        cells = "".join(f"{part:>13.3f}" if math.isfinite(part) else f"{'-':>13}" for part in parts)
+        p = f"{each.probability:>13.2g}" if not each.held else f"{'held':>13}"
+        lines.append(f"{each.name:<34}{each.count:>8}{cells}{p}")
+    return lines

@@ -1,0 +1,63 @@
+"""What the verdict on an adjusted block rests on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.results.kinds import tested_kind
+from photogram.results.network import AdjustedNetwork
+from photogram.results.observed import tested
+from photogram.results.result import Result
+from photogram.show.ways import findings_of
+from photogram.statistics.findings import Findings, by_w
+from photogram.statistics.outliers import Observations
+from photogram.statistics.reliability import TESTABLE
+
+__all__ = ["axes", "block_findings", "has_redundancy", "tested_observations", "unseen"]
+
+ROBUST = "a robust loss changes the weights"
+"""Why there is no global test with one."""
+
+
+@findings_of.register(Result)
+def block_findings(result: Result) -> Findings:
+    """Return the tests of a block: standard deviations are given, so the unit weight is known."""
+    return Findings(
+        status=result.status,
+        observations=[by_w(each) for each in tested_observations(result)],
+        degrees_of_freedom=result.degrees_of_freedom,
+        global_test=None if result.loss else result.global_test,
+        untested=ROBUST if result.loss else "no degrees of freedom",
+        computed=has_redundancy(result),
+        remarks=unseen(result),
+    )
+
+
+def tested_observations(result: Result) -> list[Observations]:
+    """Return all observations of a block with their standardized residuals, kind by kind."""
+    block = result.block
+    unknowns = (*axes(result), "omega", "phi", "kappa")
+    of_unknowns = tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, axes(result))
+    return of_unknowns + [tested_kind(each) for each in result.kinds.values()]
+
+
+def axes(result: Result) -> tuple[str, str, str]:
+    """Return what the coordinates are called."""
+    return ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+
+
+def has_redundancy(result: AdjustedNetwork) -> bool:
+    """Return whether redundancy numbers were computed, without which no observation is tested."""
+    return bool(np.isfinite(result.redundancy[result.used_images]).all())
+
+
+def unseen(result: AdjustedNetwork) -> list[str]:
+    """Say how many image coordinates no other observation checks."""
+    redundancy = result.redundancy[result.used_images]
+    hidden = int(np.count_nonzero(redundancy <= TESTABLE))
+    if not hidden:
+        return []
+    return [
+        f"errors of {hidden} of {redundancy.size} image coordinates would not show in their residuals"
+        f" (redundancy below {TESTABLE:g})"
+    ]

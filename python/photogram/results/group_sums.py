@@ -1,0 +1,380 @@
+"""Sums of squares and redundancy numbers over groups of observations, and their tests.
+
+q_g, the weighted sum of squares of a group, is a mixture of chi-square variables with the expectation r_g,
+the sum of its redundancy numbers, and the variance 2 s_g, s_g the sum of R_ij^2 within the group. With
+c = s_g / r_g, q_g / c has nearly the chi-square distribution with r_g^2 / s_g degrees of freedom
+(Satterthwaite 1946). Taking q_g itself for chi-square with r_g is conservative where there is little
+redundancy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import singledispatch
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import shown
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.network.block import Block
+from photogram.network.core import block_network
+from photogram.network.rays import local_axes
+from photogram.network.strips import strips_of
+from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
+from photogram.results.network import AdjustedNetwork
+from photogram.results.result import Result
+from photogram.show.ways import Shown, columns_of, report_of
+from photogram.statistics.components import balanced
+from photogram.statistics.distributions import bonferroni
+from photogram.statistics.limits import GlobalTest, global_test
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = [
+    "GroupSum",
+    "GroupSums",
+    "Left",
+    "Probing",
+    "block_observables",
+    "factored",
+    "group_sums",
+    "observables",
+]
+
+TESTABLE = 0.5
+"""A group with less redundancy is not tested: the mixture is nearly singular."""
+LEVEL = 0.05
+SMALL = 1000
+"""Observations of a network all of whose groups are taken column by column."""
+TOGETHER = 32
+"""Groups beyond so many share the columns of others, which are far from them."""
+
+
+@dataclass(frozen=True)
+class Probing:
+    """How sums over R are found.
+
+    Attributes
+    ----------
+    exact
+        Groups of so many observations at the most are taken column by column; None: 64, and all groups of a
+        network of 1,000 observations.
+    vectors
+        Vectors of random signs for larger groups: 16 give a sum to about 15 percent, 64 to half of that.
+    seed
+        Of the signs; the same seed gives the same bits.
+    """
+
+    exact: int | None = None
+    vectors: int = 32
+    seed: int = 1
+
+    def options(self, observations: int) -> dict[str, Any]:
+        """Return what the core takes, for a network of so many observations."""
+        exact = (observations if observations <= SMALL else 64) if self.exact is None else self.exact
+        return {"exact": exact, "vectors": self.vectors, "seed": self.seed, "threads": 0, "progress": None}
+
+
+@dataclass(frozen=True)
+class GroupSum:
+    """A group of observations after the adjustment.
+
+    Attributes
+    ----------
+    name
+        The group.
+    count, squares, redundancy
+        Observations, their weighted sum of squares q, the sum r of their redundancy numbers.
+    spread
+        s: q has the variance 2 s where the standard deviations are right.
+    test
+        Of q / c with its degrees of freedom (Satterthwaite); None with a redundancy below 0.5.
+    """
+
+    name: str
+    count: int
+    squares: float
+    redundancy: float
+    spread: float
+    test: GlobalTest | None
+
+    @property
+    def scale(self) -> float:
+        """What q is divided by to be tested: c = s / r."""
+        return self.spread / self.redundancy if self.redundancy > 0 else math.nan
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of q / c, r^2 / s."""
+        return self.redundancy**2 / self.spread if self.spread > 0 else math.nan
+
+    @property
+    def factor(self) -> float:
+        """By which residuals are larger than their standard deviations allow; NaN without redundancy."""
+        return math.sqrt(self.squares / self.redundancy) if self.redundancy > 0 else math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class GroupSums(Shown):
+    """Groups of the observations of an adjusted network, with their tests.
+
+    A group is judged after gross errors are out, and jointly with the others by variance components: its sum
+    contains the errors of the others.
+
+    Attributes
+    ----------
+    groups
+        The groups.
+    level
+        Of all tests together; each has it divided by their number (Bonferroni), half on each side.
+    """
+
+    groups: tuple[GroupSum, ...]
+    level: float
+
+    @property
+    def rejected(self) -> list[GroupSum]:
+        """Groups whose residuals are larger or smaller than their standard deviations allow."""
+        tested = [each for each in self.groups if each.test is not None]
+        return [each for each in tested if each.test and (each.test.rejected_high or each.test.rejected_low)]
+
+    def __getitem__(self, name: str) -> GroupSum:
+        """Return the group of a name."""
+        for each in self.groups:
+            if each.name == name:
+                return each
+        raise KeyError(name)
+
+    def table(self) -> pd.DataFrame:
+        """Return the groups as a data frame."""
+        return self._table("group")
+
+
+@columns_of.register(GroupSums)
+def _columns(sums: GroupSums, what: str) -> dict[str, Any]:
+    """`group`, its sums, `factor` of its standard deviations, probabilities of as low and as high a sum."""
+    del what
+    tests = [each.test for each in sums.groups]
+    return {
+        "group": [each.name for each in sums.groups],
+        "observations": [each.count for each in sums.groups],
+        "redundancy": [each.redundancy for each in sums.groups],
+        "sum_of_squares": [each.squares for each in sums.groups],
+        "spread": [each.spread for each in sums.groups],
+        "degrees_of_freedom": [each.freedom for each in sums.groups],
+        "factor": [each.factor for each in sums.groups],
+        "probability_below": [math.nan if test is None else test.probability_below for test in tests],
+        "probability_above": [math.nan if test is None else test.probability_above for test in tests],
+    }
+
+
+@report_of.register(GroupSums)
+def _report(sums: GroupSums) -> str:
+    """Return the groups as lines of text."""
+    columns = (("redundancy", 12), ("v P v", 12), ("factor of sd", 14), ("p low", 10), ("p high", 10))
+    lines = [f"{'group':<34}{'number':>8}" + "".join(f"{column:>{width}}" for column, width in columns)]
+    for each in sums.groups:
+        test = each.test
+        tests = (
+            f"{'not tested':>20}"
+            if test is None
+            else f"{test.probability_below:>10.2g}{test.probability_above:>10.2g}"
+        )
+        lines.append(
+            f"{each.name:<34}{each.count:>8}{each.redundancy:>12.2f}{each.squares:>12.2f}"
+            f"{each.factor:>14.3f}{tests}"
+        )
+    found = sums.rejected
+    tested = sum(each.test is not None for each in sums.groups)
+    said = "none" if not found else ", ".join(each.name for each in found)
+    lines.append(f"beyond their limits, of {tested} tested at {100 * sums.level:g} percent together: {said}")
+    return "\n".join(lines) + "\n"
+
+
+class Left:
+    """What an adjustment leaves of groups of its observations, and of all others as one more group.
+
+    Attributes
+    ----------
+    counts, squares, redundancy
+        (G + 1,) observations, weighted sums of squares, sums of redundancy numbers.
+    """
+
+    def __init__(
+        self,
+        result: AdjustedNetwork,
+        grouping: Grouping,
+        freedom: float,
+        total: float,
+        factored: Callable[[], _photocore.BlockCovariances],
+        probing: Probing,
+    ) -> None:
+        self.result, self.grouping, self._factored, self._probing = result, grouping, factored, probing
+        counts, squares, redundancy = sums_of(result, grouping)
+        self.counts: Indices = np.append(counts, 0)
+        self.squares: Floats = np.append(squares, max(total - squares.sum(), 0.0))
+        self.redundancy: Floats = np.append(redundancy, max(freedom - redundancy.sum(), 0.0))
+
+    def matrix(self) -> Floats:
+        """Return the (G + 1, G + 1) Helmert matrix."""
+        options = self._probing.options(int(self.counts.sum()))
+        g = self.grouping.count
+        _, found, exact = self._factored().group_squares(self.grouping.core(), classes=None, **options)
+        columns, r = found.reshape(g + 1, g), self.redundancy
+        sums = columns.sum(axis=0)
+        columns = columns * np.divide(r[:g], sums, out=np.ones(g), where=(sums > 0) & ~np.array(exact, bool))
+        matrix = np.zeros((g + 1, g + 1))
+        matrix[g, :g] = matrix[:g, g] = columns[g]
+        matrix[:g, :g] = balanced(columns[:g], r[:g] - columns[g], exact)
+        matrix[g, g] = max(r[g] - columns[g].sum(), 0.0)
+        return matrix
+
+
+def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Floats, Floats]:
+    """Return (G,) numbers of observations, weighted sums of squares and sums of redundancy numbers."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        squares = {
+            "images": (result.residuals / result.image_given_sd) ** 2 * result.image_weights[:, np.newaxis],
+            "points": _weighted_squares(result.point_residuals, result.point_given_sd),
+            "photos": _weighted_squares(result.photo_residuals, result.photo_given_sd),
+        }
+    redundancy = {
+        "images": result.redundancy,
+        "points": np.where(np.isfinite(squares["points"]), result.point_redundancy, np.nan),
+        "photos": np.where(np.isfinite(squares["photos"]), result.photo_redundancy, np.nan),
+    }
+    if isinstance(result, Result):
+        count = len(result.block.observations)
+        of_observations, own = np.full(count, np.nan), np.full(count, np.nan)
+        for kind in result.kinds.values():
+            of_observations[kind.rows] = kind.squares
+            own[kind.rows] = np.nansum(np.where(np.isfinite(kind.sd), kind.redundancy, 0.0), axis=1)
+        squares["observations"] = of_observations
+        redundancy["observations"] = np.where(np.isfinite(of_observations), own, np.nan)
+    ones = {name: np.where(np.isfinite(values), 1.0, np.nan) for name, values in redundancy.items()}
+    if isinstance(result, Result):
+        components = np.ones(len(result.block.observations))
+        for kind in result.kinds.values():
+            components[kind.rows] = np.isfinite(kind.residuals).sum(axis=1)
+        ones["observations"] *= components
+    counts = np.round(grouping.summed(ones)).astype(np.int64)
+    return counts, grouping.summed(squares), grouping.summed(redundancy)
+
+
+def _weighted_squares(residuals: Floats, sd: Floats) -> Floats:
+    return np.where((sd > 0) & np.isfinite(sd), (residuals / sd) ** 2, np.nan)
+
+
+@singledispatch
+def observables(network: object) -> Observables:
+    """Return what a block, a collection or an adjusted one has observations of."""
+    raise InputError(f"no block or collection, nor the result of one: {shown(network)}")
+
+
+@observables.register
+def block_observables(block: Block) -> Observables:
+    """Return what a block has observations of."""
+    held = np.isfinite(block.point_sd).any(axis=1)
+    known = np.isfinite(block.point_positions).any(axis=1)
+    sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
+    observed = (sd > 0) & np.isfinite(sd)
+    mounted = {mount.photo for mount in block.mounts}
+    observed[[row for row, name in enumerate(block.photo_ids) if name in mounted]] = False
+    cameras, photo_cameras = block.core_cameras()
+    names = block.camera_names if block.cameras else [str(number) for number in range(len(cameras))]
+    return Observables(
+        image_photos=block.image_photos,
+        image_points=block.image_points,
+        photo_names=block.photo_ids,
+        photo_cameras=photo_cameras,
+        camera_names=names,
+        strips=lambda: strips_of(local_axes(block).positions(block.photo_positions)),
+        point_classes=np.where(held, "control", np.where(known, "check", "pass")),
+        point_observed=(block.point_sd > 0) & np.isfinite(block.point_sd),
+        photo_observed=observed,
+        stations=("positions",) * 3 + ("attitudes",) * 3,
+        observations=[each.label for each in block.observations],
+        commons=len(block.unknowns),
+        cameras=len(cameras),
+    )
+
+
+@observables.register
+def _(result: Result) -> Observables:
+    return block_observables(result.block)
+
+
+@singledispatch
+def factored(result: object) -> _photocore.BlockCovariances:
+    """Return the factor of the normal equations of an adjusted network."""
+    raise InputError(f"not the result of an adjustment: {shown(result)}")
+
+
+@factored.register
+def _(result: Result) -> _photocore.BlockCovariances:
+    network = block_network(result.block, result.options)
+    return network.covariances(result.state, threads=0, progress=None)
+
+
+def group_sums(
+    result: AdjustedNetwork,
+    groups: GroupsArgument = "kind",
+    *,
+    level: float = LEVEL,
+    probing: Probing | None = None,
+) -> GroupSums:
+    """Test groups of the observations of an adjusted network.
+
+    Parameters
+    ----------
+    result
+        The adjusted block or collection, with covariances.
+    groups
+        `kind`, `camera`, `strip`, `photo`, `point class`, `rays`, `component`, several of these, or labels of
+        one's own (docs/weights.md).
+    level
+        Probability that any of the groups is rejected though all standard deviations are right.
+    probing
+        How sums over R are found.
+
+    Raises
+    ------
+    InputError
+        No adjusted network, none with covariances, groups that there are not.
+    """
+    if not isinstance(result, AdjustedNetwork):
+        raise InputError(f"not the result of an adjustment: {shown(result)}")
+    if not np.isfinite(result.redundancy[result.used_images]).all():
+        raise InputError("the result has no redundancy numbers: adjust with covariance=True")
+    grouping = grouped(observables(result), groups)
+    counts, squares, redundancy = sums_of(result, grouping)
+    spread = np.clip(_spread(result, grouping, counts, probing or Probing()), 0.0, redundancy)
+    testable = redundancy >= TESTABLE
+    own = bonferroni(level, int(testable.sum()))
+    found = []
+    for g, name in enumerate(grouping.groups.names):
+        q, r, s = float(squares[g]), float(redundancy[g]), float(spread[g])
+        test = global_test(q * r / s, r * r / s, own) if testable[g] and s > 0 else None
+        found.append(GroupSum(name, int(counts[g]), q, r, s, test))
+    return GroupSums(tuple(found), level)
+
+
+def _spread(result: AdjustedNetwork, grouping: Grouping, counts: Indices, probing: Probing) -> Floats:
+    """Return (G,) s_g; the groups beyond some share columns."""
+    options = probing.options(int(counts.sum()))
+    g = grouping.count
+    if g > TOGETHER:
+        _, squares, _ = factored(result).group_squares(grouping.core(), classes=TOGETHER, **options)
+        return squares
+    _, squares, _ = factored(result).group_squares(grouping.core(), classes=None, **options)
+    return np.asarray(np.diag(squares.reshape(g + 1, g)))
+
+
+check_arguments(globals(), ["group_sums"])

@@ -1,0 +1,274 @@
+"""Groups of the observations of a network: by kind, camera, strip, photo ..., or by the user's labels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.arguments.arrays import shown
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
+from photogram.statistics.components import GroupsOf
+
+__all__ = ["BASES", "Grouping", "GroupsArgument", "Observables", "grouped"]
+
+GroupsArgument = str | Sequence[str] | Mapping[str, Any]
+"""A basis, several of them (every combination is a group), or labels by part of the network."""
+
+BASES = ("kind", "camera", "strip", "photo", "point class", "component", "rays")
+"""What groups can be made by."""
+PARTS = ("images", "control", "stations", "observations")
+"""What labels of the user's own can be of."""
+MANY_RAYS = 5
+"""As many rays or more are one group."""
+
+_Labels = NDArray[np.object_]
+
+
+@dataclass(frozen=True, eq=False)
+class Observables:
+    """What a network of P photos, n points and m images has observations of.
+
+    Attributes
+    ----------
+    image_photos, image_points
+        (m,) indices.
+    photo_names
+        (P,).
+    photo_cameras, camera_names
+        (P,) the camera of each photo, and their names.
+    strips
+        Tells the strips of the photos.
+    point_classes
+        (n,) `control`, `check` or `pass`.
+    point_observed
+        (n, 3) whether a coordinate is weighted.
+    photo_observed
+        (P, k) whether an unknown of a photo is.
+    stations
+        (k,) what the unknowns of a photo are called as observations.
+    observations
+        The kinds of the observations beside images.
+    commons
+        How many common unknowns there are.
+    cameras
+        How many cameras there are.
+    """
+
+    image_photos: Indices
+    image_points: Indices
+    photo_names: Sequence[str]
+    photo_cameras: Indices
+    camera_names: Sequence[str]
+    strips: Callable[[], list[Indices]]
+    point_classes: NDArray[np.str_]
+    point_observed: Bools
+    photo_observed: Bools
+    stations: tuple[str, ...]
+    observations: Sequence[str]
+    commons: int
+    cameras: int
+
+
+@dataclass(frozen=True, eq=False)
+class Grouping:
+    """Groups of observations, a number for each observation; -1 for none.
+
+    Attributes
+    ----------
+    groups
+        Their names.
+    images, points, photos
+        (m, 2), (n, 3), (P, k).
+    observations
+        (o,) of those beside images.
+    commons, cameras
+        How many there are: they are in no group.
+    """
+
+    groups: GroupsOf
+    images: Indices
+    points: Indices
+    photos: Indices
+    observations: Indices
+    commons: int = 0
+    cameras: int = 0
+
+    @property
+    def count(self) -> int:
+        """How many groups there are."""
+        return len(self.groups.names)
+
+    def core(self) -> tuple[int, Indices, Indices, Indices, list[int], list[int], list[int]]:
+        """Return the groups as the core takes them."""
+        photos = self.photos[:, :6]
+        none = [-1] * self.cameras
+        return (
+            self.count,
+            self.images,
+            self.points,
+            np.ascontiguousarray(photos),
+            none,
+            [-1] * self.commons,
+            self.observations.tolist(),
+        )
+
+    def factors(self, factors: Floats, labels: Indices) -> Floats:
+        """Return what each observation with a label has of (G,) factors; 1 for those in no group."""
+        return np.append(factors, 1.0)[labels]
+
+    def summed(self, parts: Mapping[str, Floats]) -> Floats:
+        """Return (G,) sums of values of observations, given in the shapes of the labels."""
+        total = np.zeros(self.count + 1)
+        for name, values in parts.items():
+            labels = getattr(self, name)
+            good = np.isfinite(values)
+            total += np.bincount(labels[good] % (self.count + 1), values[good], self.count + 1)
+        return total[:-1]
+
+
+def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
+    """Return groups of the observations of a network.
+
+    Parameters
+    ----------
+    of
+        What the network has observations of.
+    groups
+        `kind`, `camera`, `strip`, `photo`, `point class`, `rays` (of the point; five and more together), or
+        `component` (x and y, plan and height of control, positions and attitudes of stations): all but `kind`
+        and `component` part the images only, the rest goes by kind. Several of these: a group for each
+        combination. Or labels of one's own: a mapping with arrays of `images` (m,) or (m, 2), `control` (n,)
+        or (n, 3), `stations` (P,) or (P, k), `observations` (o,); what has no label (None or an empty text)
+        keeps its weight, and parts that are not named go by kind.
+
+    Raises
+    ------
+    InputError
+        A basis that there is not, labels that do not fit.
+    """
+    if isinstance(groups, Mapping):
+        labels = _own(of, groups)
+    else:
+        if not isinstance(groups, str | list | tuple):
+            raise InputError(f"groups are by {', '.join(BASES)}, or labels, not {shown(groups)}")
+        bases = (groups,) if isinstance(groups, str) else tuple(groups)
+        for basis in bases:
+            if not isinstance(basis, str) or basis not in BASES:
+                raise InputError(f"groups are by {', '.join(BASES)}, or labels, not {shown(basis)}")
+        if not bases:
+            raise InputError("groups are by one basis at least")
+        labels = _by(of, bases)
+    return _numbered(of, labels)
+
+
+@dataclass(frozen=True, eq=False)
+class _Labelled:
+    """Labels of all parts, and of each label the larger group."""
+
+    images: _Labels
+    points: _Labels
+    photos: _Labels
+    observations: _Labels
+    parents: dict[str, str]
+
+
+def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
+    """Label by named bases."""
+    components = "component" in bases
+    of_images = [_images_by(of, basis) for basis in bases if basis not in ("kind", "component")]
+    head = [", ".join(parts) for parts in zip(*of_images, strict=True)] if of_images else None
+    plain = np.array(head if head is not None else [""] * len(of.image_photos), dtype=object)
+    named = np.array([f"images, {each}" if each else "images" for each in plain.tolist()], dtype=object)
+    images = np.stack([named, named], axis=1)
+    parents: dict[str, str] = {}
+    if of_images:
+        parents |= dict.fromkeys(named.tolist(), "other images")
+    if components:
+        for axis in (0, 1):
+            images[:, axis] = [f"{each}, {'xy'[axis]}" for each in named.tolist()]
+            parents |= dict(zip(images[:, axis].tolist(), named.tolist(), strict=True))
+    points = np.full(of.point_observed.shape, "control", dtype=object)
+    if components:
+        points[:] = ["control, plan", "control, plan", "control, height"]
+        parents |= dict.fromkeys(("control, plan", "control, height"), "control")
+    photos = np.empty(of.photo_observed.shape, dtype=object)
+    photos[:] = of.stations
+    parents |= dict.fromkeys(of.stations, "stations")
+    observations = np.array(list(of.observations), dtype=object)
+    return _Labelled(images, points, photos, observations, parents)
+
+
+def _images_by(of: Observables, basis: str) -> list[str]:
+    """Label the images by one basis."""
+    photos = of.image_photos.tolist()
+    if basis == "photo":
+        return [f"photo {of.photo_names[photo]}" for photo in photos]
+    if basis == "camera":
+        return [f"camera {of.camera_names[of.photo_cameras[photo]]}" for photo in photos]
+    if basis == "strip":
+        number = np.empty(len(of.photo_names), dtype=np.int64)
+        for strip, members in enumerate(of.strips(), 1):
+            number[members] = strip
+        return [f"strip {number[photo]}" for photo in photos]
+    if basis == "point class":
+        return [f"{each} points" for each in of.point_classes[of.image_points].tolist()]
+    rays = np.bincount(of.image_points, minlength=len(of.point_classes))[of.image_points]
+    return [f"{each} rays" if each < MANY_RAYS else f"{MANY_RAYS} rays and more" for each in rays.tolist()]
+
+
+def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
+    """Label as the user does."""
+    unknown = set(given) - set(PARTS)
+    if unknown:
+        raise InputError(f"labels are of {', '.join(PARTS)}, not {shown(sorted(map(str, unknown))[0])}")
+    by_kind = _by(of, ["kind"])
+    parts = {"images": "images", "control": "points", "stations": "photos", "observations": "observations"}
+    found = {}
+    for name, part in parts.items():
+        default: _Labels = getattr(by_kind, part)
+        if name not in given:
+            found[part] = default
+            continue
+        labels = np.asarray(given[name], dtype=object)
+        if labels.shape == default.shape[:1] and default.ndim == 2:
+            labels = np.repeat(labels[:, np.newaxis], default.shape[1], axis=1)
+        if labels.shape != default.shape:
+            raise InputError(
+                f"labels of {name} have the shape {labels.shape}, not {default.shape[:1]} or {default.shape}"
+            )
+        found[part] = np.vectorize(_text, otypes=[object])(labels) if labels.size else labels
+    return _Labelled(**found, parents=by_kind.parents)
+
+
+def _text(label: object) -> str:
+    missing = label is None or (isinstance(label, float) and np.isnan(label))
+    return "" if missing else str(label)
+
+
+def _numbered(of: Observables, labels: _Labelled) -> Grouping:
+    """Give the groups numbers: those of images first."""
+    numbers: dict[str, int] = {"": -1}
+
+    def number(part: _Labels, used: Bools | None = None) -> Indices:
+        flat = part.ravel() if used is None else np.where(used, part, "").ravel()
+        found = [numbers.setdefault(label, len(numbers) - 1) for label in flat.tolist()]
+        return np.array(found, dtype=np.int64).reshape(part.shape)
+
+    # In the order of the photos, whatever that of the images is.
+    number(labels.images[np.argsort(of.image_photos, kind="stable")])
+    images = number(labels.images)
+    of_images = len(numbers) - 1
+    points, photos = number(labels.points, of.point_observed), number(labels.photos, of.photo_observed)
+    observations = number(labels.observations)
+    names = tuple(name for name in numbers if name)
+    groups = GroupsOf(
+        names,
+        tuple(labels.parents.get(name, "") for name in names),
+        tuple(number < of_images for number in range(len(names))),
+    )
+    return Grouping(groups, images, points, photos, observations, of.commons, of.cameras)

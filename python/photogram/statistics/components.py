@@ -1,0 +1,511 @@
+"""Variance components: by which factors the variances of groups of observations are wrong, all at once.
+
+Observations fall into groups g with the variances theta_g sd^2. An adjustment with some theta leaves of every
+group the weighted sum of squares q_g and the sum r_g of redundancy numbers. With R taking errors to
+residuals, both in standard deviations, and the Helmert matrix H_gh = sum of R_ij^2 over i in g, j in h (its
+rows sum to r_g),
+
+    E q_g = sum_h H_gh theta_h (true) / theta_h (present),    Cov q = 2 H at the truth.
+
+* Helmert (1907): solve H f = q, and multiply theta by f.
+* Foerstner (1979): multiply theta_g by q_g / r_g. The fixed point is the same, q_g = r_g, that of the largest
+  restricted likelihood (Patterson and Thompson 1971); components stay positive, and H is not needed.
+
+The covariance of the logarithms is 2 H^-1. Nothing here knows a photograph: `estimate` is told by a function
+what an adjustment with given factors leaves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
+from photogram.messages import listed
+from photogram.statistics.distributions import bonferroni, critical_normal
+
+__all__ = ["Component", "Estimate", "GroupsOf", "Weighted", "balanced", "estimate", "helmert_step"]
+
+LEAST_REDUNDANCY = 5.0
+"""Of a group whose variance is estimated."""
+LEAST_SHARE = 0.01
+"""Of its redundancy in the number of its observations."""
+REFUSED = 1.0
+"""A redundancy below which nothing can be said of a variance."""
+MOST_CONDITION = 100.0
+"""Of the Helmert matrix, scaled to unit diagonal: beyond it components cannot be told apart."""
+LIMIT_OF_STEP = 10.0
+"""By which a step changes a factor at the most, up or down."""
+LOWER_BOUND = 0.01
+"""Of a component, in the given variance."""
+BY_HELMERT = 5
+"""Every so many steps one is Helmert's, where it is positive: Foerstner's converge linearly."""
+WORTH_CHANGING = (0.64, 1.56)
+"""Components within these limits (standard deviations wrong by less than 25 percent) change nothing."""
+NODES = 4
+"""Of the integral that the likelihood ratio is."""
+
+
+class Weighted(Protocol):
+    """What an adjustment leaves of G groups with given components."""
+
+    @property
+    def counts(self) -> Indices:
+        """(G,) observations."""
+
+    @property
+    def squares(self) -> Floats:
+        """(G,) weighted sums of squares, weights divided by the components."""
+
+    @property
+    def redundancy(self) -> Floats:
+        """(G,) sums of redundancy numbers."""
+
+    def matrix(self) -> Floats:
+        """Return the (G, G) Helmert matrix."""
+
+
+@dataclass(frozen=True)
+class GroupsOf:
+    """Groups of observations, by name.
+
+    Attributes
+    ----------
+    names
+        (G,) of the groups.
+    parents
+        (G,) the larger group that each is merged into, with all others of the same name, where its own
+        component cannot be estimated; empty for none.
+    images
+        (G,) whether they are of image coordinates.
+    held
+        Why the component of a group is not estimated, by its number.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[str, ...] = ()
+    images: tuple[bool, ...] = ()
+    held: dict[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Component:
+    """The variance component of a group.
+
+    Attributes
+    ----------
+    name
+        The group; where several were merged, the larger one.
+    members
+        The groups that it is of.
+    count, squares, redundancy
+        Observations, q and r with the last weights.
+    factor
+        theta: the variance is the given one times this.
+    sd, least_sd
+        Of the factor; the second from the redundancy alone, which is less. NaN where held.
+    interval
+        In which the factor lies with 95 percent, from the logarithm.
+    test_value, probability
+        ln(theta) / its standard deviation; of one as large where the given variance is right.
+    significant
+        Whether that is below the level divided by the number of components (Bonferroni).
+    images
+        Whether it is of image coordinates.
+    held
+        Why it is not estimated; empty where it is.
+    """
+
+    name: str
+    members: tuple[str, ...]
+    count: int
+    squares: float
+    redundancy: float
+    factor: float
+    sd: float
+    least_sd: float
+    interval: tuple[float, float]
+    test_value: float
+    probability: float
+    significant: bool
+    images: bool
+    held: str
+
+    @property
+    def factor_of_sd(self) -> float:
+        """By which standard deviations are to be multiplied."""
+        return math.sqrt(self.factor)
+
+    @property
+    def worth_changing(self) -> bool:
+        """Whether it is significant and far enough from 1 for other weights to matter."""
+        low, high = WORTH_CHANGING
+        return self.significant and not low <= self.factor <= high
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Variance components of groups.
+
+    Attributes
+    ----------
+    components
+        Estimated and held ones.
+    factors
+        (G,) theta of every group that was given.
+    matrix
+        (k, k) Helmert matrix of the components at the end.
+    converged
+        Whether q_g = r_g was reached.
+    steps
+        Of every step the factors it was made from, q and r, (G,) each.
+    messages
+        What was merged or held, and why; negative components.
+    equality
+        Likelihood ratio of all estimated components being equal, its degrees of freedom and probability; None
+        for less than two, or where it was not asked for.
+    level
+        Of the tests, all together.
+    """
+
+    components: tuple[Component, ...]
+    factors: Floats
+    matrix: Floats
+    converged: bool
+    steps: list[tuple[Floats, Floats, Floats]]
+    messages: list[str]
+    equality: tuple[float, int, float] | None
+    level: float
+
+    @property
+    def reference(self) -> float:
+        """The component of all image coordinates together; 1 where there are none."""
+        own = [each for each in self.components if each.images and each.redundancy > 0]
+        weights = [each.redundancy for each in own]
+        return float(np.average([each.factor for each in own], weights=weights)) if own else 1.0
+
+
+def helmert_step(matrix: Floats, squares: Floats, free: list[int]) -> Floats:
+    """Return the factors that Helmert's equations give for the free components, others staying as they are.
+
+    Parameters
+    ----------
+    matrix, squares
+        (k, k) H and (k,) q.
+    free
+        The components that are estimated.
+    """
+    rows = np.array(free, dtype=np.int64)
+    held = np.setdiff1d(np.arange(len(squares)), rows)
+    right = squares[rows] - matrix[np.ix_(rows, held)].sum(axis=1)
+    return np.asarray(np.linalg.solve(matrix[np.ix_(rows, rows)], right))
+
+
+def balanced(matrix: Floats, redundancy: Floats, exact: Sequence[bool]) -> Floats:
+    """Return a Helmert matrix that is symmetric, with rows that sum to the redundancy.
+
+    Parameters
+    ----------
+    matrix
+        (G, G) columns that are exact or were found with random signs.
+    redundancy
+        (G,) r.
+    exact
+        (G,) which columns are exact: those stay as they are.
+    """
+    sure = np.asarray(exact, dtype=bool)
+    found = np.where(sure[:, np.newaxis] & ~sure, matrix.T, matrix)
+    found = (found + found.T) / 2
+    loose = np.flatnonzero(~sure)
+    if not loose.size:
+        return np.asarray(found)
+    block = found[np.ix_(loose, loose)]
+    aim = np.maximum(redundancy[loose] - found[np.ix_(loose, np.flatnonzero(sure))].sum(axis=1), 0.0)
+    scale = np.ones(len(loose))
+    for _ in range(100):
+        sums = block @ scale
+        scale = np.sqrt(scale * np.divide(aim, sums, out=np.zeros_like(aim), where=sums > 0))
+    found[np.ix_(loose, loose)] = block * np.outer(scale, scale)
+    return np.asarray(found)
+
+
+def estimate(
+    adjust: Callable[[Floats], Weighted],
+    groups: GroupsOf,
+    *,
+    tolerance: float = 1e-4,
+    max_steps: int = 100,
+    least_redundancy: float = LEAST_REDUNDANCY,
+    level: float = 0.05,
+    equality: bool = True,
+) -> Estimate:
+    """Estimate variance components.
+
+    Parameters
+    ----------
+    adjust
+        Tells what an adjustment with (G,) components leaves; called first with ones.
+    groups
+        The groups.
+    tolerance
+        Stop when no component changes by more than this part of it, or by more than a hundredth of its
+        standard deviation (and a hundred times the tolerance). A last step of Helmert's must then change none
+        by more than a hundred times the tolerance.
+    max_steps
+        At the most.
+    least_redundancy
+        Of a group whose component is estimated.
+    level
+        Of the tests against 1, all together.
+    equality
+        Whether to test that all are equal, which takes some more adjustments.
+    """
+    run = _Run(adjust, groups, tolerance, max_steps)
+    run.judge(least_redundancy)
+    while not run.iterate():
+        pass
+    ratio = run.equality() if equality else None
+    return run.finished(level, ratio)
+
+
+class _Run:
+    """The iteration, with groups joined into units that have one component each."""
+
+    def __init__(
+        self, adjust: Callable[[Floats], Weighted], groups: GroupsOf, tolerance: float, max_steps: int
+    ) -> None:
+        self.adjust, self.groups = adjust, groups
+        self.tolerance, self.max_steps = tolerance, max_steps
+        self.units: list[tuple[str, list[int]]] = [(name, [g]) for g, name in enumerate(groups.names)]
+        self.held = dict(groups.held)
+        self.messages: list[str] = []
+        self.factors = np.ones(len(groups.names))
+        self.state = adjust(self.factors)
+        self.steps: list[tuple[Floats, Floats, Floats]] = []
+        self.matrix: Floats = np.zeros((0, 0))
+        self.converged = False
+
+    def judge(self, least: float) -> None:
+        """Merge groups whose component cannot be estimated, and hold what still cannot be."""
+        parents = self.groups.parents or ("",) * len(self.groups.names)
+        pools: dict[int, tuple[str, list[int]]] = {}
+        for parent in dict.fromkeys(filter(None, parents)):
+            siblings = [g for g, own in enumerate(parents) if own == parent and g not in self.held]
+            if pool := self._pool(siblings, least):
+                names = [self.groups.names[g] for g in pool]
+                name = parent if len(pool) == len(siblings) or "other" in parent else f"others of {parent}"
+                self.messages.append(
+                    f"{listed(names)}: merged, each has too little redundancy for itself: {name}"
+                )
+                pools |= dict.fromkeys(pool, (name, pool))
+        units: list[tuple[str, list[int]]] = []
+        held = {}
+        for g, own_name in enumerate(self.groups.names):
+            name, members = pools.get(g, (own_name, [g]))
+            if members[0] != g:
+                continue
+            if g in self.held:
+                held[len(units)] = self.held[g]
+            elif why := self._why(members, least):
+                held[len(units)] = why
+            units.append((name, members))
+        self.units, self.held = units, held
+
+    def _pool(self, siblings: list[int], least: float) -> list[int]:
+        """Return those of some groups that are weak, with as many others as they need; none where none is."""
+        pool = [g for g in siblings if self._why([g], least)]
+        others = sorted(set(siblings) - set(pool), key=lambda g: float(self.state.redundancy[g]))
+        while pool and others and self._why(pool, least):
+            pool.append(others.pop(0))
+        return sorted(pool) if len(pool) > 1 else []
+
+    def _why(self, members: list[int], least: float) -> str:
+        """Say why a component of some groups cannot be estimated; nothing where it can."""
+        r, n = float(self.state.redundancy[members].sum()), int(self.state.counts[members].sum())
+        if r < min(REFUSED, least):
+            return f"its redundancy is {r:.2g}: nothing checks it"
+        if r < least:
+            return f"its redundancy is {r:.2g}, less than {least:g}"
+        if r < LEAST_SHARE * n:
+            return f"its redundancy is {r:.2g} for {n} observations, less than a hundredth"
+        return ""
+
+    @property
+    def free(self) -> list[int]:
+        return [unit for unit in range(len(self.units)) if unit not in self.held]
+
+    def _sums(self, values: Floats) -> Floats:
+        return np.array([values[members].sum() for _, members in self.units])
+
+    def _helmert(self) -> tuple[Floats, Floats]:
+        """Return the matrix of the units and what Helmert's step makes of the free ones."""
+        whole = self.state.matrix()
+        matrix = np.array(
+            [[whole[np.ix_(a, b)].sum() for _, b in self.units] for _, a in self.units]
+        ).reshape(len(self.units), len(self.units))
+        return matrix, helmert_step(matrix, self._sums(self.state.squares), self.free)
+
+    def _step(self, factors: Floats) -> None:
+        """Multiply the components of the free units, and adjust."""
+        for unit, factor in zip(self.free, factors, strict=True):
+            self.factors[self.units[unit][1]] *= factor
+        self.state = self.adjust(self.factors)
+
+    def iterate(self) -> bool:
+        """Go on until nothing changes; False where a component had to be held on the way."""
+        while True:
+            free = self.free
+            squares, redundancy = self._sums(self.state.squares), self._sums(self.state.redundancy)
+            self.steps.append((self.factors.copy(), self.state.squares, self.state.redundancy))
+            if not free:
+                self.matrix, _ = self._helmert()
+                self.converged = True
+                return True
+            factors = squares[free] / redundancy[free]
+            of_sd = np.minimum(0.01 * np.sqrt(2 / redundancy[free]), 100 * self.tolerance)
+            limit = np.maximum(self.tolerance, of_sd)
+            still = bool((np.abs(factors - 1) < limit).all())
+            if still or len(self.steps) % BY_HELMERT == 0:
+                self.matrix, by_helmert = self._helmert()
+                moved = np.abs(by_helmert - 1)
+                if still and (moved <= 100 * self.tolerance).all():
+                    if (unit := self._inseparable()) is not None:
+                        self.held[unit] = "its component cannot be told from those of the others"
+                        self._back(unit)
+                        return False
+                    self.converged = True
+                    return True
+                if (by_helmert > 1 / LIMIT_OF_STEP).all() and (by_helmert < LIMIT_OF_STEP).all():
+                    factors = by_helmert
+            if len(self.steps) >= self.max_steps:
+                self.matrix, _ = self._helmert()
+                self.messages.append(f"the components still change after {self.max_steps} steps")
+                return True
+            self._step(np.clip(factors, 1 / LIMIT_OF_STEP, LIMIT_OF_STEP))
+            if self._vanished():
+                return False
+
+    def _vanished(self) -> bool:
+        """Hold components that run to zero, and say so."""
+        low = [unit for unit in self.free if self.factors[self.units[unit][1][0]] < LOWER_BOUND]
+        if not low:
+            return False
+        matrix, by_helmert = self._helmert()
+        free = self.free
+        deviations = np.sqrt(2 * np.diag(np.linalg.inv(matrix[np.ix_(free, free)])))
+        for unit in low:
+            place, (name, members) = free.index(unit), self.units[unit]
+            factor = self.factors[members[0]]
+            text = (
+                f"the residuals of {name} are smaller than any positive variance explains (component"
+                f" {factor * by_helmert[place]:.2g} +- {factor * deviations[place]:.2g})"
+            )
+            self.messages.append(f"{text}: held at the lower bound of {LOWER_BOUND:g} of the given variance")
+            self.held[unit] = f"at the lower bound of {LOWER_BOUND:g}"
+            self.factors[members] = LOWER_BOUND
+        self.state = self.adjust(self.factors)
+        return True
+
+    def _inseparable(self) -> int | None:
+        """Return the component that is to be held because the matrix is nearly singular."""
+        free = self.free
+        block = self.matrix[np.ix_(free, free)]
+        scale = np.sqrt(np.diag(block))
+        values, vectors = np.linalg.eigh(block / np.outer(scale, scale))
+        if values[-1] < MOST_CONDITION * values[0] or len(free) < 2:
+            return None
+        concerned = np.argsort(-np.abs(vectors[:, 0]))[:2]
+        rows: list[int] = concerned.tolist()
+        return min((free[k] for k in rows), key=lambda unit: float(self.matrix[unit].sum()))
+
+    def _back(self, unit: int) -> None:
+        """Give a unit its own variance again."""
+        self.factors[self.units[unit][1]] = 1.0
+        self.state = self.adjust(self.factors)
+
+    def equality(self) -> tuple[float, int, float] | None:
+        """Test whether all free components are equal.
+
+        The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2: twice its
+        difference between the equal components and the estimated ones is the integral of q_g - r_g along the line.
+        """
+        free = self.free
+        if len(free) < 2 or not self.converged:
+            return None
+        members = [g for unit in free for g in self.units[unit][1]]
+        end, present = np.log(self.factors[members]), self.factors.copy()
+        common = np.full(len(members), self._common(members, present))
+        nodes, weights = np.polynomial.legendre.leggauss(NODES)
+        ratio = 0.0
+        for node, weight in zip((nodes + 1) / 2, weights / 2, strict=True):
+            present[members] = np.exp(common + node * (end - common))
+            state = self.adjust(present)
+            ratio += weight * float((state.squares - state.redundancy)[members] @ (end - common))
+        freedom = len(free) - 1
+        ratio = max(ratio, 0.0)
+        return ratio, freedom, _photocore.chi_square(ratio, freedom)
+
+    def _common(self, members: list[int], factors: Floats) -> float:
+        """Return the logarithm of the component that they have when they have one."""
+        factors = factors.copy()
+        factors[members] = 1.0
+        for _ in range(self.max_steps):
+            state = self.adjust(factors)
+            step = float(state.squares[members].sum() / state.redundancy[members].sum())
+            factors[members] *= np.clip(step, 1 / LIMIT_OF_STEP, LIMIT_OF_STEP)
+            if abs(step - 1) < self.tolerance:
+                break
+        return math.log(factors[members[0]])
+
+    def finished(self, level: float, equality: tuple[float, int, float] | None) -> Estimate:
+        """Return what was found."""
+        free = self.free
+        deviations = np.full(len(self.units), np.nan)
+        if free:
+            inverse = np.linalg.inv(self.matrix[np.ix_(free, free)])
+            deviations[free] = np.sqrt(2 * np.diag(inverse))
+        squares, redundancy = self._sums(self.state.squares), self._sums(self.state.redundancy)
+        own_level, bound = bonferroni(level, len(free)), critical_normal(0.05)
+        images = self.groups.images or (False,) * len(self.groups.names)
+        components = []
+        for unit, (name, members) in enumerate(self.units):
+            factor, deviation = float(self.factors[members[0]]), float(deviations[unit])
+            z = math.log(factor) / deviation
+            probability = math.erfc(abs(z) / math.sqrt(2))
+            r = float(redundancy[unit])
+            components.append(
+                Component(
+                    name=name,
+                    members=tuple(self.groups.names[g] for g in members),
+                    count=int(self.state.counts[members].sum()),
+                    squares=float(squares[unit]),
+                    redundancy=r,
+                    factor=factor,
+                    sd=factor * deviation,
+                    least_sd=factor * math.sqrt(2 / r) if unit not in self.held else math.nan,
+                    interval=(factor * math.exp(-bound * deviation), factor * math.exp(bound * deviation)),
+                    test_value=z,
+                    probability=probability,
+                    significant=probability < own_level,
+                    images=all(images[g] for g in members),
+                    held=self.held.get(unit, ""),
+                )
+            )
+        for unit, why in self.held.items():
+            if not why.startswith("at the lower"):
+                self.messages.append(f"{self.units[unit][0]}: held: {why}")
+        return Estimate(
+            tuple(components),
+            self.factors,
+            self.matrix,
+            self.converged,
+            self.steps,
+            self.messages,
+            equality,
+            level,
+        )

@@ -1,0 +1,209 @@
+"""Critical values and probabilities of the tests of an adjustment, in one place.
+
+Tests of observations with known standard deviations are chi-square (Baarda 1968); where the unit weight is
+estimated from the same residuals they are F, t or tau (Pope 1976). Probabilities of huge values are handled
+as logarithms: 1e-5000 is still ordered against 1e-4000.
+
+* tau = w / s of an observation never exceeds the root of the f degrees of freedom: (tau / sqrt f)^2 is Beta
+  (1/2, (f - 1)/2), so its limits follow exactly from those of Student's t with f - 1
+  (Thompson, Ann. Math. Statist. 6, 1935).
+* lambda0 is the noncentrality at which a test of a level is significant with a given power. The B-method
+  chooses the levels of tests of several dimensions so that all find the same error with the same power
+  (Baarda 1968).
+* Of many tests together: Bonferroni holds the probability that any good observation is rejected whatever the
+  correlations; Benjamini and Hochberg (J. Roy. Statist. Soc. B 57, 1995) hold the share of good ones among
+  those rejected, with tests that are independent.
+"""
+
+from __future__ import annotations
+
+import math
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram import _photocore
+from photogram.errors import InputError
+
+__all__ = [
+    "LEVEL",
+    "b_method",
+    "benjamini_hochberg",
+    "bonferroni",
+    "critical_chi_square",
+    "critical_fisher",
+    "critical_normal",
+    "critical_student",
+    "critical_tau",
+    "lambda0",
+    "log_chi_square",
+    "log_fisher",
+]
+
+LEVEL = 0.05
+"""Probability of a false alarm of the global test, and of any single test among all of an adjustment."""
+
+
+def critical_normal(level: float) -> float:
+    """Return the value that the absolute value of a standard normal variable exceeds with the level."""
+    return -NormalDist().inv_cdf(_level(level) / 2)
+
+
+def critical_student(level: float, dof: float) -> float:
+    """Return the value that the absolute value of Student's variable exceeds with the level.
+
+    That of the normal distribution where `dof` is infinite; infinite where `dof` is not positive.
+    """
+    if not dof > 0:
+        return math.inf
+    return critical_normal(level) if math.isinf(dof) else _photocore.student_limit(_level(level), dof)
+
+
+def critical_tau(level: float, dof: float) -> float:
+    """Return the value that an internally studentized residual w / s exceeds with the level, on either side.
+
+    Parameters
+    ----------
+    level
+        Probability.
+    dof
+        f of the adjustment. Below two there is no test: every |tau| is the root of f.
+
+    Returns
+    -------
+    sqrt(f) t / sqrt(f - 1 + t^2), t that of Student with f - 1; less than the root of f. Infinite below two
+    degrees of freedom.
+    """
+    if not dof >= 2:
+        return math.inf
+    t = critical_student(level, dof - 1)
+    return t if math.isinf(dof) else math.sqrt(dof) * t / math.hypot(math.sqrt(dof - 1), t)
+
+
+def critical_chi_square(level: float, dof: float) -> float:
+    """Return the value that a chi-square variable exceeds with the level."""
+    return _photocore.chi_square_quantile(_level(level), dof, upper=True)
+
+
+def critical_fisher(level: float, first: float, second: float) -> float:
+    """Return the value that Fisher's variable exceeds with the level.
+
+    Chi-square over `first` where `second` is infinite; infinite where `second` is not positive.
+    """
+    if not second > 0:
+        return math.inf
+    if math.isinf(second):
+        return critical_chi_square(level, first) / first
+    return _photocore.fisher_limit(_level(level), first, second)
+
+
+def log_chi_square(x: ArrayLike, dof: ArrayLike) -> NDArray[np.float64]:
+    """Return logarithms of the probabilities that chi-square variables exceed values.
+
+    Parameters
+    ----------
+    x, dof
+        Values and degrees of freedom, any shapes that go together.
+
+    Returns
+    -------
+    Natural logarithms, finite also where the probability is no number; NaN where there is no degree of
+    freedom, or a value is negative or NaN.
+    """
+    both = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(dof, dtype=np.float64))
+    return _photocore.log_chi_square(*(np.ravel(each) for each in both)).reshape(both[0].shape)
+
+
+def log_fisher(x: ArrayLike, first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+    """Return logarithms of the probabilities that Fisher's variables exceed values.
+
+    As :func:`log_chi_square`; `first` and `second` are degrees of freedom, `second` finite.
+    """
+    given = [np.asarray(each, dtype=np.float64) for each in (x, first, second)]
+    three = np.broadcast_arrays(*given)
+    return _photocore.log_fisher(*(np.ravel(each) for each in three)).reshape(three[0].shape)
+
+
+def lambda0(level: float = 0.001, power: float = 0.80, dimension: float = 1, dof: float = math.inf) -> float:
+    """Return the noncentrality of an error that a test finds with a given power.
+
+    Parameters
+    ----------
+    level
+        Of the test (alpha0).
+    power
+        Probability that the error is found (beta0); more than the level.
+    dimension
+        Degrees of freedom of the tested group.
+    dof
+        f of the adjustment where the unit weight is estimated from it: the test is F with `dimension` and
+        f - `dimension`. Infinite where the unit weight is known.
+
+    Returns
+    -------
+    17.0746 for Baarda's choice, the default; infinite where f is no more than the dimension.
+
+    Raises
+    ------
+    InputError
+        Level and power are not in their ranges.
+    """
+    if not 0 < level < power < 1:
+        raise InputError(
+            "the level (significance) must be positive and less than the power, the power less than 1"
+        )
+    if not dof > dimension:
+        return math.inf
+    return _photocore.detectable_noncentrality(level, power, dimension, dof - dimension)
+
+
+def b_method(dimension: float, level: float = 0.001, power: float = 0.80) -> tuple[float, float]:
+    """Return level and chi-square limit of a test that finds what the test of one observation finds.
+
+    Parameters
+    ----------
+    dimension
+        Degrees of freedom of the test: of a group, or of the global test.
+    level, power
+        Of the test of one observation; see :func:`lambda0`.
+    """
+    return _photocore.level_of_equal_power(lambda0(level, power), power, dimension)
+
+
+def bonferroni(level: float, tests: int) -> float:
+    """Return the level of each of so many tests, so that any of them rejects by chance with the level."""
+    return _level(level) / max(tests, 1)
+
+
+def benjamini_hochberg(
+    probabilities: ArrayLike, level: float = LEVEL, *, dependent: bool = False
+) -> NDArray[np.bool_]:
+    """Return which tests are rejected so that among them the expected share of good ones is the level.
+
+    Parameters
+    ----------
+    probabilities
+        (n,) p-values; NaN where nothing is tested.
+    level
+        False discovery rate.
+    dependent
+        Hold it under any dependence between the tests, too (Benjamini and Yekutieli 2001).
+    """
+    p = np.asarray(probabilities, dtype=np.float64)
+    order = np.argsort(p, kind="stable")  # NaN last
+    ranks = np.arange(1, np.count_nonzero(~np.isnan(p)) + 1)
+    if not ranks.size:
+        return np.zeros(p.shape, dtype=bool)
+    allowed = _level(level) * ranks / (ranks.size * (np.sum(1 / ranks) if dependent else 1.0))
+    within = np.flatnonzero(p[order[: ranks.size]] <= allowed)
+    rejected = np.zeros(p.shape, dtype=bool)
+    if within.size:
+        rejected[order[: within[-1] + 1]] = True
+    return rejected
+
+
+def _level(level: float) -> float:
+    if not 0 < level < 1:
+        raise InputError(f"a level is a probability between 0 and 1, not {level:g}")
+    return level

@@ -1,0 +1,305 @@
+"""What the conditions of a verdict ask of the findings: limits, what lies beyond them, and by how much."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from photogram.messages import listed
+from photogram.statistics.distributions import (
+    bonferroni,
+    critical_chi_square,
+    critical_fisher,
+    critical_normal,
+    critical_student,
+)
+from photogram.statistics.findings import Findings, Systematic, Tested, by_t
+from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
+from photogram.statistics.outliers import Observations
+
+__all__ = ["Evidence", "Test"]
+
+NAMED = 5
+"""Observations that a sentence names at most."""
+
+FEW = 5
+"""With fewer degrees of freedom only gross disagreement can be seen."""
+
+ENOUGH = 20
+"""Tested observations that the median of their test values needs."""
+
+MEDIAN = 0.6744897501960817
+"""Of the absolute value of a standard normal variable."""
+
+STATISTICS = {
+    "w": "w (Baarda; the unit weight is known)",
+    "t": "t (externally studentized, Pope; the unit weight is estimated)",
+    "T": "T of groups (chi-square; the unit weight is known)",
+    "F": "F of groups (the unit weight is estimated)",
+}
+"""What the test values of observations are called."""
+
+Beyond = tuple[float, Tested, tuple[int, ...]]
+"""Logarithm of the probability, kind, and place of an observation whose test rejects."""
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test.
+
+    Attributes
+    ----------
+    name
+        What is tested.
+    statistic
+        What it is called: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals.
+    distribution, dof
+        `chi2`, `F`, `normal`, `t` or another, and its degrees of freedom.
+    value
+        Of the statistic.
+    limits
+        What it may be at least and at most; None where there is no such side.
+    p
+        Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers.
+    log10_p
+        Its decimal logarithm.
+    level
+        What p is compared with.
+    tests
+        Among so many tests: the level is a share of that of all together (Bonferroni).
+    accepted
+        Whether p is no less than the level.
+    """
+
+    name: str
+    statistic: str
+    distribution: str
+    dof: tuple[float, ...]
+    value: float
+    limits: tuple[float | None, float | None]
+    p: float
+    log10_p: float
+    level: float
+    tests: int
+    accepted: bool
+
+
+class Evidence:
+    """What the conditions ask of the findings."""
+
+    def __init__(self, found: Findings) -> None:
+        self.found = found
+        self.test = found.global_test
+
+    @cached_property
+    def number(self) -> int:
+        """How many single tests there are."""
+        return sum(self._count(each) for each in self.found.observations)
+
+    @staticmethod
+    def _count(tested: Tested) -> int:
+        return int(np.count_nonzero(~np.isnan(tested.values)))
+
+    @cached_property
+    def level(self) -> float:
+        """Of each single test."""
+        return bonferroni(self.found.level, self.number)
+
+    @cached_property
+    def high(self) -> bool:
+        """Whether residuals are too large by a factor that matters."""
+        return self.test is not None and self.test.problem() is not None
+
+    @cached_property
+    def low(self) -> bool:
+        """Whether residuals are too small by a factor that matters."""
+        return self.test is not None and self.test.rejected_low and self.test.factor < 1 / NOTABLE_FACTOR
+
+    @cached_property
+    def robust(self) -> float | None:
+        """The factor of the median test value, unharmed by a quarter of gross errors; None of few."""
+        values = [
+            np.abs(each.values[~np.isnan(each.values)])
+            for each in self.found.observations
+            if each.statistic == "w"
+        ]
+        together = np.concatenate(values) if values else np.zeros(0)
+        return float(np.median(together)) / MEDIAN if together.size >= ENOUGH else None
+
+    def beyond(self, factor: float = 1.0) -> list[Beyond]:
+        """Return tests beyond their limit, had all standard deviations been larger by the factor, by p."""
+        found: list[tuple[float, int, tuple[int, ...], Tested]] = []
+        for order, each in enumerate(self.found.observations):
+            found += [(log_p, order, place, each) for log_p, place in each.beyond(self.level, factor)]
+        found.sort(key=lambda item: item[:3])
+        return [(log_p, each, place) for log_p, _, place, each in found]
+
+    @cached_property
+    def single(self) -> list[Beyond]:
+        """Tests beyond their limit as the standard deviations are given."""
+        return self.beyond()
+
+    @cached_property
+    def gross(self) -> list[Beyond]:
+        """Tests beyond their limit beside a common factor of all standard deviations.
+
+        Of few observations the factor is that of the others: the externally studentized test.
+        """
+        if not self.high or not self.single:
+            return self.single
+        if self.robust is not None:
+            return self.beyond(max(self.robust, 1.0))
+        test = self.test
+        assert test is not None
+        omega, f = test.weighted_sum_of_squares, test.degrees_of_freedom
+        studentized = [
+            by_t(Observations(each.kind, each.values, each.name), omega, f) if each.statistic == "w" else each
+            for each in self.found.observations
+        ]
+        return Evidence(replace(self.found, observations=studentized)).beyond()
+
+    @cached_property
+    def pattern(self) -> bool:
+        """Whether a pattern of residuals is significant and large."""
+        return any(each.significant and each.large for each in self.found.systematic)
+
+    @cached_property
+    def factor(self) -> float:
+        """By how much residuals are larger than expected; NaN where that is not known."""
+        return self.test.factor if self.test is not None else math.nan
+
+    def interval(self) -> str:
+        """Return the factor with its interval."""
+        assert self.test is not None
+        low, high = self.test.interval
+        return f"{self.factor:.3g} (95 percent: {low:.3g} to {high:.3g})"
+
+    def named(self, tests: list[Beyond]) -> str:
+        """Name the first of the tests, with their values."""
+        names = [
+            f"{number}) {each.name(place)} ({each.statistic} = {each.values[place]:.4g})"
+            for number, (_, each, place) in enumerate(tests, 1)
+        ]
+        return listed(names, NAMED)
+
+    def accepted(self) -> tuple[str, str]:
+        """Return code and headline where nothing is wrong."""
+        if self.test is None:
+            return "not-tested", f"Not tested as a whole ({self.found.untested}); no single test rejects"
+        low, high = self.test.limits
+        return (
+            "accepted",
+            "Accepted: the residuals agree with the given standard deviations"
+            f" (unit variance {self.test.variance:.4g}, expected {low:.3g} to {high:.3g})",
+        )
+
+    def remarks(self) -> list[str]:
+        """Return what is said of every adjustment: size of the factor, few degrees of freedom, no test."""
+        lines = self._by_what()
+        test = self.test
+        if test is not None and not (self.high or self.low) and (test.rejected_high or test.rejected_low):
+            lines.append(
+                f"the global test rejects, but residuals are only {self.factor:.3g} times as expected"
+            )
+        f = self.found.degrees_of_freedom
+        if 0 < f < FEW:
+            lines.append(f"with {f:g} degrees of freedom only gross disagreement can be seen")
+        return lines
+
+    def _by_what(self) -> list[str]:
+        """Say which test decides on single observations."""
+        if not self.found.computed:
+            return ["single observations are not tested: redundancy numbers were not computed"]
+        if not self.number:
+            return []
+        found = {each.statistic for each in self.found.observations if self._count(each)}
+        what = " and ".join(meaning for statistic, meaning in STATISTICS.items() if statistic in found)
+        return [
+            f"single observations are judged by {what}: level {self.found.level:g} for all"
+            f" {self.number} tests together"
+        ]
+
+    def tests(self) -> list[Test]:
+        """Return the global test, the largest of every kind of observations, and those of patterns."""
+        whole = [] if self.test is None else [_whole(self.test)]
+        largest = (_largest(each, self.level, self.number) for each in self.found.observations)
+        patterns = [_of_pattern(each) for each in self.found.systematic]
+        return [*whole, *(each for each in largest if each is not None), *patterns]
+
+
+def _distribution(
+    statistic: str, level: float, dimension: float, second: float
+) -> tuple[str, tuple[float, ...], float]:
+    """Return the distribution of a test value, its degrees of freedom, and its limit."""
+    if statistic == "w":
+        return "normal", (), critical_normal(level)
+    if statistic == "t":
+        return "t", (second,), critical_student(level, second)
+    if statistic == "T":
+        return "chi2", (dimension,), critical_chi_square(level, dimension)
+    return "F", (dimension, second), critical_fisher(level, dimension, second)
+
+
+def _whole(test: GlobalTest) -> Test:
+    return Test(
+        name="global",
+        statistic="s^2",
+        distribution="chi2/f" if math.isinf(test.reference_dof) else "F",
+        dof=(test.degrees_of_freedom,)
+        if math.isinf(test.reference_dof)
+        else (test.degrees_of_freedom, test.reference_dof),
+        value=test.variance,
+        limits=test.limits,
+        p=test.probability,
+        log10_p=test.log10_probability,
+        level=test.level,
+        tests=1,
+        accepted=not (test.rejected_high or test.rejected_low),
+    )
+
+
+def _of_pattern(pattern: Systematic) -> Test:
+    return Test(
+        name=pattern.name,
+        statistic=pattern.statistic,
+        distribution=pattern.distribution,
+        dof=pattern.dof,
+        value=pattern.value,
+        limits=(None, None),
+        p=pattern.probability,
+        log10_p=_log10(pattern.probability),
+        level=pattern.level,
+        tests=1,
+        accepted=not pattern.significant,
+    )
+
+
+def _log10(p: float) -> float:
+    return math.log10(p) if p > 0 else -math.inf
+
+
+def _largest(tested: Tested, level: float, number: int) -> Test | None:
+    """Return the test of the kind with the least probability; None where nothing is tested."""
+    place = tested.largest()
+    if place is None:
+        return None
+    one = tested.at(place)
+    dimension, second = float(np.asarray(one.dimension)[0]), float(np.asarray(one.second)[0])
+    least = float(one.log_probability()[0])
+    distribution, dof, limit = _distribution(tested.statistic, level, dimension, second)
+    return Test(
+        name=f"{tested.kind}: {tested.name(place)}",
+        statistic=tested.statistic,
+        distribution=distribution,
+        dof=dof,
+        value=float(tested.values[place]),
+        limits=(-limit if tested.statistic in "wt" else None, limit),
+        p=math.exp(least),
+        log10_p=least / math.log(10),
+        level=level,
+        tests=number,
+        accepted=not least < math.log(level),
+    )

@@ -1,0 +1,253 @@
+"""What the verdict on an adjustment rests on: tests of observations, kind by kind, and what else is known.
+
+Every program fills in the same :class:`Findings`; :func:`photogram.statistics.verdict.verdict` judges them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.types import Floats
+from photogram.statistics.distributions import LEVEL, critical_fisher, log_chi_square, log_fisher
+from photogram.statistics.groups import GroupTests
+from photogram.statistics.limits import GlobalTest, externally_studentized
+from photogram.statistics.outliers import Observations
+
+__all__ = ["Component", "Findings", "Snooped", "Systematic", "Tested", "by_t", "by_w", "of_groups"]
+
+
+@dataclass(frozen=True, eq=False)
+class Tested:
+    """Test values of one kind of observations.
+
+    Attributes
+    ----------
+    kind
+        What they are, in the plural.
+    values
+        Test values in any shape, NaN where nothing is tested.
+    name
+        Names the observation at an index of `values`.
+    statistic
+        `w` (standard normal), `t` (Student with `second` degrees of freedom), `T` (chi-square with
+        `dimension`) or `F` (`dimension` and `second`).
+    dimension, second
+        Degrees of freedom.
+    """
+
+    kind: str
+    values: Floats
+    name: Callable[[tuple[int, ...]], str]
+    statistic: str
+    dimension: ArrayLike = 1.0
+    second: ArrayLike = math.inf
+
+    def at(self, place: tuple[int, ...]) -> Tested:
+        """Return the test of one observation."""
+        shape = np.shape(self.values)
+        dimension, second = (
+            np.broadcast_to(np.asarray(each), shape) for each in (self.dimension, self.second)
+        )
+        return replace(
+            self,
+            values=np.array([self.values[place]]),
+            dimension=np.array([dimension[place]]),
+            second=np.array([second[place]]),
+        )
+
+    def largest(self) -> tuple[int, ...] | None:
+        """Return the place of the least probable value, the first of equal ones; None without values."""
+        sizes = np.abs(self.values) if self._alike else -self.log_probability()
+        sizes = np.where(np.isnan(sizes), -math.inf, sizes)
+        if not sizes.size or sizes.max() == -math.inf:
+            return None
+        return tuple(int(each) for each in np.unravel_index(int(sizes.argmax()), sizes.shape))
+
+    def beyond(self, level: float, factor: float = 1.0) -> list[tuple[float, tuple[int, ...]]]:
+        """Return logarithms of p-values below the level, and where they are; see :meth:`log_probability`."""
+        if self._alike:
+            # All have one limit: only what is beyond it needs its probability.
+            dimension, second = float(np.asarray(self.dimension)), float(np.asarray(self.second))
+            limit = math.sqrt(critical_fisher(level, dimension, second) * dimension)
+            scale = factor if math.isinf(second) else 1.0
+            places = np.argwhere(np.abs(self.values) > limit * scale)
+            chosen = replace(self, values=self.values[tuple(places.T)])
+            log_p = chosen.log_probability(factor)
+        else:
+            every = self.log_probability(factor)
+            places = np.argwhere(every < math.log(level))
+            log_p = every[tuple(places.T)]
+        return [(float(each), tuple(place)) for each, place in zip(log_p, places.tolist(), strict=True)]
+
+    @property
+    def _alike(self) -> bool:
+        """Whether all values are w or t of the same degrees of freedom."""
+        return self.statistic in "wt" and np.ndim(self.dimension) == 0 and np.ndim(self.second) == 0
+
+    def log_probability(self, factor: float = 1.0) -> Floats:
+        """Return logarithms of p-values, had all standard deviations been larger by the factor.
+
+        The factor takes no part in t and F, which have their unit weight from the residuals.
+        """
+        squares = np.where(np.isnan(self.values), math.nan, np.abs(self.values))
+        if self.statistic in "wt":
+            squares = squares**2
+        if self.statistic in "wT":
+            return log_chi_square(squares / factor**2, self.dimension)
+        return log_fisher(squares, self.dimension, self.second)
+
+
+def by_w(observations: Observations) -> Tested:
+    """Return observations tested with a known unit weight; their values are Baarda's w."""
+    return Tested(observations.kind, observations.values, observations.name, "w")
+
+
+def by_t(observations: Observations, weighted_sum_of_squares: float, degrees_of_freedom: float) -> Tested:
+    """Return observations tested with the unit weight that the others give; their values are w."""
+    t = externally_studentized(observations.values, weighted_sum_of_squares, degrees_of_freedom)
+    return Tested(observations.kind, t, observations.name, "t", second=max(degrees_of_freedom - 1, 1))
+
+
+def of_groups(
+    kind: str, tests: GroupTests, name: Callable[[tuple[int, ...]], str], *, freedom: float | None = None
+) -> Tested:
+    """Return tests of groups; `freedom` is f where the unit weight is estimated."""
+    dimension = np.where(tests.dimension > 0, tests.dimension, math.nan)
+    if freedom is None:
+        values = np.where(tests.dimension > 0, tests.statistic, math.nan)
+        return Tested(kind, values, name, "T", dimension)
+    return Tested(kind, tests.fisher, name, "F", dimension, freedom - dimension)
+
+
+@dataclass(frozen=True)
+class Systematic:
+    """A test of the pattern of residuals.
+
+    Attributes
+    ----------
+    name, sentence
+        Of the test, and what it says: what, how large, what it would do.
+    statistic, distribution, dof, value
+        Of the test.
+    probability, level
+        Its p-value and the level it is compared with.
+    large
+        Whether the pattern is large enough to matter: with a small probability the model is likely wrong.
+    """
+
+    name: str
+    sentence: str
+    statistic: str
+    distribution: str
+    dof: tuple[float, ...]
+    value: float
+    probability: float
+    level: float
+    large: bool
+
+    @property
+    def significant(self) -> bool:
+        """Whether the test rejects."""
+        return self.probability < self.level
+
+
+@dataclass(frozen=True)
+class Component:
+    """The estimated variance component of a group of observations.
+
+    Attributes
+    ----------
+    group
+        Its name.
+    factor
+        By which its standard deviations are too small: the root of the component.
+    interval
+        95 percent, of the factor.
+    significant
+        Whether it differs from 1, and by enough to change weights.
+    """
+
+    group: str
+    factor: float
+    interval: tuple[float, float]
+    significant: bool
+
+
+@dataclass(frozen=True)
+class Snooped:
+    """What data snooping has taken out.
+
+    Attributes
+    ----------
+    removed
+        Each that was taken out and did not return, in order: name, and what else the log says of it.
+    images, control
+        Shares of the images and of the control that were taken out.
+    rivals
+        What cannot be told apart from them, as sentences.
+    """
+
+    removed: Sequence[Mapping[str, Any]]
+    images: float = 0.0
+    control: float = 0.0
+    rivals: Sequence[str] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings:
+    """All that the verdict on an adjustment rests on.
+
+    Attributes
+    ----------
+    status
+        `converged`, or what else came of the iteration.
+    observations
+        Tests of single observations or groups of every kind.
+    degrees_of_freedom
+        f.
+    global_test
+        Of all residuals; None where it says nothing.
+    untested
+        Why there is no global test.
+    undetermined
+        Unknowns that no observation determines.
+    hints
+        Accepted hypotheses of what is wrong with the data, as sentences ("probably ...").
+    spoiled
+        Why gross errors make the result unusable, where the program has found that itself; a sentence.
+    doubtful
+        Stars: exposures whose identification is doubtful or rejected.
+    systematic, components, snooped
+        What further computations have found, where they were made.
+    computed
+        Whether observations could be tested, that is, whether their redundancy numbers were computed.
+    remarks
+        Sentences that stand below the headline.
+    snoop
+        How gross errors are taken out with this program; nothing where it cannot.
+    level
+        Of the global test, and of all single tests together.
+    """
+
+    status: str
+    observations: Sequence[Tested]
+    degrees_of_freedom: float
+    global_test: GlobalTest | None = None
+    untested: str = "no a-priori unit weight"
+    undetermined: Sequence[str] = ()
+    hints: Sequence[str] = ()
+    spoiled: str = ""
+    doubtful: Sequence[str] = ()
+    systematic: Sequence[Systematic] = ()
+    components: Sequence[Component] = ()
+    snooped: Snooped | None = None
+    computed: bool = True
+    remarks: Sequence[str] = ()
+    snoop: str = ""
+    level: float = LEVEL

@@ -1,0 +1,176 @@
+"""Tests of groups of observations that err together: the two coordinates of an image, a control point.
+
+With standardized residuals v = (observed - computed) / sd and R = I - A Q A', the block R_g of the m rows
+of a group, and its pseudo-inverse, an error of the group that nobody suspects has (Cook and Weisberg 1982;
+Teunissen 2000)
+
+    T = v' R^- v                                chi-square with m' = rank R, unit weight known
+    F = (T / m') / ((Omega - T) / (f - m'))     F(m', f - m'), unit weight estimated from the others
+    d = R^- v                                   the error itself, in standard deviations, cofactor R^-
+
+Leaving the group out lowers Omega by T. The eigenvalues of R_g are redundancy numbers of directions: along a
+direction with none an error is invisible. The two coordinates of a point on two photographs have one visible
+direction, across the base: there m' is 1, and both have the same test value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from photogram.arguments.types import Floats, Indices
+from photogram.statistics.distributions import log_chi_square, log_fisher
+
+__all__ = ["INVISIBLE", "GroupTests", "group_tests", "parts_tests"]
+
+INVISIBLE = 1e-6
+"""Directions with less redundancy than this are not seen: eigenvalues of rank defects are below 1e-14."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroupTests:
+    """Tests of n groups of m observations each.
+
+    Attributes
+    ----------
+    dimension
+        (n,) m', the number of directions in which an error shows; 0 where nothing is tested.
+    statistic
+        (n,) T; 0 without a direction.
+    fisher
+        (n,) F; NaN where the unit weight is known, or f is no more than m'.
+    log_probability
+        (n,) logarithms of the probability that a good group has a value as large, by the test that decides:
+        chi-square with a known unit weight, else F. NaN where nothing is tested.
+    error
+        (n, m) estimated errors in standard deviations.
+    cofactors
+        (n, m, m) of these.
+    eigenvalues
+        (n, m) redundancy numbers of directions, ascending; those of rows that do not exist are 0.
+    """
+
+    dimension: Indices
+    statistic: Floats
+    fisher: Floats
+    log_probability: Floats
+    error: Floats
+    cofactors: Floats
+    eigenvalues: Floats
+
+    @property
+    def weakest(self) -> Floats:
+        """(n,) the least redundancy of a direction in which an error shows; NaN without one."""
+        visible = np.where(self.eigenvalues > INVISIBLE, self.eigenvalues, math.inf)
+        least = visible.min(axis=1)
+        return np.asarray(np.where(np.isfinite(least), least, math.nan))
+
+    def guilty(self, group: int) -> list[int]:
+        """Return the row of a group that most likely errs alone, and those not to be told apart from it.
+
+        The largest |d| over its own standard deviation; rows whose estimates are correlated with it by more
+        than 0.9 stand beside it.
+        """
+        cofactors = self.cofactors[group]
+        sd = np.sqrt(np.diagonal(cofactors))
+        if not (sd > 0).any():
+            return []
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first = int(np.nan_to_num(np.abs(self.error[group]) / sd).argmax())
+            correlation = np.abs(cofactors[first] / (sd[first] * sd))
+        return [first, *(int(row) for row in np.flatnonzero(correlation > 0.9) if row != first)]
+
+
+def group_tests(
+    blocks: ArrayLike,
+    residuals: ArrayLike,
+    weighted_sum_of_squares: float = math.nan,
+    degrees_of_freedom: float = math.inf,
+    *,
+    known: bool = True,
+) -> GroupTests:
+    """Test n groups of m observations each, from their blocks of R.
+
+    Parameters
+    ----------
+    blocks
+        (n, m, m) blocks of R = I - A Q A', rows divided by standard deviations.
+    residuals
+        (n, m) observed minus computed over standard deviation; NaN where a group has no such row.
+    weighted_sum_of_squares, degrees_of_freedom
+        Omega and f of the adjustment; not needed where the unit weight is known.
+    known
+        Whether the unit weight is known: chi-square decides, else F.
+    """
+    r = np.asarray(blocks, dtype=np.float64)
+    v = np.asarray(residuals, dtype=np.float64)
+    there = ~np.isnan(v)
+    r = np.where(there[:, :, np.newaxis] & there[:, np.newaxis, :], r, 0.0)
+    mu, directions = np.linalg.eigh(r)
+    visible = mu > INVISIBLE
+    inverse = np.where(visible, 1.0 / np.where(visible, mu, 1.0), 0.0)
+    along = np.einsum("nji,nj->ni", directions, np.where(there, v, 0.0))
+    statistic = (along**2 * inverse).sum(axis=1)
+    dimension = visible.sum(axis=1)
+    log_p, fisher = _probabilities(statistic, dimension, weighted_sum_of_squares, degrees_of_freedom, known)
+    return GroupTests(
+        dimension=dimension,
+        statistic=statistic,
+        fisher=fisher,
+        log_probability=log_p,
+        error=np.einsum("nij,nj->ni", directions, along * inverse),
+        cofactors=np.einsum("nij,nj,nkj->nik", directions, inverse, directions),
+        eigenvalues=mu,
+    )
+
+
+def parts_tests(
+    block: ArrayLike,
+    residuals: ArrayLike,
+    parts: Sequence[Sequence[int]],
+    weighted_sum_of_squares: float = math.nan,
+    degrees_of_freedom: float = math.inf,
+    *,
+    known: bool = True,
+) -> Floats:
+    """Return log-probabilities of parts of one group, each tested as if the other rows were good.
+
+    Of a control point: plan and height, `parts=((0, 1), (2,), (0, 1, 2))`; the smallest tells what to blame.
+
+    Parameters
+    ----------
+    block, residuals
+        (m, m) and (m,) of the group, as for :func:`group_tests`.
+    parts
+        Rows of each part.
+    """
+    r, v = np.asarray(block, dtype=np.float64), np.asarray(residuals, dtype=np.float64)
+    kept = np.full((len(parts), len(v)), math.nan)
+    for part, rows in enumerate(parts):
+        kept[part, list(rows)] = v[list(rows)]
+    blocks = np.broadcast_to(r, (len(parts), *r.shape))
+    tests = group_tests(blocks, kept, weighted_sum_of_squares, degrees_of_freedom, known=known)
+    return tests.log_probability
+
+
+def _probabilities(
+    statistic: Floats, dimension: NDArray[np.int64], omega: float, freedom: float, known: bool
+) -> tuple[Floats, Floats]:
+    fisher = np.full(statistic.shape, math.nan)
+    tested = dimension > 0
+    if known:
+        return np.where(tested, log_chi_square(statistic, np.maximum(dimension, 1)), math.nan), fisher
+    second = freedom - dimension
+    tested &= second > 0
+    first, others = dimension[tested], second[tested]
+    # Zero but for rounding where a group makes up all of Omega.
+    left = np.maximum(omega - statistic[tested], 1e-12 * omega)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fisher[tested] = (statistic[tested] / first) / (left / others)
+    log_p = np.full(statistic.shape, math.nan)
+    log_p[tested] = log_fisher(fisher[tested], first, others)
+    return log_p, fisher

@@ -1,0 +1,489 @@
+"""The rounds of data snooping: choose, take out, adjust, test what is out again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats
+from photogram.statistics.distributions import LEVEL, log_chi_square, log_fisher
+from photogram.statistics.limits import global_test
+from photogram.statistics.reliability import TESTABLE
+from photogram.statistics.snooping.choosing import Choice, Level, choose
+from photogram.statistics.snooping.conditioning import UnitWeight
+from photogram.statistics.snooping.log import Removal, Rival, Round
+from photogram.statistics.snooping.suspects import (
+    LostSupportError,
+    Out,
+    Standing,
+    Suspects,
+    Tests,
+    Trial,
+)
+
+__all__ = ["Outcome", "Settings", "snooped"]
+
+MEDIAN = 0.6744897501960817
+"""Of the absolute value of a standard normal variable."""
+OPTIMISTIC = 2.0
+"""Standard deviations that are too small by more than this are told from gross errors by the median."""
+ENOUGH = 20
+"""Test values that a median needs."""
+MANY = 0.05
+"""Share of the images beyond `FAR` robust standard deviations from which on a robust start is needed."""
+FAR = 5.0
+CANDIDATE = 0.25
+"""A weight that a robust adjustment has lowered below this is taken for that of a gross error."""
+RESCUES = 5
+"""Attempts to leave a round with everything determined."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to snoop.
+
+    Attributes
+    ----------
+    level
+        Family level of all tests together, or the false discovery rate.
+    fdr
+        Whether it is the latter.
+    known
+        Whether the unit weight is known: chi-square decides, else F.
+    robust
+        Whether to start robustly; None where many observations are wrong.
+    max_rounds
+        Rounds at the most.
+    """
+
+    level: float = LEVEL
+    fdr: bool = False
+    known: bool = True
+    robust: bool | None = None
+    max_rounds: int = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What snooping has ended with.
+
+    Attributes
+    ----------
+    log
+        Everything that was taken out, in order.
+    rounds
+        Every round; the last takes nothing out.
+    out
+        What takes no part.
+    tests
+        How many groups are tested: it is kept from the start.
+    before, standing
+        How the network stood at first, and without what is out.
+    factors
+        By kind, the robust factors by which standard deviations were multiplied for the tests; empty where
+        the given ones stand.
+    final
+        Tests of what takes part, at the end.
+    remarks
+        What else there is to say.
+    """
+
+    log: list[Removal]
+    rounds: list[Round]
+    out: Out
+    tests: int
+    before: Standing
+    standing: Standing
+    factors: dict[str, float]
+    final: Tests
+    remarks: list[str]
+
+
+def snooped(trial: Trial, settings: Settings) -> Outcome:
+    """Take gross errors out of a network, and return what was done."""
+    return _Snooping(trial, settings).run()
+
+
+class _Snooping:
+    def __init__(self, trial: Trial, settings: Settings) -> None:
+        self.trial, self.settings = trial, settings
+        suspects = trial.suspects
+        self.suspects: Suspects = suspects
+        self.out = Out(np.zeros(int(suspects.row_starts[-1]), dtype=bool))
+        self.log: list[Removal] = []
+        self.rounds: list[Round] = []
+        self.remarks: list[str] = []
+        self.returns: set[int] = set()
+        self.kept: set[int] = set()
+        self.before = self.standing = trial.adjust(self.out)
+        self.tests = trial.tests()
+        testable = self.tests.active & (self.tests.rank > 0) & (self.tests.least > TESTABLE)
+        self.level = Level(settings.level, int(testable.sum()), settings.fdr)
+        self.factors, self.scales = self._scales()
+
+    def run(self) -> Outcome:
+        if self._needs_robust_start():
+            self._start_robustly()
+        for number in range(1, self.settings.max_rounds + 1):
+            removed, returned = self._round(number)
+            if not removed and not returned:
+                break
+        else:
+            self.remarks.append(f"snooping has not ended after {self.settings.max_rounds} rounds")
+        return Outcome(
+            log=self.log,
+            rounds=self.rounds,
+            out=self.out,
+            tests=self.level.tests,
+            before=self.before,
+            standing=self.standing,
+            factors=self.factors,
+            final=self.tests,
+            remarks=self.remarks,
+        )
+
+    def _unit(self) -> UnitWeight:
+        standing = self.standing
+        return UnitWeight(self.settings.known, standing.weighted_sum_of_squares, standing.degrees_of_freedom)
+
+    def _round(self, number: int) -> tuple[list[int], list[int]]:
+        standing = self.standing
+        allowed = self._allowed()
+        count = sum(each.is_out for each in self.log)
+        choices = choose(
+            self.trial, self.tests, self._unit(), self.scales, allowed, self.level, count, ahead=True
+        )
+        remarks: list[str] = []
+        removed = self._take_out(choices, number, remarks)
+        returned = self._take_back(number) if any(each.is_out for each in self.log) else []
+        self.rounds.append(
+            Round(
+                number=number,
+                status=standing.status,
+                weighted_sum_of_squares=standing.weighted_sum_of_squares,
+                degrees_of_freedom=standing.degrees_of_freedom,
+                tests=self.level.tests,
+                limit=self.level.limit(count),
+                removed=removed,
+                returned=returned,
+                remarks=remarks,
+            )
+        )
+        return removed, returned
+
+    def _allowed(self) -> Bools:
+        allowed = self.suspects.removable & (self.tests.least > TESTABLE)
+        allowed[list(self.kept)] = False
+        return allowed
+
+    def _scales(self) -> tuple[dict[str, float], Floats]:
+        """Return robust factors k by kind where standard deviations are too optimistic, and k^2 by group."""
+        suspects, tests = self.suspects, self.tests
+        scales = np.ones(len(suspects))
+        if not self.settings.known:
+            return {}, scales
+        everything = self._values(np.ones(len(suspects), dtype=bool))
+        overall = _factor(everything)
+        if len(everything) < ENOUGH or not overall > OPTIMISTIC:
+            return {}, scales
+        factors = {}
+        for kind, name in enumerate(suspects.kind_names):
+            own = np.asarray(suspects.kinds == kind)
+            if not (own & tests.active).any():
+                continue
+            values = self._values(own)
+            factor = max(_factor(values) if len(values) >= ENOUGH else overall, 1.0)
+            factors[name] = factor
+            scales[own] = factor**2
+        named = ", ".join(f"{name} {factor:.3g}" for name, factor in factors.items())
+        self.remarks.append(
+            "standard deviations are too small by about the robust factor"
+            f" {overall:.3g} (median of the test values): tested with them times {named}"
+        )
+        return factors, scales
+
+    def _values(self, groups: Bools) -> Floats:
+        """Return |w| of all rows of some groups that are testable."""
+        rows = np.repeat(groups, np.diff(self.suspects.row_starts))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            w = np.abs(self.tests.residual) / np.sqrt(self.tests.redundancy)
+            return np.asarray(w[rows & (self.tests.redundancy > TESTABLE) & np.isfinite(w)])
+
+    def _needs_robust_start(self) -> bool:
+        if self.settings.robust is not None:
+            return self.settings.robust
+        if self.standing.status != "converged":
+            return True
+        images = np.asarray(self.suspects.kinds == 0)
+        values = self._values(images)
+        factor = max(_factor(values), 1.0) if values.size else 1.0
+        return bool(values.size) and float(np.mean(values > FAR * factor)) > MANY
+
+    def _start_robustly(self) -> None:
+        """Take out what robust weights nearly vanish for; real tests decide on their return."""
+        suspects = self.suspects
+        images = self._values(np.asarray(suspects.kinds == 0))
+        weights = self.trial.resist(max(_factor(images), 1.0) if images.size else 1.0)
+        candidates = np.flatnonzero((weights < CANDIDATE) & suspects.removable & self.tests.active)
+        first, standing = self.tests, self.standing
+        known = self._unit()
+        entries = []
+        for group in candidates.tolist():
+            rows = suspects.rows(group)
+            statistic, dimension = float(first.statistic[group]), int(first.rank[group])
+            entries.append(
+                self._entry(
+                    group,
+                    rows,
+                    0,
+                    statistic,
+                    statistic,
+                    dimension,
+                    known.fisher(statistic, dimension),
+                    math.nan,
+                    first.error[rows],
+                    first.error_sd[rows],
+                    self.level.limit(0),
+                    (),
+                )
+            )
+        removed = self._apply(entries, [])
+        self.remarks.append(
+            f"many observations disagree: a robust adjustment (Huber, then Cauchy) put {len(removed)}"
+            " groups aside; tests against the others decided which stay out"
+        )
+        returned = []
+        while more := self._take_back(0):
+            returned += more
+        self.rounds.append(
+            Round(
+                number=0,
+                status=standing.status,
+                weighted_sum_of_squares=standing.weighted_sum_of_squares,
+                degrees_of_freedom=standing.degrees_of_freedom,
+                tests=self.level.tests,
+                limit=self.level.limit(0),
+                removed=removed,
+                returned=returned,
+            )
+        )
+
+    def _take_out(self, choices: list[Choice], number: int, remarks: list[str]) -> list[int]:
+        entries = []
+        for choice in choices:
+            own = choice.chosen
+            deviations = self.trial.deviations[own.rows]
+            rivals = tuple(
+                Rival(self.suspects.name(group), statistic, dimension, odds)
+                for group, statistic, dimension, odds in own.rivals
+            )
+            entries.append(
+                self._entry(
+                    choice.group,
+                    own.rows,
+                    number,
+                    choice.first_statistic,
+                    own.statistic,
+                    own.dimension,
+                    own.fisher,
+                    own.log_probability,
+                    own.error * deviations,
+                    np.sqrt(np.diagonal(own.cofactors)) * deviations,
+                    choice.limit,
+                    rivals,
+                )
+            )
+        return self._apply(entries, remarks)
+
+    def _entry(
+        self,
+        group: int,
+        rows: np.ndarray,
+        number: int,
+        first: float,
+        statistic: float,
+        dimension: int,
+        fisher: float,
+        log_probability: float,
+        error: Floats,
+        error_sd: Floats,
+        limit: float,
+        rivals: tuple[Rival, ...],
+    ) -> Removal:
+        suspects = self.suspects
+        name = suspects.name(group)
+        if len(rows) < len(suspects.rows(group)):
+            name = f"{', '.join(suspects.row_name(int(row)) for row in rows)} of {name}"
+        return Removal(
+            round=number,
+            group=group,
+            kind=suspects.kind(group),
+            name=name,
+            rows=tuple(rows.tolist()),
+            components=tuple(suspects.row_name(int(row)) for row in rows),
+            units=tuple(suspects.unit(int(row)) for row in rows),
+            dimension=dimension,
+            first_statistic=first,
+            statistic=statistic,
+            fisher=fisher,
+            log_probability=log_probability,
+            limit=limit,
+            error=tuple(error.tolist()),
+            error_sd=tuple(error_sd.tolist()),
+            redundancy=float(self.tests.least[group]),
+            rivals=rivals,
+        )
+
+    def _apply(self, entries: list[Removal], remarks: list[str]) -> list[int]:
+        """Take groups out with what cannot stay without them, and adjust.
+
+        Groups without which the network falls apart stay, and are said to.
+        """
+        if not entries:
+            return []
+        pending = entries
+        for _ in range(RESCUES):
+            out = self.out.copy()
+            log = [self._out_with(out, entry) for entry in pending]
+            try:
+                self._adjust(out)
+            except LostSupportError as lost:
+                if lost.points and not lost.photos:
+                    pending = [self._forced(each, lost.points) for each in pending]
+                    continue
+                kept = [each for each in pending if self._concerns(each, lost)]
+                for each in kept or pending:
+                    self._keep(each)
+                pending = [each for each in pending if each.group not in self.kept]
+                continue
+            first = len(self.log)
+            self.log += log
+            return [first + place for place, each in enumerate(log) if not each.kept]
+        for each in pending:
+            self._keep(each)
+        return []
+
+    def _forced(self, entry: Removal, points: tuple[int, ...]) -> Removal:
+        own = int(self.suspects.points[entry.group])
+        if own not in points:
+            return entry
+        return entry.with_(consequences=(*entry.consequences, _NOT_DETERMINED))
+
+    def _concerns(self, entry: Removal, lost: LostSupportError) -> bool:
+        photos = set(self.suspects.loads(entry.group).tolist()) | {int(self.suspects.photos[entry.group])}
+        return bool(photos & set(lost.photos))
+
+    def _keep(self, entry: Removal) -> None:
+        self.kept.add(entry.group)
+        self.log.append(entry.with_(kept="nothing else determines what it belongs to"))
+
+    def _out_with(self, out: Out, entry: Removal) -> Removal:
+        """Put a group out, and what cannot stay without it."""
+        out.rows[list(entry.rows)] = True
+        points, photos = self.trial.consequences(out, entry.group)
+        consequences = list(entry.consequences)
+        if photos:
+            out.rows[list(entry.rows)] = False
+            self.kept.add(entry.group)
+            return entry.with_(kept="it would leave a photo with fewer than three points")
+        own = int(self.suspects.points[entry.group])
+        if _NOT_DETERMINED in consequences and own >= 0:
+            points = points | {own}
+        for point in sorted(points - out.points):
+            out.points.add(point)
+            consequences += self._left(out, point)
+        return entry.with_(consequences=tuple(dict.fromkeys(consequences)))
+
+    def _left(self, out: Out, point: int) -> Iterator[str]:
+        """Put everything of a point out, and say so."""
+        groups = np.flatnonzero(self.suspects.points == point).tolist()
+        for group in groups:
+            rows = self.suspects.rows(group)
+            if not out.rows[rows].all():
+                out.rows[rows] = True
+                yield f"{self.suspects.name(group)} is no longer used (its point is left with one ray)"
+
+    def _adjust(self, out: Out) -> None:
+        self.standing = self.trial.adjust(out)
+        self.out = out
+        self.tests = self.trial.tests()
+
+    def _take_back(self, number: int) -> list[int]:
+        """Test what is out against the rest, and take back what agrees: the best, or all that are apart."""
+        places = [place for place, each in enumerate(self.log) if each.is_out]
+        predictions = self.trial.predictions([self.log[place].group for place in places])
+        agreeing = []
+        for place, prediction in zip(places, predictions, strict=True):
+            if prediction is None:
+                continue
+            entry = self.log[place]
+            log_p = self._log_probability(prediction.statistic, len(prediction.rows), entry.group)
+            self.log[place] = entry.with_(
+                prediction=prediction.statistic,
+                prediction_log_probability=log_p,
+                prediction_error=prediction.error,
+            )
+            if log_p >= math.log(self.level.limit(0)) and entry.group not in self.returns:
+                agreeing.append((-log_p, place))
+        agreeing.sort()
+        returning = self._apart([place for _, place in agreeing])
+        if not returning:
+            return []
+        out = self.out.copy()
+        for place in returning:
+            out.rows[list(self.log[place].rows)] = False
+        try:
+            self._adjust(out)
+        except LostSupportError:
+            return []
+        for place in returning:
+            self.returns.add(self.log[place].group)
+            self.log[place] = self.log[place].with_(returned=number)
+        if not self.trial.whole:
+            return returning
+        return returning + self._take_back(number)
+
+    def _apart(self, places: list[int]) -> list[int]:
+        """Return the first where every one is tested alone, else those that have no photo in common."""
+        if self.trial.whole:
+            return places[:1]
+        taken: set[int] = set()
+        apart = []
+        for place in places:
+            group = self.log[place].group
+            photo = int(self.suspects.photos[group])
+            photos = {photo} if photo >= 0 else set(self.suspects.loads(group).tolist())
+            if not photos & taken:
+                taken |= photos
+                apart.append(place)
+        return apart
+
+    def _log_probability(self, statistic: float, dimension: int, group: int) -> float:
+        """Return the log-probability of what is out as an observation of the network without it."""
+        if self.settings.known:
+            return float(log_chi_square(statistic / self.scales[group], dimension))
+        f = self.standing.degrees_of_freedom
+        if not (f > 0 and self.standing.weighted_sum_of_squares > 0):
+            return 0.0
+        s2 = self.standing.weighted_sum_of_squares / f
+        return float(log_fisher(statistic / dimension / s2, dimension, f))
+
+
+_NOT_DETERMINED = "its point is no longer determined and has left the network"
+
+
+def _factor(values: Floats) -> float:
+    """Return the robust standard deviation of test values whose sizes are given."""
+    return float(np.median(values)) / MEDIAN if values.size else 1.0
+
+
+def verdict_of(standing: Standing) -> str:
+    """Return what the global test says of a standing, in a few words."""
+    test = global_test(standing.weighted_sum_of_squares, standing.degrees_of_freedom)
+    if test is None:
+        return "no degrees of freedom"
+    said = "too high" if test.rejected_high else "too low" if test.rejected_low else "accepted"
+    return f"unit variance {test.variance:.4g}, expected {test.limits[0]:.3g} to {test.limits[1]:.3g}: {said}"

@@ -1,0 +1,212 @@
+"""Groups of observations that may hold a gross error together, and what is asked of a network of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+
+__all__ = ["LostSupportError", "Out", "Prediction", "Standing", "Suspects", "Tests", "Trial"]
+
+
+@dataclass(frozen=True, eq=False)
+class Suspects:
+    """G groups of observations with M rows in all, one group after the other.
+
+    Attributes
+    ----------
+    row_starts
+        (G + 1,) where the rows of each group start.
+    kinds
+        (G,) which of `kind_names` each is of.
+    kind_names
+        What the kinds are called: `image`, `control`, ...
+    points, photos
+        (G,) the point and the photo that a group is of; -1 where there is none. Groups of one point cannot be
+        judged one without the other.
+    loads
+        Which photos, further than its own, a group has to do with: those that its point is seen from.
+    removable
+        (G,) whether snooping may take it out.
+    parts
+        Rows that may go alone, of a group by its number: plan, height, or all of a control point. None where
+        the group goes as a whole.
+    name, row_name, unit
+        What a group is called, what one of its rows is, and the unit of that row (M).
+    """
+
+    row_starts: Indices
+    kinds: Indices
+    kind_names: Sequence[str]
+    points: Indices
+    photos: Indices
+    loads: Callable[[int], Indices]
+    removable: Bools
+    parts: Callable[[int], Sequence[Sequence[int]] | None]
+    name: Callable[[int], str]
+    row_name: Callable[[int], str]
+    unit: Callable[[int], str]
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    def kind(self, group: int) -> str:
+        """Return what the kind of a group is called."""
+        return self.kind_names[int(self.kinds[group])]
+
+    def rows(self, group: int) -> Indices:
+        """Return the rows of a group."""
+        return np.arange(self.row_starts[group], self.row_starts[group + 1])
+
+
+@dataclass(eq=False)
+class Out:
+    """What takes no part.
+
+    Attributes
+    ----------
+    rows
+        (M,) which rows are out.
+    points, photos
+        Those that are out with all that was observed of them.
+    """
+
+    rows: Bools
+    points: set[int] = field(default_factory=set)
+    photos: set[int] = field(default_factory=set)
+
+    def copy(self) -> Out:
+        """Return the same, to be changed."""
+        return Out(self.rows.copy(), set(self.points), set(self.photos))
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a network stands without what is out.
+
+    Attributes
+    ----------
+    status
+        `converged`, or what else came of the iteration.
+    weighted_sum_of_squares, degrees_of_freedom
+        Omega and f of what takes part.
+    """
+
+    status: str
+    weighted_sum_of_squares: float
+    degrees_of_freedom: int
+
+
+@dataclass(frozen=True, eq=False)
+class Tests:
+    """Tests of all groups; NaN for what is out.
+
+    Attributes
+    ----------
+    active
+        (G,) whether any row takes part.
+    rank
+        (G,) directions in which an error shows.
+    statistic
+        (G,) T, by which Omega falls without the group.
+    least
+        (G,) the smallest redundancy of a direction that shows.
+    shared
+        (G,) h: |correlation| of two groups of different points is no more than the root of the product.
+    residual
+        (M,) of unit weight.
+    redundancy
+        (M,) redundancy numbers.
+    error, error_sd
+        (M,) estimated error and its standard deviation, in the units of the rows.
+    """
+
+    active: Bools
+    rank: Indices
+    statistic: Floats
+    least: Floats
+    shared: Floats
+    residual: Floats
+    redundancy: Floats
+    error: Floats
+    error_sd: Floats
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What is out of a group against what the rest predicts.
+
+    Attributes
+    ----------
+    statistic
+        d' C^-1 d: chi-square with as many degrees of freedom as rows are out.
+    rows
+        These, of all.
+    error, error_sd
+        Observed minus predicted of each, and its standard deviation, in its unit.
+    """
+
+    statistic: float
+    rows: tuple[int, ...]
+    error: tuple[float, ...]
+    error_sd: tuple[float, ...]
+
+
+class LostSupportError(Exception):
+    """What is out leaves unknowns undetermined: of these points and photos."""
+
+    def __init__(self, points: Sequence[int], photos: Sequence[int]) -> None:
+        super().__init__(f"undetermined: points {list(points)}, photos {list(photos)}")
+        self.points = tuple(points)
+        self.photos = tuple(photos)
+
+
+class Trial(Protocol):
+    """What snooping asks of a network."""
+
+    @property
+    def suspects(self) -> Suspects:
+        """The groups."""
+        ...
+
+    @property
+    def deviations(self) -> Floats:
+        """(M,) standard deviations a priori, in the units of the rows."""
+        ...
+
+    @property
+    def whole(self) -> bool:
+        """Whether R of all rows together is small enough to be had."""
+        ...
+
+    def adjust(self, out: Out) -> Standing:
+        """Adjust without what is out; raises LostSupportError."""
+        ...
+
+    def tests(self) -> Tests:
+        """Test all groups."""
+        ...
+
+    def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
+        """Test what is out of groups; None where it cannot be predicted."""
+        ...
+
+    def blocks(self, groups: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
+        """Return, for the points of some groups, all groups there, residuals of unit weight, and R."""
+        ...
+
+    def response(self) -> tuple[Floats, Floats]:
+        """Return residuals of unit weight (M,) and R (M, M) of all rows; zero for those that are out."""
+        ...
+
+    def resist(self, scale: float) -> Floats:
+        """Adjust robustly, errors beyond `scale` standard deviations losing weight: (G,) what is left."""
+        ...
+
+    def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
+        """Return points that are left with too few rays, and photos without support, when a group is out."""
+        ...

@@ -1,0 +1,257 @@
+"""The verdict on an adjustment: whether its result can be used, and if not, what is wrong.
+
+One table of conditions, in order: the first that fits gives the headline and the exit code, all others that
+fit follow as lines. No figure is hidden: every test stands in the verdict with its distribution, probability,
+level and number of tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from photogram.messages import listed
+from photogram.statistics.evidence import NAMED, Evidence, Test
+from photogram.statistics.findings import Findings
+from photogram.statistics.limits import NOTABLE_FACTOR
+
+__all__ = ["EXIT_NOT_CONVERGED", "EXIT_NOT_USABLE", "Test", "Verdict", "verdict", "worst"]
+
+EXIT_NOT_CONVERGED, EXIT_NOT_USABLE = 3, 4
+"""How a command ends: figures that are no results; results that must not be used as they are."""
+
+_GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)
+"""Exit codes, the worst last."""
+
+LARGEST_FACTOR = 3.0
+"""Standard deviations wrong by more than this are no matter of weights."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a result can be used.
+
+    Attributes
+    ----------
+    code
+        Name of the condition that fits first: the table is in `docs/tests.md`.
+    headline
+        A sentence.
+    exit
+        Exit code of the command: 0, 3 or 4.
+    warning
+        Whether a user should look although the exit code is 0; `--strict` makes it 4.
+    lines
+        What else is to be said.
+    tests
+        The global test, the largest test value of every kind of observation, tests of patterns.
+    removed, rivals, hints
+        What snooping took out, what cannot be told apart from it, and accepted hypotheses.
+    """
+
+    code: str
+    headline: str
+    exit: int
+    warning: bool
+    lines: tuple[str, ...]
+    tests: tuple[Test, ...]
+    removed: tuple[Any, ...] = ()
+    rivals: tuple[str, ...] = ()
+    hints: tuple[str, ...] = ()
+
+    @property
+    def usable(self) -> bool:
+        """Whether the result can be used."""
+        return self.exit == 0
+
+    def exit_code(self, *, strict: bool = False) -> int:
+        """Return the exit code of a command; `strict` lets warnings count."""
+        return EXIT_NOT_USABLE if strict and self.warning and self.exit == 0 else self.exit
+
+    def document(self) -> dict[str, Any]:
+        """Return the verdict as it stands in JSON documents."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class _Line:
+    code: str
+    text: str
+    exit: int = 0
+    warning: bool = False
+
+
+def verdict(found: Findings) -> Verdict:
+    """Judge an adjustment by all that was found about it."""
+    evidence = Evidence(found)
+    fitting = [line for condition in _CONDITIONS if (line := condition(evidence)) is not None]
+    first, *others = fitting or [_Line(*evidence.accepted())]
+    return Verdict(
+        code=first.code,
+        headline=first.text,
+        exit=first.exit,
+        warning=first.warning or any(line.warning or line.exit for line in others),
+        lines=(*(line.text for line in others), *evidence.remarks(), *found.remarks),
+        tests=tuple(evidence.tests()),
+        removed=tuple(found.snooped.removed) if found.snooped else (),
+        rivals=tuple(found.snooped.rivals) if found.snooped else (),
+        hints=tuple(found.hints),
+    )
+
+
+def worst(verdicts: Iterable[Verdict], *, strict: bool = False) -> int:
+    """Return the exit code of a command with several results: that of the worst."""
+    return max((each.exit_code(strict=strict) for each in verdicts), key=_GRAVITY.index, default=0)
+
+
+def _not_converged(e: Evidence) -> _Line | None:
+    if e.found.status == "converged":
+        return None
+    return _Line(
+        "not-converged", f"Not converged ({e.found.status}): the figures are no results", EXIT_NOT_CONVERGED
+    )
+
+
+def _rank_defect(e: Evidence) -> _Line | None:
+    if not e.found.undetermined:
+        return None
+    names = listed(list(e.found.undetermined))
+    return _Line("undetermined", f"Unknowns that no observation determines: {names}", EXIT_NOT_CONVERGED)
+
+
+def _hint(e: Evidence) -> _Line | None:
+    if not e.found.hints:
+        return None
+    first, *others = e.found.hints
+    text = "; ".join([f"{first[:1].upper()}{first[1:]}", *others])
+    return _Line("hint", text, EXIT_NOT_USABLE)
+
+
+def _identification(e: Evidence) -> _Line | None:
+    if not e.found.doubtful:
+        return None
+    named = listed(list(e.found.doubtful))
+    return _Line("identification", f"The identification of stars is doubtful: {named}", EXIT_NOT_USABLE)
+
+
+def _gross_errors(e: Evidence) -> _Line | None:
+    if e.found.spoiled:
+        return _Line("gross-errors", f"Gross errors: {e.found.spoiled}", EXIT_NOT_USABLE)
+    if not e.high or e.found.snooped or not e.gross:
+        return None
+    if e.pattern and e.robust is not None and e.robust > 1.5:
+        return None
+    text = f"Gross errors likely: {e.named(e.gross)}"
+    if e.found.snoop:
+        text += f"; {e.found.snoop} takes them out"
+    return _Line("gross-errors", text, EXIT_NOT_USABLE)
+
+
+def _snooped(e: Evidence) -> _Line | None:
+    found = e.found.snooped
+    if found is None or not found.removed:
+        return None
+    count = len(found.removed)
+    if found.images > 0.05 or found.control > 1 / 3:
+        return _Line(
+            "too-much-removed",
+            f"Too much had to be removed ({count} observations: {100 * found.images:.3g} percent of the"
+            f" images, {100 * found.control:.3g} of the control): model or identification is wrong",
+            EXIT_NOT_USABLE,
+        )
+    if e.high:
+        return None
+    names = listed([str(each.get("name", "")) for each in found.removed], NAMED)
+    return _Line("usable-after-removal", f"Usable after removal of {count} observations: {names}")
+
+
+def _common_factor(e: Evidence) -> _Line | None:
+    if not e.high or e.gross or e.pattern or any(each.significant for each in e.found.components):
+        return None
+    if e.robust is not None and e.robust < e.factor / NOTABLE_FACTOR:
+        return None
+    text = f"Weights too optimistic: standard deviations are too small by about {e.interval()}"
+    if e.factor <= LARGEST_FACTOR:
+        return _Line("weights", f"{text}; covariances are scaled by the unit variance", warning=True)
+    return _Line("weights", text, EXIT_NOT_USABLE)
+
+
+def _components(e: Evidence) -> _Line | None:
+    wrong = [each for each in e.found.components if each.significant]
+    if not wrong:
+        return None
+    named = [
+        f"of {each.group} by about {each.factor:.3g} ({each.interval[0]:.3g} to {each.interval[1]:.3g})"
+        for each in wrong
+    ]
+    far = any(not 1 / LARGEST_FACTOR <= each.factor <= LARGEST_FACTOR for each in wrong)
+    text = f"Standard deviations are wrong: those {listed(named)}"
+    return _Line("weights-of-groups", text, EXIT_NOT_USABLE if far else 0, warning=True)
+
+
+def _model(e: Evidence) -> _Line | None:
+    wrong = [each.sentence for each in e.found.systematic if each.significant and each.large]
+    return (
+        _Line("model", f"The model is likely wrong: {'; '.join(wrong)}", EXIT_NOT_USABLE) if wrong else None
+    )
+
+
+def _uncontrolled(e: Evidence) -> _Line | None:
+    if e.found.degrees_of_freedom >= 1 and (e.number or not e.found.computed):
+        return None
+    reason = (
+        "as many unknowns as observations" if e.found.degrees_of_freedom < 1 else "no observation has a test"
+    )
+    return _Line("uncontrolled", f"Nothing is checked: {reason}", warning=True)
+
+
+def _unexplained(e: Evidence) -> _Line | None:
+    explained = (_gross_errors, _snooped, _common_factor, _components, _model)
+    if not e.high or any(condition(e) is not None for condition in explained):
+        return None
+    largest = [test for test in e.tests() if test.name != "global"]
+    named = "; ".join(f"{test.name} ({test.statistic} = {test.value:.4g})" for test in largest)
+    return _Line(
+        "unexplained",
+        f"Residuals are {e.interval()} times larger than the standard deviations allow; no single cause"
+        f" found. Largest tests: {named or 'none'}",
+        EXIT_NOT_USABLE if e.factor > LARGEST_FACTOR else 0,
+        warning=True,
+    )
+
+
+def _look_at(e: Evidence) -> _Line | None:
+    if e.high or not e.single:
+        return None
+    whole = "Accepted" if e.test is not None else f"Not tested as a whole ({e.found.untested})"
+    return _Line("look-at", f"{whole}, but look at: {e.named(e.single)}", warning=True)
+
+
+def _too_low(e: Evidence) -> _Line | None:
+    if not e.low:
+        return None
+    return _Line(
+        "weights-pessimistic",
+        "Weights too pessimistic: the residuals are smaller than the given standard deviations allow."
+        f" These are too large by about {1 / e.factor:.3g}, or residuals are not independent"
+        " (repeated or smoothed values)",
+    )
+
+
+_CONDITIONS: tuple[Callable[[Evidence], _Line | None], ...] = (
+    _not_converged,
+    _rank_defect,
+    _hint,
+    _identification,
+    _gross_errors,
+    _snooped,
+    _common_factor,
+    _components,
+    _model,
+    _uncontrolled,
+    _unexplained,
+    _look_at,
+    _too_low,
+)
+"""The first that fits gives the headline."""

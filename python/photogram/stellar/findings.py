@@ -1,0 +1,80 @@
+"""What the verdicts on a plate of stars and on exposures of the sky rest on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.show.ways import findings_of
+from photogram.statistics.findings import Findings, Tested, by_t
+from photogram.statistics.outliers import Observations
+from photogram.statistics.reliability import TESTABLE
+from photogram.stellar.night import CalibratedNight
+from photogram.stellar.outliers import studentized
+from photogram.stellar.result import Result
+
+__all__ = ["night_findings", "plate_findings"]
+
+Named = Callable[[tuple[int, ...]], str]
+
+
+@findings_of.register(Result)
+def plate_findings(result: Result) -> Findings:
+    """Return the tests of a plate: w where the mean error of unit weight is given (option 14), else t."""
+    problem, tests = result.problem, studentized(result)
+    statistic, second = ("w", np.inf) if tests.known else ("t", max(result.degrees_of_freedom - 1, 1))
+
+    def image(index: tuple[int, ...]) -> str:
+        star = problem.star_ids[problem.image_stars[index[0]]]
+        return f"{'xy'[index[1]]} of point {problem.image_points[index[0]]} of star {star}"
+
+    def star(index: tuple[int, ...]) -> str:
+        return f"{('right ascension', 'declination')[index[1]]} of star {problem.star_ids[index[0]]}"
+
+    return Findings(
+        status="converged" if result.converged else "not converged",
+        observations=[
+            Tested("plate coordinates", tests.images, image, statistic, second=second),
+            Tested("places of stars", tests.stars, star, statistic, second=second),
+        ],
+        degrees_of_freedom=result.degrees_of_freedom,
+        global_test=result.test,
+        untested="the mean error of unit weight is not given"
+        if not problem.options.mean_error
+        else "no degrees of freedom",
+    )
+
+
+@findings_of.register(CalibratedNight)
+def night_findings(result: CalibratedNight) -> Findings:
+    """Return the tests of exposures of the sky against the standard deviation of their images."""
+    found, freedom = result.calibration, result.calibration.degrees_of_freedom
+    omega = found.mean_error**2 * freedom
+
+    def image(index: tuple[int, ...]) -> str:
+        exposure = result.names[found.exposures[index[0]]]
+        x, y = found.xy[index[0]]
+        return f"{'xy'[index[1]]} of the image at {x:.1f}, {y:.1f} of exposure {exposure}"
+
+    def star(index: tuple[int, ...]) -> str:
+        name = result.night.catalogue.ids[found.catalogue[index[0]]]
+        return f"{('right ascension', 'declination')[index[1]]} of star {name}"
+
+    def tested(kind: str, values: Floats, redundancy: Floats, name: Named) -> Tested:
+        # The values are over mean errors a posteriori; the standard deviation of a pixel is a guess.
+        w = np.where(np.nan_to_num(redundancy) > TESTABLE, values * found.mean_error, np.nan)
+        return by_t(Observations(kind, w, name), omega, freedom)
+
+    return Findings(
+        status=found.status,
+        observations=[
+            tested("image coordinates", found.standardized, found.redundancy, image),
+            tested("places of stars", found.star_standardized, found.star_redundancy, star),
+        ],
+        degrees_of_freedom=freedom,
+        global_test=result.test,
+        untested="no degrees of freedom",
+        doubtful=["more exposures are left out than take part"] if result.mostly_left_out else [],
+    )

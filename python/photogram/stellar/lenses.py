@@ -1,0 +1,113 @@
+"""The lenses of digital cameras that stars calibrate: models of `docs/cameras.md`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from photogram.errors import InputError
+
+__all__ = ["LENSES", "Lens", "lens_named"]
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A lens.
+
+    Attributes
+    ----------
+    model
+        The camera of `docs/cameras.md` that it is.
+    names
+        Parameters in the order of reports and files, fx, fy, cx, cy first; those of the model that are
+        missing are zero.
+    order
+        All parameters of the model, in its order.
+    radius
+        Distance from the principal point in principal distances, without lens terms, of an angle from the
+        axis (radians).
+    formula
+        The same for reports.
+    widest
+        The field of view (radians) from which on it has no image.
+    held
+        Terms that are zero unless a camera file says otherwise: without them the lens is the projection of
+        its name.
+    groups
+        Terms that are tested together, in the order in which they are left out where the data do not show
+        them.
+    """
+
+    model: str
+    names: tuple[str, ...]
+    order: tuple[str, ...]
+    radius: Callable[[float], float]
+    formula: str
+    widest: float
+    held: tuple[str, ...] = ()
+    groups: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Where the parameters stand in the model."""
+        return tuple(self.order.index(name) for name in self.names)
+
+
+_SQUARE = ("fx", "fy", "cx", "cy")
+_TWO_TERMS = (*_SQUARE, "k1", "k2")
+_FISHEYE = (*_SQUARE, "k1", "k2", "k3", "k4")
+
+LENSES: dict[str, Lens] = {
+    "brown": Lens(
+        "full_opencv",
+        (*_SQUARE, "k1", "k2", "k3", "p1", "p2"),
+        (*_SQUARE, "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+        math.tan,
+        "tan theta (1 + k1 r^2 + k2 r^4 + k3 r^6) and decentering",
+        math.pi,
+        groups=(("k3",), ("k2",), ("k1",), ("p1", "p2")),
+    ),
+    "equidistant": Lens("opencv_fisheye", _SQUARE, _FISHEYE, lambda theta: theta, "theta", math.tau),
+    "equisolid": Lens(
+        "equisolid",
+        _TWO_TERMS,
+        _TWO_TERMS,
+        lambda theta: 2 * math.sin(0.5 * theta),
+        "2 sin(theta/2)",
+        math.tau,
+        held=("k1", "k2"),
+    ),
+    "stereographic": Lens(
+        "stereographic",
+        _TWO_TERMS,
+        _TWO_TERMS,
+        lambda theta: 2 * math.tan(0.5 * theta),
+        "2 tan(theta/2)",
+        math.tau,
+        held=("k1", "k2"),
+    ),
+    "kannala_brandt": Lens(
+        "opencv_fisheye",
+        _FISHEYE,
+        _FISHEYE,
+        lambda theta: theta,
+        "theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)",
+        math.tau,
+        groups=(("k4",), ("k3",), ("k2",), ("k1",)),
+    ),
+}
+"""Lenses by the names that files and reports have for them."""
+
+
+def lens_named(name: str) -> Lens:
+    """Return a lens.
+
+    Raises
+    ------
+    InputError
+        There is none of the name.
+    """
+    if name not in LENSES:
+        raise InputError(f"there is no lens {name!r}; lenses are {', '.join(LENSES)}")
+    return LENSES[name]

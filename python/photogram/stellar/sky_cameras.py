@@ -1,0 +1,210 @@
+"""Calibrated cameras of digital exposures with their covariance, of any lens, in pixels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.io import json
+from photogram.network.cameras import Camera
+from photogram.stellar.camera_files import read_camera, read_document
+from photogram.stellar.lenses import LENSES, Lens, lens_named
+from photogram.stellar.sky import TAU
+
+__all__ = ["COMMON", "BrownCamera", "SkyCamera"]
+
+
+COMMON = 17
+"""Parameters of the core that all images share."""
+_INTERIOR = COMMON - len(TAU)
+_EQUAL = 1e-4
+"""Pixels by which fy may differ from fx in blocks, where the two were one parameter."""
+_KIND = "sky camera"
+
+
+@dataclass(frozen=True, eq=False)
+class SkyCamera:
+    """A camera of digital exposures: x counts right, y down.
+
+    Attributes
+    ----------
+    values
+        (k,) parameters in the order of `names`; principal distances and principal point in pixels.
+    covariance
+        (k, k); zero for what was held, and for fy where there is a `common_scale`.
+    lens
+        Name of the lens (`photogram.stellar.lenses.LENSES`).
+    common_scale
+        Whether fx is the principal distance of both axes.
+
+    Raises
+    ------
+    InputError
+        There is no such lens, or it has more or fewer parameters.
+    """
+
+    values: Floats
+    covariance: Floats
+    lens: str = "brown"
+    common_scale: bool = False
+
+    def __post_init__(self) -> None:
+        count = len(lens_named(self.lens).names)
+        if np.shape(self.values) != (count,) or np.shape(self.covariance) != (count, count):
+            raise InputError(f"a camera {self.lens} has {count} parameters: {', '.join(self.names)}")
+
+    @classmethod
+    def of_field(cls, width: float, height: float, field_of_view: float, lens: str = "brown") -> Self:
+        """Return an ideal camera of a frame in pixels and a horizontal field of view in radians.
+
+        Raises
+        ------
+        InputError
+            There is no such lens, or it does not see so much.
+        """
+        facts = lens_named(lens)
+        if not 0 < field_of_view < facts.widest:
+            widest = math.degrees(facts.widest)
+            raise InputError(
+                f"the field of view is {math.degrees(field_of_view):g} degrees; of a lens {lens} it is"
+                f" between 0 and {widest:g}"
+            )
+        f = 0.5 * width / facts.radius(0.5 * field_of_view)
+        count = len(facts.names)
+        values = np.zeros(count)
+        values[:4] = f, f, 0.5 * width, 0.5 * height
+        return cls(values, np.zeros((count, count)), lens)
+
+    @property
+    def facts(self) -> Lens:
+        """The lens."""
+        return LENSES[self.lens]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(k,) of the parameters."""
+        return LENSES[self.lens].names
+
+    @property
+    def kind(self) -> tuple[str, bool]:
+        """The kind of camera as the core takes it."""
+        return self.facts.model, self.common_scale
+
+    @property
+    def model_values(self) -> Floats:
+        """The parameters of the model of `docs/cameras.md`, in its order."""
+        values = np.zeros(len(self.facts.order))
+        values[list(self.facts.places)] = self.values
+        return values
+
+    @property
+    def common(self) -> Floats:
+        """(17,) as the core takes it: those of the model, zeros, coefficients of refraction."""
+        common = np.zeros(COMMON)
+        common[: len(self.facts.order)] = self.model_values
+        common[_INTERIOR:] = TAU
+        return common
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """(k,) which parameters have a mean error."""
+        return np.asarray(np.diag(self.covariance) > 0)
+
+    def rays(self, xy: Floats) -> Floats:
+        """Return unit directions (n, 3) of images (n, 2), NaN for none: x right, y down, z along the axis."""
+        rays = _photocore.camera_rays(self.facts.model, self.model_values, np.asarray(xy, float))
+        return np.asarray(rays * (1.0, -1.0, -1.0), float)
+
+    def partials(self, rays: Floats) -> Floats:
+        """Return partials (n, 2, k), pixels, of images of directions, as of `rays`, by the parameters."""
+        turned = np.ascontiguousarray(np.asarray(rays, float) * (1.0, -1.0, -1.0))
+        _, _, found = _photocore.camera_partials(self.facts.model, self.model_values, turned)
+        return np.asarray(found[:, :, list(self.facts.places)], float)
+
+    def largest_angle(self, frame: tuple[float, float]) -> float:
+        """Return the largest angle (radians) from the axis in a frame; pi where a part has no direction."""
+        x, y = (np.linspace(0, size, 9) for size in frame)
+        rim = [(a, b) for a in x for b in (0.0, frame[1])] + [(a, b) for a in (0.0, frame[0]) for b in y]
+        cosine = self.rays(np.array(rim))[:, 2]
+        return math.acos(max(-1.0, min(1.0, float(cosine.min())))) if np.isfinite(cosine).all() else math.pi
+
+    def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
+        """Return the camera as blocks take it: columns and rows, y down, the model of its lens.
+
+        Parameters
+        ----------
+        name
+            For reports.
+        weighted
+            Whether its parameters are observations with their full covariance; otherwise they are known. What
+            was held here is held there; of a common scale fy is fx to a ten-thousandth of a pixel.
+        """
+        names, model = self.names, self.facts.model
+        values = dict(zip(names, self.values.tolist(), strict=True))
+        if not (weighted and self.known.any()):
+            return Camera(model, values, name=name)
+        matrix, known = self.covariance.copy(), self.known
+        if self.common_scale and known[0]:
+            matrix[1, :], matrix[:, 1] = matrix[0, :], matrix[:, 0]
+            matrix[1, 1] = matrix[0, 0] + _EQUAL**2
+            known = known | (np.arange(len(names)) == 1)
+        order = np.flatnonzero(known)
+        return Camera(
+            model, values, covariance=([names[i] for i in order], matrix[np.ix_(order, order)]), name=name
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return the camera as it is written."""
+        brown = self.lens == "brown"
+        return {
+            "program": f"photogram {_photocore.__version__}",
+            "kind": "brown camera" if brown else _KIND,
+            **({} if brown else {"lens": self.lens, "model": self.facts.model}),
+            "unit": "pixel",
+            "common_scale": self.common_scale,
+            "parameters": dict(zip(self.names, self.values.tolist(), strict=True)),
+            "covariance": {"order": self.names, "matrix": self.covariance},
+        }
+
+    def to_json(self) -> bytes:
+        """Return the camera as a JSON document: a weighted prior of later adjustments."""
+        return json.to_json(self.document())
+
+    @classmethod
+    def read(cls, path: Path) -> SkyCamera:
+        """Read what `to_json` wrote.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read, or is another document.
+        """
+        document = read_document(path, ("brown camera", _KIND))
+        lens = str(document.get("lens", "brown"))
+        if lens not in LENSES:
+            raise InputError(
+                f"is a camera of the lens {lens}, which is none of {', '.join(LENSES)}", file=path
+            )
+        values, covariance = read_camera(path, document, LENSES[lens].names)
+        of = BrownCamera if lens == "brown" else SkyCamera
+        return of(values, covariance, lens, document.get("common_scale") is True)
+
+
+@dataclass(frozen=True, eq=False)
+class BrownCamera(SkyCamera):
+    """A pinhole camera with Brown's distortion: `SkyCamera` of the lens `brown`.
+
+    With (u, v) = (X, Y) / Z and r^2 = u^2 + v^2,
+    x = fx (u (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 u v + p2 (r^2 + 2 u^2)) + cx,
+    and y likewise with fy, cy, and p1, p2 exchanged. `values` are fx, fy, cx, cy, k1, k2, k3, p1, p2.
+    """
+
+    NAMES = LENSES["brown"].names
