@@ -27,6 +27,8 @@ FORMATS: dict[str, Format] = {
         "bundler",
         "bal",
         "pixels",
+        "patb",
+        "bingo",
         "giant",
     )
 }

@@ -173,6 +173,7 @@ def bare_settings(
     *,
     frame: Frame | None = None,
     length: str = "m",
+    image: str = "px",
     sd: Mapping[str, tuple[float, ...]] | None = None,
     crs: str | None = None,
 ) -> Settings:
@@ -184,7 +185,7 @@ def bare_settings(
         What errors name.
     tables
         The tables.
-    frame, length, sd
+    frame, length, image, sd
         As in :class:`Settings`.
     crs
         Of all these tables, where they are not in the frame.
@@ -196,8 +197,8 @@ def bare_settings(
         options=Options(),
         length=length,
         angle="deg",
-        image="px",
-        image_y="down",
+        image=image,
+        image_y="down" if image == "px" else "up",
         pixel_origin="corner",
         attitude="omega_phi_kappa",
         rotation="object_to_photo",

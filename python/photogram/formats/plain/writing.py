@@ -152,10 +152,9 @@ def _cameras(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
     names = dict.fromkeys(name for each in cameras for name in each.names if name not in constants)
     for name in names:
         values = [each.parameters.get(name) for each in cameras]
-        columns[name] = [
-            -value if value is not None and each.model == "perspective" else value
-            for each, value in zip(cameras, values, strict=True)
-        ]
+        # In files a principal distance is positive for the positive plane, in models negative.
+        sign = -1.0 if name == "c" else 1.0
+        columns[name] = [None if value is None else sign * value for value in values]
     for name in names:
         deviations = [
             dict(zip(each.names, each.deviations.tolist(), strict=True)).get(name, 0.0) for each in cameras
