@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -115,7 +115,7 @@ def collection(
         raise typer.BadParameter("names a directory; adjusted.txt goes there", param_hint="--out")
     with job:
         import photogram
-        from photogram.collection import adjust, to_bytes
+        from photogram.collection import AdjustedCollection, adjust, to_bytes
         from photogram.collection.formats import recognised
         from photogram.collection.report import summary
 
@@ -132,7 +132,7 @@ def collection(
         log = None
         with job.status("adjusting") as status:
             progress = shown(status, "cost", 0.5) if status is not None else None
-            options = {
+            options: dict[str, Any] = {
                 "tolerance": tolerance,
                 "max_iterations": max_iterations,
                 "ordering": ordering.value,
@@ -141,6 +141,8 @@ def collection(
             }
             if snoop:
                 log = photogram.snoop(photos, level=level, fdr=fdr, unit_weight=unit_weight.value, **options)
+                if not isinstance(log.result, AdjustedCollection):
+                    raise TypeError("a collection gives the result of a collection")
                 result = log.result
             else:
                 result = adjust(photos, loss=_LOSSES[loss], scale=scale, covariance=covariance, **options)
