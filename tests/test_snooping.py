@@ -5,11 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import photogram
 import photogram.collection
 from photogram import Block
 from photogram.adjustment.snooping import block_trial
+from photogram.cli import app
 from photogram.network.observations import Distance
 from photogram.results import network_trial
 from photogram.statistics import lambda0
@@ -399,3 +401,24 @@ def test_reliability():
     assert gravest.in_sd == pytest.approx(largest, rel=1e-4)
     assert "image" in found.lines()[2]
     assert len(found.table()) == len(found.redundancy)
+
+
+def test_commands(tmp_path):
+    """Both commands write the log, and the network without what is in it."""
+    runner = CliRunner()
+    document = tmp_path / "giant.json"
+    done = runner.invoke(
+        app, ["giant", "--example", "--snoop", "--out", str(tmp_path / "giant"), "--json", str(document)]
+    )
+    assert done.exit_code == 0, done.output
+    assert "Data snooping" in (tmp_path / "giant" / "report.txt").read_text(encoding="utf-8")
+    log = json.loads(document.read_text(encoding="utf-8"))["snooping"]
+    assert log["distribution"] == "chi2"
+    assert log["family_level"] == 0.05
+    done = runner.invoke(
+        app, ["collection", "--example", "--snoop", "--fdr", "0.1", "--json", str(tmp_path / "ring.json")]
+    )
+    assert done.exit_code == 0, done.output
+    log = json.loads((tmp_path / "ring.json").read_text(encoding="utf-8"))["snooping"]
+    assert log["false_discovery_rate"] == 0.1
+    assert log["distribution"] == "F"

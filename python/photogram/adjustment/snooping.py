@@ -31,7 +31,7 @@ from photogram.results.result import Result
 from photogram.results.snooped import Snooped
 from photogram.results.suspects import network_trial
 from photogram.statistics.distributions import LEVEL
-from photogram.statistics.snooping.snooping import Settings, snooped
+from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
 from photogram.statistics.snooping.suspects import LostSupportError, Out
 
 __all__ = ["block_trial", "settings_of", "snoop"]
@@ -159,15 +159,24 @@ def _snoop_block(
         first = adjusted(block, covariance=False)
         if not first.converged and robust is not False:
             first = adjusted(block, covariance=False, loss="huber")
-        trial = block_trial(first.block, first.state, first.options, threads, parts=parts)
-        try:
-            outcome = snooped(trial, settings)
-        except LostSupportError as lost:
-            raise AdjustmentError(f"the block cannot be tested: {lost}") from lost
+        trial, outcome = _snooped_from(first, settings, threads, parts=parts)
     result = adjusted(_without(block, trial, outcome.out))
     remarks = [Message(remark) for remark in outcome.remarks]
     result = dataclasses.replace(result, messages=[*remarks, *result.messages])
     return Snooped(result=result, outcome=outcome, suspects=trial.suspects, settings=settings)
+
+
+def _snooped_from(
+    first: Result, settings: Settings, threads: int | None, *, parts: bool
+) -> tuple[NetworkTrial, Outcome]:
+    """Snoop from where an adjustment has ended; without a robust start where that leads nowhere."""
+    for attempt in (settings, dataclasses.replace(settings, robust=False)):
+        trial = block_trial(first.block, first.state, first.options, threads, parts=parts)
+        try:
+            return trial, snooped(trial, attempt)
+        except (LostSupportError, _photocore.BlockError) as error:
+            reason: Exception = error
+    raise AdjustmentError(f"the block cannot be tested: {reason.args[0]}") from reason
 
 
 def options_of(unit_variance: UnitVariance) -> CoreOptions:

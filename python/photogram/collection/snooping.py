@@ -58,8 +58,8 @@ def _snoop_collection(
     trial = collection_trial(first, threads, parts=parts)
     try:
         outcome = snooped(trial, settings)
-    except LostSupportError as lost:
-        raise AdjustmentError(f"the collection cannot be tested: {lost}") from lost
+    except (LostSupportError, _photocore.CollectionError) as error:
+        raise AdjustmentError(f"the collection cannot be tested: {error.args[0]}") from error
     cleaned = _without(first, trial, outcome.out)
     result = adjust(cleaned, threads=threads, progress=progress, **options)
     remarks = [Message(remark) for remark in outcome.remarks]

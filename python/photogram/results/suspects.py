@@ -38,7 +38,7 @@ def block_suspects(block: Block, core: _photocore.NetworkTrial, *, parts: bool =
     return _Named(block, core, parts).suspects()
 
 
-ROUGH = 0.1
+ROUGH = 1.0
 """Standard deviations: a step that moves no unknown by more is the last of a round."""
 EXACT = 1e-7
 """The same where R of all rows is used: a small network."""

@@ -10,6 +10,7 @@ is what an adjustment without S gives in a linear model (Hadi and Simonoff 1993)
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -50,7 +51,8 @@ class UnitWeight:
         others = self.without(statistic, dimension)
         if dimension == 0 or not others.degrees_of_freedom > 0:
             return math.nan
-        return statistic / dimension / (others.weighted_sum_of_squares / others.degrees_of_freedom)
+        left = others.weighted_sum_of_squares / others.degrees_of_freedom
+        return statistic / dimension / left if left > 0 else math.inf
 
     def odds(self, first: tuple[float, int], second: tuple[float, int]) -> float:
         """Return the odds of one group against another: T and m' of each (Akaike weights)."""
@@ -59,7 +61,7 @@ class UnitWeight:
             exponent = (t - other) / 2
         else:
             omega = self.weighted_sum_of_squares
-            left = [max(omega - each, 1e-12 * omega) for each in (other, t)]
+            left = [max(omega - each, 1e-12 * omega, sys.float_info.min) for each in (other, t)]
             exponent = self.degrees_of_freedom / 2 * math.log(left[0] / left[1])
         return math.exp(min(exponent - (m - n), 700.0))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -172,8 +172,11 @@ class _Snooping:
             self.trial, self.tests, self._unit(), self.scales, allowed, self.level, count, ahead=True
         )
         remarks: list[str] = []
-        removed = self._take_out(choices, number, remarks)
-        returned = self._take_back(number) if any(each.is_out for each in self.log) else []
+        # In a large network what went before returns in the adjustment that takes others out.
+        returned = [] if self.trial.whole else self._agreeing()
+        removed = self._take_out(choices, number, remarks, returned)
+        if self.trial.whole:
+            returned = self._take_back(number)
         removed += self._take_photos_out(number)
         self.rounds.append(
             Round(
@@ -305,9 +308,7 @@ class _Snooping:
             f"many observations disagree: a robust adjustment (Huber, then Cauchy) put {len(removed)}"
             " groups aside; tests against the others decided which stay out"
         )
-        returned = []
-        while more := self._take_back(0):
-            returned += more
+        returned = self._take_back(0)
         self.rounds.append(
             Round(
                 number=0,
@@ -321,7 +322,9 @@ class _Snooping:
             )
         )
 
-    def _take_out(self, choices: list[Choice], number: int, remarks: list[str]) -> list[int]:
+    def _take_out(
+        self, choices: list[Choice], number: int, remarks: list[str], returning: list[int]
+    ) -> list[int]:
         entries = []
         for choice in choices:
             own = choice.chosen
@@ -346,7 +349,14 @@ class _Snooping:
                     rivals,
                 )
             )
-        return self._apply(entries, remarks)
+        removed = self._apply(entries, remarks, returning)
+        self._note_return(returning, number)
+        return removed
+
+    def _note_return(self, places: list[int], number: int) -> None:
+        for place in places:
+            self.returns.add(self.log[place].group)
+            self.log[place] = self._with_prediction(place).with_(returned=number)
 
     def _entry(
         self,
@@ -387,16 +397,18 @@ class _Snooping:
             rivals=rivals,
         )
 
-    def _apply(self, entries: list[Removal], remarks: list[str]) -> list[int]:
+    def _apply(self, entries: list[Removal], remarks: list[str], returning: Sequence[int] = ()) -> list[int]:
         """Take groups out with what cannot stay without them, and adjust.
 
         Groups without which the network falls apart stay, and are said to.
         """
-        if not entries:
+        if not entries and not returning:
             return []
         pending = entries
         for _ in range(RESCUES):
             out = self.out.copy()
+            for place in returning:
+                out.rows[list(self.log[place].rows)] = False
             log = [self._out_with(out, entry) for entry in pending]
             try:
                 self._adjust(out)
@@ -499,7 +511,7 @@ class _Snooping:
         for point in sorted(points - out.points):
             out.points.add(point)
             consequences += self._left(out, point)
-        return entry.with_(consequences=tuple(dict.fromkeys(consequences)))
+        return entry.with_(consequences=tuple(dict.fromkeys(consequences))) if consequences else entry
 
     def _left(self, out: Out, point: int) -> Iterator[str]:
         """Put everything of a point out, and say so."""
@@ -515,8 +527,25 @@ class _Snooping:
         self.tests = self.trial.tests()
 
     def _take_back(self, number: int) -> list[int]:
-        """Test what is out against the rest, and take back what agrees: the best, or all that are apart."""
+        """Take back what agrees with the rest, one adjustment after the other."""
+        returning = self._agreeing()
+        if not returning:
+            return []
+        out = self.out.copy()
+        for place in returning:
+            out.rows[list(self.log[place].rows)] = False
+        try:
+            self._adjust(out)
+        except LostSupportError:
+            return []
+        self._note_return(returning, number)
+        return returning + self._take_back(number)
+
+    def _agreeing(self) -> list[int]:
+        """Test what is out against the rest, and return what agrees: the best, or all that are apart."""
         places = [place for place, each in enumerate(self.log) if each.is_out and each.rows]
+        if not places:
+            return []
         predictions = self.trial.predictions([self.log[place].group for place in places])
         known = [(place, own) for place, own in zip(places, predictions, strict=True) if own is not None]
         log_p = self._log_probability(
@@ -531,22 +560,7 @@ class _Snooping:
             for place, (_, value) in self.predicted.items()
             if value >= limit and self.log[place].group not in self.returns
         )
-        returning = self._apart([place for _, place in agreeing])
-        if not returning:
-            return []
-        out = self.out.copy()
-        for place in returning:
-            out.rows[list(self.log[place].rows)] = False
-        try:
-            self._adjust(out)
-        except LostSupportError:
-            return []
-        for place in returning:
-            self.returns.add(self.log[place].group)
-            self.log[place] = self._with_prediction(place).with_(returned=number)
-        if not self.trial.whole:
-            return returning
-        return returning + self._take_back(number)
+        return self._apart([place for _, place in agreeing])
 
     def _apart(self, places: list[int]) -> list[int]:
         """Return the first where every one is tested alone, else those that have no photo in common."""
