@@ -106,6 +106,8 @@ def good(tmp_path_factory):
     session = comparator.simulate_calibration(plate, cases=1, sequence=range(1, 26)).session
     options = comparator.Options(joint=False, polynomial=False)
     calibration = comparator.calibrate(session, options)
+    star_camera = folder / "camera.json"
+    star_camera.write_bytes(stellar.BrownCamera.of_field(6000, 4000, 0.6).to_json())
     readings, deck, own_grid = folder / "readings.csv", folder / "deck.txt", folder / "grid.csv"
     readings.write_bytes(comparator.to_csv(session))
     deck.write_bytes(comparator.to_cards(session))
@@ -136,6 +138,7 @@ def good(tmp_path_factory):
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},
             "first_values": {"block": block},
+            "camera_from": {"path": star_camera, "name": "stars", "weighted": True},
             "group_sums": {"result": photogram.adjust(block)},
             "hints": {"block": block},
             "orient": {"stations": stations},

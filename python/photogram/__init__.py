@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from photogram.results.iteration import Iteration
     from photogram.results.result import Result
     from photogram.results.snooped import Snooped
+    from photogram.stellar.cameras import camera_from
 
 __all__ = [
     "AdjustmentError",
@@ -63,6 +64,7 @@ __all__ = [
     "VarianceComponents",
     "__version__",
     "adjust",
+    "camera_from",
     "check",
     "first_values",
     "group_sums",
@@ -105,6 +107,7 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "camera_from": "stellar.cameras",
     "check": "checks.checking",
     "first_values": "adjustment.first_values",
     "group_sums": "results.group_sums",

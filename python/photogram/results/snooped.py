@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import orjson
@@ -11,6 +11,9 @@ import orjson
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
 from photogram.show.sections import Section, composed, headline
+from photogram.show.ways import Judged, findings_of
+from photogram.statistics.findings import Findings
+from photogram.statistics.findings import Snooped as Taken
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome, Settings
@@ -23,7 +26,7 @@ __all__ = ["Snooped"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Snooped:
+class Snooped(Judged):
     """A network after data snooping.
 
     Attributes
@@ -58,6 +61,14 @@ class Snooped:
     def rivals(self) -> list[str]:
         """Sentences on what cannot be told apart from what was removed."""
         return [entry.sentence for entry in self.removed if entry.in_dispute]
+
+    @property
+    def findings(self) -> Findings:
+        """What the verdict rests on: that of the network without what was taken out, and how much it was."""
+        removed = [_member(entry) for entry in self.removed]
+        images, control = self.share_removed("image"), self.share_removed("control")
+        taken = Taken(removed, images=images, control=control, rivals=self.rivals)
+        return replace(findings_of(self.result), snooped=taken)
 
     def share_removed(self, kind: str) -> float:
         """Return the share of the groups of a kind that are out, with what went with them."""
@@ -103,11 +114,16 @@ class Snooped:
 
     def to_json(self) -> bytes:
         """Return the whole result with the log under `snooping` as one JSON document (UTF-8)."""
-        return json.to_json({**orjson.loads(self.result.to_json()), "snooping": self.document()})
+        document = {**orjson.loads(self.result.to_json()), "snooping": self.document()}
+        return json.to_json({**document, "verdict": self.verdict.document()})
 
     def sections(self) -> list[Section]:
         """Return the log as titled sections of a report."""
-        return [("Data snooping", self._head()), ("Taken out, in order", self._log())]
+        return [
+            ("Verdict", [self.verdict.headline, *self.verdict.lines]),
+            ("Data snooping", self._head()),
+            ("Taken out, in order", self._log()),
+        ]
 
     def report(self) -> str:
         """Return the report: what was taken out, then the report of the network without it."""
@@ -258,7 +274,8 @@ def _lines(entry: Removal) -> list[str]:
             f" {entry.dimension}, F {entry.fisher:.2f}, log10 p {entry.log_probability / _LN10:.1f}"
             f" (limit {math.log10(entry.limit):.1f})"
         )
-    lines.append(f"    estimated error {errors}; redundancy {entry.redundancy:.3f}")
+    if errors:
+        lines.append(f"    estimated error {errors}; redundancy {entry.redundancy:.3f}")
     lines += [
         f"    or {rival.name}: T {rival.statistic:.2f}, odds {rival.odds:.2g} : 1" for rival in entry.rivals
     ]
@@ -269,3 +286,8 @@ def _lines(entry: Removal) -> list[str]:
             f" {entry.prediction_log_probability / _LN10:.1f}"
         )
     return lines
+
+
+@findings_of.register
+def _findings(snooped: Snooped) -> Findings:
+    return snooped.findings
