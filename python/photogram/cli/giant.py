@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
+from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
@@ -83,6 +84,15 @@ def giant(
             help="Stop by the percent criterion and the limit of iterations of COMMON; list as in 1987.",
         ),
     ] = False,
+    unit_variance: Annotated[
+        UnitVarianceName | None,
+        typer.Option(
+            help="What the variance of unit weight is based on; `redundancy`: on redundancy numbers, whatever"
+            " the weights of the stations. Default: as COMMON says.",
+            show_default=False,
+        ),
+    ] = None,
+    components: Components = None,
     ordering: Ordering = OrderingName.AUTO,
     air_refraction: Annotated[
         AirModel | None,
@@ -142,23 +152,29 @@ def giant(
             job.reads(directory)
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
-        job.writes(*(out / name for name in RESULTS))
+        job.writes(*(out / name for name in RESULTS), *([out / COMPONENTS] if components else []))
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         block = _refracted(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
-        if snoop and (as_published or project.common.intersection_only):
-            raise typer.BadParameter("not with --as-published or an intersection", param_hint="--snoop")
+        if snoop and (as_published or components or project.common.intersection_only):
+            refused = "not with --as-published, --components or an intersection"
+            raise typer.BadParameter(refused, param_hint="--snoop")
         options = {"level": level, "fdr": fdr, "unit_weight": unit_weight.value} if snoop else None
         try:
-            result, log = _adjust(job, project, block, as_published, ordering, threads, options)
+            result, log = _adjust(
+                job, project, block, as_published, unit_variance, ordering, threads, options
+            )
         except AdjustmentError:
             # What was remarked on while reading is often the reason.
             for message in project.messages[:SHOWN]:
                 errors.print(escape(str(message)))
             raise
         written = _result_files(project, block, result, log, out, as_published)
+        found = estimated(job, block, components, threads)
+        if found is not None:
+            written[out / COMPONENTS] = found.report().encode()
         documents = {}
         if json is not None:
             documents[json] = (log or result).to_json()
@@ -171,9 +187,13 @@ def giant(
             written,
             documents,
             summary=lambda: print_sections(
-                [*log.sections(), *summary(result)[1:]] if log else summary(result), "report.txt"
+                [
+                    *(log.sections() if log else []),
+                    *with_components(summary(result), found)[1 if log else 0 :],
+                ],
+                "report.txt",
             ),
-            code=(log or result).verdict.exit_code(strict=strict),
+            code=(found or log or result).verdict.exit_code(strict=strict),
         )
 
 
@@ -216,6 +236,7 @@ def _adjust(
     project: Project,
     block: Block,
     as_published: bool,
+    unit_variance: UnitVarianceName | None,
     ordering: OrderingName,
     threads: int | None,
     snooping: dict[str, Any] | None,
@@ -227,16 +248,15 @@ def _adjust(
     with job.status("adjusting") as status:
         progress = shown(status, "weighted sum of squares", 1.0) if status is not None else None
         if snooping is not None:
-            log = snoop(
-                block, unit_variance=common.unit_variance, threads=threads, progress=progress, **snooping
-            )
+            snooping["unit_variance"] = unit_variance.value if unit_variance else common.unit_variance
+            log = snoop(block, threads=threads, progress=progress, **snooping)
             if not isinstance(log.result, Result):
                 raise TypeError("a block gives the result of a block")
             result = replace(log.result, messages=[*project.messages, *log.result.messages])
             return result, replace(log, result=result)
         result = adjust(
             block,
-            unit_variance=common.unit_variance,
+            unit_variance=unit_variance.value if unit_variance else common.unit_variance,
             ordering=ordering.value,
             as_published=AsPublished(common.convergence_percent, common.max_iterations)
             if as_published

@@ -2,6 +2,7 @@
 
 from photogram.arguments.annotations import check_arguments
 from photogram.collection import (  # noqa: F401  (the ways to show a result, and what works on it)
+    checking,
     components,
     document,
     findings,

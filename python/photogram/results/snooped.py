@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import orjson
 
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
-from photogram.show.sections import Section, composed, headline
-from photogram.show.ways import Judged, findings_of
-from photogram.statistics.findings import Findings
-from photogram.statistics.findings import Snooped as Taken
+from photogram.show.sections import Section, composed, headline, verdict_section
+from photogram.show.ways import Judged
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome, Settings
@@ -62,14 +60,6 @@ class Snooped(Judged):
         """Sentences on what cannot be told apart from what was removed."""
         return [entry.sentence for entry in self.removed if entry.in_dispute]
 
-    @property
-    def findings(self) -> Findings:
-        """What the verdict rests on: that of the network without what was taken out, and how much it was."""
-        removed = [_member(entry) for entry in self.removed]
-        images, control = self.share_removed("image"), self.share_removed("control")
-        taken = Taken(removed, images=images, control=control, rivals=self.rivals)
-        return replace(findings_of(self.result), snooped=taken)
-
     def share_removed(self, kind: str) -> float:
         """Return the share of the groups of a kind that are out, with what went with them."""
         own = [group for group in range(len(self.suspects)) if self.suspects.kind(group) == kind]
@@ -113,14 +103,14 @@ class Snooped(Judged):
         }
 
     def to_json(self) -> bytes:
-        """Return the whole result with the log under `snooping` as one JSON document (UTF-8)."""
-        document = {**orjson.loads(self.result.to_json()), "snooping": self.document()}
-        return json.to_json({**document, "verdict": self.verdict.document()})
+        """Return the whole result with its verdict and the log, `snooping`, as one JSON document (UTF-8)."""
+        own = {"verdict": self.verdict.document(), "snooping": self.document()}
+        return json.to_json({**orjson.loads(self.result.to_json()), **own})
 
     def sections(self) -> list[Section]:
         """Return the log as titled sections of a report."""
         return [
-            ("Verdict", [self.verdict.headline, *self.verdict.lines]),
+            verdict_section(self.verdict),
             ("Data snooping", self._head()),
             ("Taken out, in order", self._log()),
         ]
@@ -286,8 +276,3 @@ def _lines(entry: Removal) -> list[str]:
             f" {entry.prediction_log_probability / _LN10:.1f}"
         )
     return lines
-
-
-@findings_of.register
-def _findings(snooped: Snooped) -> Findings:
-    return snooped.findings
