@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram import _photocore
+from photogram.adjustment.undetermined import weak_in_words
 from photogram.errors import AdjustmentError
 from photogram.messages import Message, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 
-if TYPE_CHECKING:
-    from photogram import _photocore
+__all__ = ["behind", "folded", "harmful", "hidden", "rounded", "too_coarse", "undetermined"]
 
-__all__ = ["behind", "folded", "hidden", "rounded", "too_coarse", "undetermined"]
-
+NEAR = 1e-3
+"""A point nearer to a station than this part of the median of such distances is at its place."""
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
 
@@ -29,10 +29,47 @@ def undetermined(
         messages.append(Message(f"there are no covariances: {error}"))
     weak = _unknowns(block, solution.weak, solution.weak_cameras, solution.weak_unknowns)
     if weak:
+        ends = "stands still, but" if solution.status == "converged" else "creeps:"
+        words = weak_in_words(block, solution)
         messages.append(
             Message(
-                "the sum of squares stands still, but the observations hardly determine a combination of"
+                f"the sum of squares {ends} the observations hardly determine a combination of"
                 f" unknowns that moves {weak}: other values along it fit as well"
+                + (f" ({words})" if words else "")
+            )
+        )
+    return messages
+
+
+def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+    """Remark on points and photos that hardly hold, and spoil what hangs on them."""
+    near = [(point, distance) for point, _, distance in solution.weak_points if distance < NEAR]
+    flat = [(point, ratio) for point, ratio, distance in solution.weak_points if distance >= NEAR]
+    messages = []
+    if solution.loose_photos:
+        names = listed([block.photo_ids[photo] for photo in solution.loose_photos])
+        messages.append(
+            Message(
+                f"left out, photos that their images do not determine: {names}; their points are too few, or"
+                " lie on a line: they stay where they were given, and their images do not take part"
+            )
+        )
+    if near:
+        names = listed([block.point_ids[point] for point, _ in near])
+        messages.append(
+            Message(
+                f"at a station's own place, {min(distance for _, distance in near):.1g} of the distance of"
+                f" the others and less than {NEAR:g}: points {names}; what their images say of the photos"
+                " drowns what all others say: leave them out"
+            )
+        )
+    if flat:
+        names = listed([block.point_ids[point] for point, _ in flat])
+        messages.append(
+            Message(
+                f"on nearly parallel rays: points {names}; their standard deviations along the rays are up to"
+                f" {max(ratio for _, ratio in flat):.1g} times those across: they say nothing of the"
+                " distance, and redundancy numbers of their images may have lost digits"
             )
         )
     return messages
@@ -93,19 +130,51 @@ def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
 
 
 def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Remark on images beyond where the radial terms of a lens are one-to-one: they fit two directions."""
-    images = solution.images_folded
+    """Remark on images beyond where the radial terms of a lens are one-to-one: they fit two directions.
+
+    Points that are known give the ray, so that camera, pose or coordinates are wrong by more than an error of
+    measurement: that is an error. Where the point itself is unknown, one image may be a mistake, which its
+    residual shows: that is a remark, and the result is there to look for it.
+
+    Raises
+    ------
+    AdjustmentError
+        The point of such an image has given coordinates.
+    """
+    images = np.asarray(solution.images_folded)
     if not len(images):
         return []
+    given = np.asarray(np.isfinite(block.point_sd).any(axis=1))[block.image_points[images]]
+    ends = _fold_of(block, solution, int(images[given.argmax()]))
+    if given.any():
+        own = zip(block.image_points[images[given]], block.image_photos[images[given]], strict=True)
+        where = [f"point {block.point_ids[point]} on photo {block.photo_ids[photo]}" for point, photo in own]
+        raise AdjustmentError(
+            f"control lies beyond where the lens of its camera is one-to-one: {listed(where)}; {ends}:"
+            " coordinates, pose or lens are wrong"
+        )
     points = listed([block.point_ids[point] for point in np.unique(block.image_points[images])])
     photos = listed([block.photo_ids[photo] for photo in np.unique(block.image_photos[images])])
     count = "1 image point lies" if len(images) == 1 else f"{len(images)} image points lie"
     return [
         Message(
             f"{count} beyond where the lens of the camera is one-to-one: its radial terms fold back there,"
-            f" and the result is not to be trusted: points {points} on photos {photos}"
+            f" and the result is not to be trusted: points {points} on photos {photos}; {ends}"
         )
     ]
+
+
+def _fold_of(block: Block, solution: _photocore.BlockSolution, image: int) -> str:
+    """Say where the lens of an image's camera ends, at its adjusted parameters."""
+    row = 0 if block.photo_cameras is None else int(block.photo_cameras[block.image_photos[image]])
+    camera = block.cameras[row]
+    domain = _photocore.radial_domain(camera.model, np.array(solution.cameras[row][0]))
+    if domain is None:
+        return f"the lens of {block.camera_names[row]}"
+    radius, end = domain
+    unit = f" {camera.unit}" if camera.direction == "backward" else " principal distances"
+    at = f"{radius:.4g}{unit}, which becomes {end:.4g}"
+    return f"the lens of {block.camera_names[row]} folds at a radius of {at}"
 
 
 def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:
