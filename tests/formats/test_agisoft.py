@@ -85,4 +85,4 @@ def test_a_fault_is_named_with_its_line(tmp_path, old, new, words):
 
 
 def test_damaged_documents_end_in_a_message(tmp_path):
-    assert check_damaged(sample("agisoft", "cameras.xml"), tmp_path, "agisoft", 300, 5) > 100
+    assert check_damaged(sample("agisoft", "cameras.xml"), tmp_path, "agisoft", 500, 5) > 100

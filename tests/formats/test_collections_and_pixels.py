@@ -103,4 +103,15 @@ def test_giant_projects_come_in_and_go_out(run, tmp_path):
     ("name", "source"), [("bundler", ("bundler",)), ("bal", ("bal", "problem-6-40.txt"))]
 )
 def test_damaged_collections_end_in_a_message(tmp_path, name, source):
-    assert check_damaged(sample(*source), tmp_path, name, 150, 1) > 30
+    assert check_damaged(sample(*source), tmp_path, name, 500, 1) > 100
+
+
+def test_damaged_tables_of_pixels_end_in_a_message(tmp_path):
+    lines = sample("project", "cameras.csv").read_text().splitlines()
+    (tmp_path / "camera.csv").write_text("\n".join(lines[:2]) + "\n")
+    wishes = Wishes(cameras=tmp_path / "camera.csv")
+    assert check_damaged(sample("pixels", "images.csv"), tmp_path, "pixels", 500, 2, wishes) > 50
+
+
+def test_damaged_giant_projects_end_in_a_message(tmp_path):
+    assert check_damaged(GALVESTON, tmp_path, "giant", 100, 3) > 10

@@ -158,4 +158,4 @@ def test_the_largest_of_several_models_is_taken(tmp_path):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_damaged_models_end_in_a_message(tmp_path, seed):
-    assert check_damaged(only(tmp_path / "model"), tmp_path / "damaged", "opensfm", 100, seed) > 20
+    assert check_damaged(only(tmp_path / "model"), tmp_path / "damaged", "opensfm", 170, seed) > 20

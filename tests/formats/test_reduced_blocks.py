@@ -112,4 +112,10 @@ def test_a_fault_is_named_with_its_line(tmp_path, file, old, new, words):
 
 @pytest.mark.parametrize("seed", range(2))
 def test_damaged_blocks_end_in_a_message(tmp_path, seed):
-    assert check_damaged(sample("patb"), tmp_path, "patb", 150, seed) > 20
+    assert check_damaged(sample("patb"), tmp_path, "patb", 250, seed) > 20
+
+
+def test_damaged_bingo_blocks_end_in_a_message(tmp_path):
+    cameras = tmp_path / "cameras.csv"
+    cameras.write_text("camera,c\nA,8.67\nB,9.315\n")
+    assert check_damaged(sample("bingo"), tmp_path, "bingo", 500, 4, Wishes(cameras=cameras)) > 50
