@@ -58,7 +58,7 @@ def test_every_kind_of_the_figures_is_tested(script):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_planted_is_named_and_nothing_else(kind, script):
-    # Networks on which no limit was chosen.
+    # Networks other than those of the page.
     outcomes = [
         script["outcome"](script["KINDS"][kind], seed, False) for seed in range(8000, 8000 + NETWORKS)
     ]
