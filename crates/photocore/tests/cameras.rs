@@ -16,7 +16,9 @@ fn sample(name: &str, numbers: &[f64]) -> Camera {
         ("cx" | "cy" | "xp" | "yp" | "r0" | "b1" | "b2" | "dx" | "dy" | "x0" | "y0", Unit::Image) => {
             100.0 * number
         }
-        (polynomial, Unit::Image) if name.starts_with("on_comparator") && polynomial.starts_with(['x', 'y']) => {
+        (polynomial, Unit::Image)
+            if name.starts_with("on_comparator") && polynomial.starts_with(['x', 'y']) =>
+        {
             part * 100.0 * number
         }
         ("alpha" | "omega", _) => 0.7 + 0.2 * number,

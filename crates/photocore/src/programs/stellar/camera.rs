@@ -2,7 +2,9 @@
 //! lens.
 
 use crate::geometry::plate_lens;
-use crate::geometry::{Camera as Lens, Distortion, Matrix3, PlateLens, Plated, Vector3, pointing_with_partials};
+use crate::geometry::{
+    Camera as Lens, Distortion, Matrix3, PlateLens, Plated, Vector3, pointing_with_partials,
+};
 
 pub use crate::geometry::plate_lens::{Decentering, Form, INTERIOR};
 
