@@ -94,8 +94,8 @@ def main() -> None:
     parser.add_argument("--repetitions", type=int, default=3)
     parser.add_argument("--without", nargs="*", choices=list(PEERS), default=[])
     arguments = parser.parse_args()
-    print(f"{processor()}; seconds, the fastest of {arguments.repetitions}\n")
-    head = ["photos", "known cameras", "steps", "two of 8 unknown", "steps", "ratio"]
+    print(f"{processor()}; seconds, the fastest of {arguments.repetitions}; cpu: of all processors\n")
+    head = ["photos", "known cameras", "cpu", "steps", "two of 8 unknown", "cpu", "steps", "ratio", "of cpu"]
     peers = [name for name in PEERS if name not in arguments.without]
     for name in peers:
         head += [f"{name}, bare", f"{name} / photogram"]
@@ -107,25 +107,28 @@ def main() -> None:
             "unknown": lambda block=unknown: photogram.adjust(block),
         }
         seconds: dict[str, float] = dict.fromkeys([*work, *peers], np.inf)
+        cpu = dict(seconds)
         found: dict[str, object] = {}
         for _ in range(arguments.repetitions):
             # A solution of a peer cannot be repeated from where it has ended.
             ready = work | {name: PEERS[name](unknown) for name in peers}
             for side, run in ready.items():
-                start = time.perf_counter()
+                start, start_cpu = time.perf_counter(), time.process_time()
                 found[side] = run()
                 seconds[side] = min(seconds[side], time.perf_counter() - start)
-        print(row(size, seconds, found))
+                cpu[side] = min(cpu[side], time.process_time() - start_cpu)
+        print(row(size, seconds, cpu, found))
 
 
-def row(size: Size, seconds: dict[str, float], found: dict[str, object]) -> str:
+def row(size: Size, seconds: dict[str, float], cpu: dict[str, float], found: dict[str, object]) -> str:
     """Return a row of the table; the sums of squares must agree."""
     known, unknown = found["known"], found["unknown"]
     assert isinstance(known, photogram.Result)
     assert isinstance(unknown, photogram.Result)
-    cells = [f"{size.photos:,}", f"{seconds['known']:.2f}", str(len(known.iterations))]
-    cells += [f"{seconds['unknown']:.2f}", str(len(unknown.iterations))]
-    cells += [f"{seconds['unknown'] / seconds['known']:.2f}"]
+    cells = [f"{size.photos:,}"]
+    for side, result in (("known", known), ("unknown", unknown)):
+        cells += [f"{seconds[side]:.2f}", f"{cpu[side]:.2f}", str(len(result.iterations))]
+    cells += [f"{each['unknown'] / each['known']:.2f}" for each in (seconds, cpu)]
     for name in [name for name in PEERS if name in seconds]:
         ours, theirs = unknown.sums_of_squares.total, float(str(found[name]))
         if abs(theirs / ours - 1.0) > 1e-4:

@@ -707,8 +707,8 @@ class BlockNetwork:
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended, in the datum that it was taken to."""
 
-    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
-        """Prepare for trials without some observations, from where the adjustment has ended."""
+    def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where an adjustment ended, or from the start."""
 
     def resistance(self, state: BlockState, *, threads: int) -> list[tuple[str, float]]:
         """Return what keeps the block from moving as a whole: kinds of observations.
@@ -748,14 +748,12 @@ class NetworkTrial:
     def deviations(self) -> _Floats:
         """(M,) standard deviations a priori, in the units of the observations."""
 
-    def stand(self, held: list[int]) -> tuple[str, int, float, int, list[int]]:
-        """Take the network as it stands, with everything in it; return how it stands, as `adjust`.
+    @property
+    def photos(self) -> list[list[float]]:
+        """The values of each photo where the last trial has ended: as they are given, pose first."""
 
-        Parameters
-        ----------
-        held
-            Unknowns that were held for a datum.
-        """
+    def stand(self) -> tuple[str, int, float, int, list[int]]:
+        """Take the network as its adjustment has ended, with everything in it; return what `adjust` does."""
 
     def adjust(
         self,
@@ -876,8 +874,9 @@ class BlockState:
     ----------
     unknowns
         Adjusted, in the order of the core.
-    held, collapsed
-        Unknowns held for a datum; points left out because they ran into a station.
+    held, collapsed, loose
+        Unknowns held for a datum; points left out because they ran into a station or their rays do not
+        determine them; photos left out because their images do not.
     ordering
         The name of the ordering in force.
     datum
@@ -897,13 +896,14 @@ class BlockState:
         unknowns: list[float],
         held: list[int],
         collapsed: list[int],
+        loose: list[int],
         ordering: str,
         datum: _DatumRow | None,
         released: bool,
     ) -> BlockState: ...
     def __getnewargs__(
         self,
-    ) -> tuple[list[float], list[int], list[int], str, _DatumRow | None, bool]: ...
+    ) -> tuple[list[float], list[int], list[int], list[int], str, _DatumRow | None, bool]: ...
 
 @final
 class BlockCovariances:
@@ -1118,10 +1118,24 @@ class BlockSolution(_NetworkSolution):
         """Indices of the images beyond where the lens of their camera is one-to-one, ascending."""
 
     @property
+    def loose_photos(self) -> list[int]:
+        """Indices of the photos that stay as they are because their images do not determine them."""
+
+    @property
+    def weak_points(self) -> list[tuple[int, float, float]]:
+        """Points on nearly parallel rays, or at a station's own place.
+
+        For each its index, the largest of its standard deviations over the smallest (in any directions;
+        infinite where rounding has taken the smallest, NaN without cofactors) and its distance from the
+        nearest station that sees it, in the median of these distances.
+        """
+
+    @property
     def weak(self) -> list[tuple[int, int]]:
         """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
 
-        The sum of squares stood still all the same. Empty where the adjustment ended otherwise.
+        The sum of squares stood still all the same, or the iterations ran out. Empty where the adjustment
+        ended otherwise.
         """
 
     @property
@@ -2023,8 +2037,8 @@ class CollectionNetwork:
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended."""
 
-    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
-        """Prepare for trials without some observations, from where the adjustment has ended."""
+    def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where an adjustment ended, or from the start."""
 
 @final
 class CollectionSolution(_NetworkSolution):
@@ -2045,6 +2059,10 @@ class CollectionSolution(_NetworkSolution):
     @property
     def collapsed(self) -> list[int]:
         """Indices of the points that ran into a station and were left out."""
+
+    @property
+    def not_determined(self) -> list[int]:
+        """Indices of the points that were left out because their rays do not determine them."""
 
     @property
     def sum_of_squares(self) -> float:

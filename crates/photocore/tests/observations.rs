@@ -16,8 +16,8 @@ use photocore::network::observations::{
     Position, Prior, Quantity, Relative,
 };
 use photocore::network::{
-    Camera, Common, CommonKind, Image, Mount, Network, NetworkError, Observation, Options, Photo, Point,
-    Precision, Solution,
+    Camera, Common, CommonKind, Dropped, Image, Mount, Network, NetworkError, Observation, Options, Photo,
+    Point, Precision, Reason, Solution,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -906,8 +906,9 @@ fn points_that_nothing_else_holds_are_named() {
     network.images.push(first);
     network.images.push(Image { photo: PHOTOS, ..first });
     network.observations = vec![distance(1, 2)];
-    let refused = adjust_with(&network, &Options::default(), 1).err();
-    assert_eq!(refused, Some(NetworkError::UndeterminedPoints(vec![0])), "a local point");
+    let found = adjust_with(&network, &Options::default(), 1).unwrap();
+    assert_eq!(found.dropped, [Dropped { point: 0, reason: Reason::NotDetermined }], "a local point");
+    assert!(found.points[0].is_none() && found.points[5].unwrap().cofactors[0][0] > 0.0);
     network.observations = vec![EqualHeight { points: [3, 4], difference: 0.0, sd: 1.0 }.into()];
     network.observations.push(EqualHeight { points: [0, 0], difference: 0.0, sd: 1.0 }.into());
     let refused = adjust_with(&network, &Options::default(), 1).err();

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.ends import behind, folded, rounded, too_coarse, undetermined
+from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
 from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
@@ -345,7 +345,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
         by_reason.setdefault(reason, []).append(block.point_ids[point])
     error = None if solution.undetermined is None else _named(block, *solution.undetermined)
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
-    messages += behind(block, solution) + folded(block, solution)
+    messages += harmful(block, solution) + behind(block, solution) + folded(block, solution)
     messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
     dropped = {block.point_ids[point] for point, _ in solution.dropped}
     lost = [each.name for each in block.observations if dropped.intersection(each.points)]

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram import _photocore
+from photogram.adjustment.undetermined import weak_in_words
 from photogram.errors import AdjustmentError
 from photogram.messages import Message, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 
-__all__ = ["behind", "folded", "hidden", "rounded", "too_coarse", "undetermined"]
+__all__ = ["behind", "folded", "harmful", "hidden", "rounded", "too_coarse", "undetermined"]
 
+NEAR = 1e-3
+"""A point nearer to a station than this part of the median of such distances is at its place."""
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
 
@@ -26,10 +29,47 @@ def undetermined(
         messages.append(Message(f"there are no covariances: {error}"))
     weak = _unknowns(block, solution.weak, solution.weak_cameras, solution.weak_unknowns)
     if weak:
+        ends = "stands still, but" if solution.status == "converged" else "creeps:"
+        words = weak_in_words(block, solution)
         messages.append(
             Message(
-                "the sum of squares stands still, but the observations hardly determine a combination of"
+                f"the sum of squares {ends} the observations hardly determine a combination of"
                 f" unknowns that moves {weak}: other values along it fit as well"
+                + (f" ({words})" if words else "")
+            )
+        )
+    return messages
+
+
+def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+    """Remark on points and photos that hardly hold, and spoil what hangs on them."""
+    near = [(point, distance) for point, _, distance in solution.weak_points if distance < NEAR]
+    flat = [(point, ratio) for point, ratio, distance in solution.weak_points if distance >= NEAR]
+    messages = []
+    if solution.loose_photos:
+        names = listed([block.photo_ids[photo] for photo in solution.loose_photos])
+        messages.append(
+            Message(
+                f"left out, photos that their images do not determine: {names}; their points are too few, or"
+                " lie on a line: they stay where they were given, and their images do not take part"
+            )
+        )
+    if near:
+        names = listed([block.point_ids[point] for point, _ in near])
+        messages.append(
+            Message(
+                f"at a station's own place, {min(distance for _, distance in near):.1g} of the distance of"
+                f" the others and less than {NEAR:g}: points {names}; what their images say of the photos"
+                " drowns what all others say: leave them out"
+            )
+        )
+    if flat:
+        names = listed([block.point_ids[point] for point, _ in flat])
+        messages.append(
+            Message(
+                f"on nearly parallel rays: points {names}; their standard deviations along the rays are up to"
+                f" {max(ratio for _, ratio in flat):.1g} times those across: they say nothing of the"
+                " distance, and redundancy numbers of their images may have lost digits"
             )
         )
     return messages

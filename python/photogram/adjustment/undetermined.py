@@ -9,15 +9,18 @@ import numpy as np
 from photogram.errors import RankError
 from photogram.messages import listed
 from photogram.network.block import Block
+from photogram.network.geometry import viewing_directions
 
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["in_words", "undetermined_combinations"]
+__all__ = ["in_words", "undetermined_combinations", "weak_in_words"]
 
 _DISTANCES = frozenset({"c", "f", "fx", "fy"})
 _POINTS = frozenset({"xp", "yp", "cx", "cy"})
 _DECENTRING = frozenset({"P1", "P2", "p1", "p2", "B1", "B2"})
+_ALONG = 0.8
+"""Cosine of the angle between the view and an axis that is moved along it."""
 _PARTS = {
     "along": "flying heights (positions along the view)",
     "across": "positions across the view",
@@ -85,6 +88,27 @@ def _said(block: Block, moved: tuple[tuple[int, int], ...], poses: tuple[str, ..
     parts += [_PARTS[part] for part in poses]
     words = in_words({name for names in by_camera.values() for name in names}, set(poses))
     return " with ".join(parts) + (f": {words}" if words else "")
+
+
+def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
+    """Say what the combination is that no step could follow to its end; see :func:`in_words`."""
+    names = {block.cameras[camera].names[k] for camera, k in solution.weak_cameras}
+    if block.photo_cameras is not None:
+        cameras = block.photo_cameras.tolist()
+        own = [(cameras[photo], unknown - 6) for photo, unknown in solution.weak if unknown >= 6]
+        names |= {block.cameras[camera].names[k] for camera, k in own}
+    if not names:
+        return ""
+    views = viewing_directions(
+        solution.photo_positions, solution.photo_attitudes, photo_to_ground=block.photo_to_ground
+    )
+    poses = set()
+    for photo, unknown in solution.weak:
+        if unknown < 3:
+            poses.add("along" if abs(views[photo, unknown]) > _ALONG else "across")
+        elif unknown < 6:
+            poses.add("swing" if unknown == 5 else "tilt")
+    return in_words(names, poses)
 
 
 def in_words(names: set[str], poses: set[str]) -> str:

@@ -140,6 +140,10 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
         names = listed([str(point) for point in solution.collapsed])
         messages.append(Message(f"left out, points that ran into the station of a photo: {names}"))
         out[solution.collapsed] = False
+    if solution.not_determined:
+        names = listed([str(point) for point in solution.not_determined])
+        messages.append(Message(f"left out, points that their rays do not determine: {names}"))
+        out[solution.not_determined] = False
     if out.any():
         messages.append(Message(f"left out, points with images on fewer than two photos: {_numbers(out)}"))
     behind = solution.point_rays_behind

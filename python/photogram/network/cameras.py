@@ -116,6 +116,11 @@ class Camera:
         return tuple(name for name, _ in self._facts[1])
 
     @property
+    def powers(self) -> dict[str, int]:
+        """Which power of the unit of image coordinates each parameter has."""
+        return dict(self._facts[1])
+
+    @property
     def constants(self) -> frozenset[str]:
         """Parameters that are never unknown."""
         names, count = self.names, self._facts[2]

@@ -12,6 +12,7 @@ from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.report import problems_of
 from photogram.results.result import Result, SumsByKind
+from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.ways import document_of
 
 if TYPE_CHECKING:
@@ -79,6 +80,10 @@ def _document(result: Result) -> dict[str, Any]:
         "control": _control(result),
         "stations": _stations(result),
         "check_points": _check_points(result),
+        "weakest": {
+            "points": [vars(each) for each in weakest_points(result)],
+            "photos": [vars(each) for each in weakest_photos(result)],
+        },
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
         "ordering": result.ordering,
         "predictions": dict(result.predictions),

@@ -17,6 +17,7 @@ from photogram.results.kinds import kind_lines
 from photogram.results.observed import image_lines, observed_lines
 from photogram.results.result import Result
 from photogram.results.unknowns import unknown_lines
+from photogram.results.weakest import weakest_lines
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.sections import Section, composed, headline, problems, verdict_section
 from photogram.show.ways import report_of
@@ -70,6 +71,7 @@ def report(result: Result) -> str:
         ("Unknowns that observations have in common", unknown_lines(result.unknowns)),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
+        ("Weakest points and photos", weakest_lines(result)),
         ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Work", _work(result)),
     ]

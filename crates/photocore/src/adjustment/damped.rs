@@ -26,13 +26,33 @@ const LEAST_DAMPING: f64 = 1e-5;
 /// With this damping a step follows the gradient; if that does not lower the sum of squares, nothing will.
 const MOST_DAMPING: f64 = 1e9;
 
+/// A full step that changes no unknown by more than this multiple of its standard deviation, and fails, follows a combination that is
+/// so weakly determined that the others bend off the straight line on the way: it is followed along the curve (see
+/// [`Run::along_valley`]).
+const VALLEY: f64 = 30.0;
+/// Parts of such a step that are tried, each half of the one before,
+const PARTS: usize = 4;
+/// and how many steps are taken so in one adjustment at the most: a valley that goes on and on is for the names of its unknowns.
+const MOST_ALONG: usize = 8;
+/// Damping of the steps that lead back to the floor of a valley: it holds what is weak, and lets all else go.
+const HOLDING: f64 = 1e-6;
+/// How many of these steps there are at the most, at each part.
+const BACK: usize = 3;
+/// A part of a step is good when it lowers the sum of squares by this fraction of what the linearized equations predict: where they predict
+/// badly, the combination is determined so weakly that its standard deviation is no measure of a step.
+const GAIN: f64 = 0.5;
+
 /// What the control of the steps remembers from one to the next.
 struct Control {
     stop: Stop,
     /// The lowest sum of squares.
     best: f64,
-    /// What it was when a full step failed last.
-    refused: Option<f64>,
+    /// What it was when a full step failed last, and the unknowns that this has moved most.
+    refused: Option<(f64, Vec<usize>)>,
+    /// Whether that was a step along a valley.
+    in_valley: bool,
+    /// How many have been taken along one.
+    along: usize,
 }
 
 /// The damping after a step that failed.
@@ -59,7 +79,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
         stop: Stop,
     ) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
-        let mut control = Control { stop, best: state.sum_of_squares, refused: None };
+        let mut control =
+            Control { stop, best: state.sum_of_squares, refused: None, in_valley: false, along: 0 };
         while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
             match self.step_from(state, &mut control)? {
                 ControlFlow::Continue(next) => state = next,
@@ -67,6 +88,10 @@ impl<'a, M: Model> Run<'a, '_, M> {
             }
         }
         let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
+        let creeps = control.in_valley && status == Status::NotConverged;
+        if let Some((_, moved)) = control.refused.filter(|_| creeps) {
+            self.weak = moved;
+        }
         self.stay(state, status)
     }
 
@@ -108,11 +133,29 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let highest = if negligible { f64::MAX } else { control.best * (1.0 + ROUNDING) };
         // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
         if !(next.sum_of_squares <= highest && next.factor.deficient_locals.is_empty()) {
+            next.factor.recycle(&self.problem.system);
+            if damping == 0.0 {
+                control.in_valley = change <= VALLEY;
+            }
+            if damping == 0.0
+                && control.in_valley
+                && control.along < MOST_ALONG
+                && let Some((values, sum)) = self.along_valley(&unknowns, &step, change, control.best)?
+            {
+                control.best = sum;
+                control.along += 1;
+                self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &values)?;
+                return self.form(values, 0.0).map(ControlFlow::Continue);
+            }
             return self.refuse(unknowns, damping, control, moved.unwrap_or_default());
         }
         let sum = next.sum_of_squares;
         let decrease = std::mem::replace(&mut control.best, sum) - sum;
         self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &next.unknowns)?;
+        // What harms all others makes full steps fail.
+        if damping > 0.0 && self.has_collapsed(&unknowns, next.equations.at()) {
+            return Ok(ControlFlow::Break(End::at(Status::NotConverged, next.unknowns, None)));
+        }
         if damping == 0.0 && control.stop.at_decrease(decrease, sum) {
             return self.stay(next, Status::Converged).map(ControlFlow::Break);
         }
@@ -128,8 +171,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
         control: &mut Control,
         moved: Vec<usize>,
     ) -> Next<'a, M> {
-        if damping == 0.0 && self.stands_still(&mut control.refused, control.best) {
-            self.weak = moved;
+        if damping == 0.0 && self.stands_still(&mut control.refused, control.best, moved) {
+            self.weak = control.refused.take().map(|(_, moved)| moved).unwrap_or_default();
             let state = self.form(unknowns, 0.0)?;
             return self.stay(state, Status::Converged).map(ControlFlow::Break);
         }
@@ -144,18 +187,54 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// Whether the sum of squares has stood still between two full steps that failed, `refused` at the first and `sum` at the second:
     /// what it still falls by, damped, no unknown is determined well enough to show.
-    fn stands_still(&self, refused: &mut Option<f64>, sum: f64) -> bool {
+    fn stands_still(&self, refused: &mut Option<(f64, Vec<usize>)>, sum: f64, moved: Vec<usize>) -> bool {
         let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
         let least = STILL * (sum / freedom).max(1.0);
-        refused.replace(sum).is_some_and(|before| before - sum <= least)
+        refused.replace((sum, moved)).is_some_and(|(before, _)| before - sum <= least)
     }
 
-    /// Whether a step is negligible itself and, the steps falling at the rate of the last two, all further ones together would be
-    /// well below a limit (Hairer and Wanner 1996, section IV.8).
+    /// Follows a full step that has failed along the valley of the combination that it moves: a part of it, then back to the floor by
+    /// steps so damped that they hold the combination. The values reached and the sum of squares there; None where no part is good.
+    ///
+    /// Principal distance and flying height of a flat block make such a valley: a change that no image shows, as long as points and
+    /// attitudes follow it, and they follow a curve. A step back damped at random crosses the valley to and fro, and creeps.
+    fn along_valley(
+        &mut self,
+        unknowns: &[f64],
+        step: &[f64],
+        change: f64,
+        best: f64,
+    ) -> Result<Option<(Vec<f64>, f64)>, AdjustError> {
+        let mut part = 1.0;
+        for _ in 0..PARTS {
+            let own: Vec<f64> = step.iter().map(|value| part * value).collect();
+            let mut values = self.problem.advanced(unknowns, &own);
+            let predicted = part * (2.0 - part) * change * change;
+            for _ in 0..BACK {
+                let state = self.form(values, HOLDING)?;
+                if !(state.sum_of_squares.is_finite() && state.factor.deficient_locals.is_empty()) {
+                    break;
+                }
+                let before = state.unknowns.clone();
+                let Some(Solved { basis, step, .. }) = self.solve_unless_lost(state)? else { break };
+                basis.factor.recycle(&self.problem.system);
+                values = self.problem.advanced(&before, &step);
+                let sum = self.objective(&values);
+                if best - sum >= GAIN * predicted {
+                    return Ok(Some((values, sum)));
+                }
+            }
+            part /= 2.0;
+        }
+        Ok(None)
+    }
+
+    /// Whether a step is negligible itself and, the steps falling at the rate of the last two, all further ones together would not
+    /// exceed a limit (Hairer and Wanner 1996, section IV.8).
     fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
         let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
         let rate = before.map_or(1.0, |iteration| change / iteration.largest_change);
-        change <= NEGLIGIBLE && rate < 1.0 && rate / (1.0 - rate) * change <= limit / 10.0
+        change <= NEGLIGIBLE && rate < 1.0 && rate / (1.0 - rate) * change <= limit
     }
 
     /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.

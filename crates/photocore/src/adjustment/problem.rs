@@ -239,6 +239,11 @@ impl<'a, M: Model> Linearized<'a, M> {
         Self { problem, prepared, observation_sd: &problem.observation_sd, fixed: None, reweighting: None }
     }
 
+    /// The values that the equations are of, prepared.
+    pub fn at(&self) -> &M::Prepared {
+        &self.prepared
+    }
+
     /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).
     pub fn decrease(&self, pool: &ThreadPool, prior: &Prior, step: &[f64]) -> f64 {
         let layout = self.problem.layout();

@@ -375,6 +375,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
         Ok((found, prior_redundancy))
     }
 
+    /// Whether a step has led local blocks to where they harm all others; keeps them.
+    pub(super) fn has_collapsed(&mut self, before: &[f64], after: &M::Prepared) -> bool {
+        self.collapsed = self.problem.model.collapsed(before, after);
+        !self.collapsed.is_empty()
+    }
+
     /// Keeps an iteration that stands, with its corrections, and tells of it.
     pub(super) fn accept(
         &mut self,

@@ -18,6 +18,10 @@ const ROUNDING: f64 = 1e-14;
 /// and so may be one by which no unknown changes by more than this multiple of its standard deviation.
 const NEGLIGIBLE: f64 = 1e-6;
 
+/// So many steps in a row that lower the sum of squares together by less than one of them must, to go on, follow what nothing determines:
+/// the sum stands still, however much they are damped.
+const PATIENCE: usize = 50;
+
 /// The damping, and by how much the next failure raises it.
 struct Damping {
     value: f64,
@@ -63,10 +67,18 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut state = start;
         let mut lowest = state.sum_of_squares;
         let mut damping = Damping { value: state.damping, rise: 2.0 };
+        let (mut mark, mut steps) = (lowest, 0);
         while self.iterations.len() < self.options.max_iterations {
             if damping.value > MOST_DAMPING {
                 return self.rest(state.unknowns, Status::Diverged);
             }
+            if !stop.at_decrease(mark - lowest, lowest) {
+                (mark, steps) = (lowest, 0);
+            }
+            if steps == PATIENCE {
+                return self.rest(state.unknowns, Status::Converged);
+            }
+            steps += 1;
             let (unknowns, used) = (state.unknowns.clone(), state.damping);
             let Some(solved) = self.solve_unless_lost(state)? else {
                 damping.rise();
@@ -121,8 +133,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let &Trial { sum_of_squares, change: largest_change, .. } = trial;
         let iteration = Iteration { number, sum_of_squares, largest_change, damping };
         self.accept(iteration, before, &trial.unknowns)?;
-        self.collapsed = self.problem.model.collapsed(before, &trial.prepared);
-        let ends = !self.collapsed.is_empty();
+        let ends = self.has_collapsed(before, &trial.prepared);
         Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone(), None)))
     }
 

@@ -68,17 +68,6 @@ impl Camera {
             && self.whitening().is_some()
     }
 
-    /// The diagonal of the weights of the parameters as observations.
-    pub(super) fn weights(&self) -> Vec<f64> {
-        let weight = |&sd: &f64| if sd > 0.0 { sd.powi(2).recip() } else { 0.0 };
-        let mut weights: Vec<f64> = self.sd.iter().map(weight).collect();
-        if let Some(root) = self.whitening() {
-            let of = self.weighted();
-            of.into_iter().enumerate().for_each(|(i, k)| weights[k] = root.column(i).norm_squared());
-        }
-        weights
-    }
-
     /// Redundancy numbers of the parameters as one observation, the diagonal of Qvv S^-1 = I - Q S^-1; None unless it is one.
     pub(super) fn redundancy(&self, cofactors: &[f64]) -> Option<Vec<f64>> {
         let (root, weighted, count) = (self.whitening()?, self.weighted(), self.sd.len());

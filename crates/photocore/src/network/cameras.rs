@@ -1,12 +1,12 @@
 //! Cameras whose parameters are unknown: those of one photo are unknowns of that, those of several are blocks of their own.
 
-use super::model::{Bundle, Station};
+use std::ops::Range;
+
+use super::model::Bundle;
 use super::precision::median;
 use super::problem::Assembled;
-use super::{AdjustedPhoto, Image, Network};
-use crate::adjustment::{Adjustment, Model};
-use crate::geometry::camera::each_camera;
-use crate::geometry::{CameraModel, Vector3};
+use super::{AdjustedPhoto, Network};
+use crate::adjustment::{Adjustment, Problem};
 
 /// An adjusted camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,19 +60,20 @@ impl Network {
             }
         };
         let mut cameras: Vec<AdjustedCamera> = self.cameras.iter().map(given).collect();
-        if adjustment.cofactors.is_some() && self.cameras.iter().any(|camera| !camera.is_held()) {
-            self.inform(&mut cameras, model, adjustment, unknowns);
-        }
         for (index, (given, photo)) in self.photos.iter().zip(photos).enumerate() {
             let camera = &mut cameras[given.camera];
             camera.photos += 1;
             camera.images += photo.images;
             if model.has_own_camera(index) {
                 camera.take_over(photo);
+                let own = model.of_block(index);
+                camera.inform(problem, own.start + 6..own.end, adjustment);
             }
         }
         for (shared, &index) in model.shared.iter().enumerate() {
-            cameras[index].take_block(model, model.cameras.len() + shared, adjustment, unknowns);
+            let block = model.cameras.len() + shared;
+            cameras[index].take_block(model, block, adjustment, unknowns);
+            cameras[index].inform(problem, model.of_block(block), adjustment);
         }
         for (camera, given) in cameras.iter_mut().zip(&self.cameras) {
             if let Some(redundancy) = given.redundancy(&camera.cofactors) {
@@ -80,53 +81,6 @@ impl Network {
             }
         }
         cameras
-    }
-
-    /// Adds up the squares of the partials of all images by the parameters of their cameras, and the weights of these.
-    fn inform(
-        &self,
-        cameras: &mut [AdjustedCamera],
-        model: &Bundle,
-        adjustment: &Adjustment,
-        unknowns: &[f64],
-    ) {
-        for (camera, given) in cameras.iter_mut().zip(&self.cameras).filter(|(_, given)| !given.is_held()) {
-            camera.information = given.weights();
-        }
-        let stations = model.prepare(unknowns);
-        for point in 0..model.points.len() {
-            for index in model.start[point]..model.start[point + 1] {
-                let image = &model.images[index];
-                let number = self.photos[image.photo].camera;
-                if self.cameras[number].is_held() {
-                    continue;
-                }
-                let Station { orientation, camera } = &stations.photos[image.photo];
-                let u = orientation.sight(&stations.points[point]);
-                let weight = adjustment.weights.as_ref().map_or(1.0, |weights| weights[index]);
-                let (sd, sums) = (&self.cameras[number].sd, &mut cameras[number].information);
-                each_camera!(camera, camera => add_squares(camera, &u, image, weight, sd, sums));
-            }
-        }
-    }
-}
-
-/// Adds the squares of the partials of an image, straight as its ray is, by the parameters of its camera that are not held.
-fn add_squares<C: CameraModel>(
-    camera: &C,
-    u: &Vector3,
-    image: &Image,
-    weight: f64,
-    sd: &[f64],
-    sums: &mut [f64],
-) {
-    let (_, computed) = camera.compare(u, image.xy);
-    for (partials, image_sd) in computed.by_parameters.iter().zip(image.sd) {
-        for ((sum, partial), sd) in sums.iter_mut().zip(partials.as_ref()).zip(sd) {
-            if *sd > 0.0 {
-                *sum += weight * (partial / image_sd).powi(2);
-            }
-        }
     }
 }
 
@@ -171,6 +125,16 @@ impl AdjustedCamera {
         self.redundancy = photo.redundancy[6..].to_vec();
         self.cofactors =
             photo.cofactors.chunks_exact(width).skip(6).flat_map(|row| &row[6..]).copied().collect();
+    }
+
+    /// Takes the diagonal of the normal equations of its unknowns; a held one has none.
+    fn inform(&mut self, problem: &Problem<Bundle>, unknowns: Range<usize>, adjustment: &Adjustment) {
+        let Some(all) = &adjustment.cofactors else { return };
+        let first = problem.layout().all_kept().start;
+        let of = |unknown: usize| {
+            if problem.sd[unknown] == 0.0 { 0.0 } else { all.information[unknown - first] }
+        };
+        self.information = unknowns.map(of).collect();
     }
 
     /// Takes what was found of a kept block of its own.

@@ -19,8 +19,10 @@ pub struct State {
     pub unknowns: Vec<f64>,
     /// Those of them that were held for a datum.
     pub held: Vec<usize>,
-    /// Points that were left out because they ran into a station, ascending.
+    /// Points that were left out because they ran into a station, or their rays do not determine them, ascending.
     pub collapsed: Vec<usize>,
+    /// Photos that were left out because their images do not determine them, ascending.
+    pub loose: Vec<usize>,
     /// The ordering in force.
     pub ordering: Ordering,
     /// The datum that it was taken to since; None for that of what was held, or of the observations.
@@ -255,7 +257,11 @@ impl Network {
             *left_out.get_mut(point).ok_or(NetworkError::State)? = true;
         }
         let options = Options { ordering: state.ordering, ..*options };
-        let screened = self.screen(&left_out);
+        let mut loose = vec![false; self.photos.len()];
+        for &photo in &state.loose {
+            *loose.get_mut(photo).ok_or(NetworkError::State)? = true;
+        }
+        let screened = self.screen(&left_out, &loose);
         let assembled = pool.install(|| self.assemble(&options, screened, None))?;
         let count = assembled.problem.layout().unknowns();
         if state.unknowns.len() != count || state.held.iter().any(|&unknown| unknown >= count) {

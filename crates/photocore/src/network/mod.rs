@@ -74,6 +74,7 @@ mod solution;
 mod start;
 mod suspects;
 mod trial;
+mod weak_points;
 mod weighted_angles;
 
 use std::ops::ControlFlow;
@@ -101,6 +102,7 @@ pub use solution::{AdjustedPhoto, AdjustedPoint, Redundancies, Solution, SumsOfS
 pub(crate) use start::meet;
 pub use suspects::Subject;
 pub use trial::{OnPoint, Out, Prediction, Standing, Tests, Trial};
+pub use weak_points::WeakPoint;
 
 /// A photo as it is known beforehand.
 #[derive(Debug, Clone, Copy)]
@@ -324,12 +326,18 @@ impl Network {
     ) -> Result<Solution, NetworkError> {
         self.check()?;
         let mut left_out = vec![false; self.points.len()];
+        let mut loose = vec![false; self.photos.len()];
+        let mut harmful: Vec<Dropped> = Vec::new();
         for &point in start.iter().flat_map(|state| &state.collapsed) {
             *left_out.get_mut(point).ok_or(NetworkError::State)? = true;
         }
+        for &photo in start.iter().flat_map(|state| &state.loose) {
+            *loose.get_mut(photo).ok_or(NetworkError::State)? = true;
+        }
+        let mut start = start;
         let mut before: Option<(Adjustment, problem::Reached)> = None;
         loop {
-            let screened = self.screen(&left_out);
+            let screened = self.screen(&left_out, &loose);
             if screened.points.is_empty() {
                 return Err(NetworkError::Empty);
             }
@@ -344,6 +352,18 @@ impl Network {
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
             let adjusted = adjustment::adjust(problem, &own, pool, watch);
+            if let Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) = &adjusted {
+                let (points, photos) = (assembled.few_points(error), assembled.few_photos(error));
+                if !(points.is_empty() && photos.is_empty()) {
+                    // They have led the others astray: these begin again.
+                    points.iter().for_each(|&point| left_out[point] = true);
+                    photos.iter().for_each(|&photo| loose[photo] = true);
+                    let reason = Reason::NotDetermined;
+                    harmful.extend(points.into_iter().map(|point| Dropped { point, reason }));
+                    start = None;
+                    continue;
+                }
+            }
             let named = |error| self.name(NetworkError::new(error, &assembled), &assembled, pool);
             let mut adjusted = adjusted.map_err(named)?;
             let earlier = before.take();
@@ -360,12 +380,34 @@ impl Network {
                 solution.minimal_control = minimal;
                 solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
                 solution.lost_digits = lost;
+                solution.dropped.extend(harmful);
+                solution.dropped.sort_unstable_by_key(|dropped| dropped.point);
                 return Ok(solution);
             }
-            adjusted.collapsed.iter().for_each(|&point| left_out[assembled.points[point]] = true);
+            for &point in &adjusted.collapsed {
+                let point = assembled.points[point];
+                left_out[point] = true;
+                harmful.push(Dropped { point, reason: Reason::RanIntoStation });
+            }
             let reached = assembled.reached(&adjusted.unknowns, self.points.len());
             before = Some((adjusted, reached));
         }
+    }
+
+    /// The problem of the network as it is given.
+    fn assembled_first(
+        &self,
+        options: &Options,
+        pool: &ThreadPool,
+    ) -> Result<problem::Assembled, NetworkError> {
+        self.check()?;
+        let screened = self.screen(&vec![false; self.points.len()]);
+        if screened.points.is_empty() {
+            return Err(NetworkError::Empty);
+        }
+        let assembled = pool.install(|| self.assemble(options, screened, None))?;
+        assembled.check_memory(options)?;
+        Ok(assembled)
     }
 
     /// Refuses photos that cannot carry a datum.

@@ -10,7 +10,7 @@ use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
 use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start, State};
-use crate::adjustment::{Method, Model, Problem};
+use crate::adjustment::{AdjustError, Method, Model, Problem};
 use crate::geometry::{
     Matrix3, ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, local_vertical, nearest_turns,
 };
@@ -24,6 +24,8 @@ pub(super) struct Assembled {
     pub points: Vec<usize>,
     /// Those that do not.
     pub dropped: Vec<Dropped>,
+    /// The photos that stay where they are because their images do not determine them.
+    pub loose: Vec<usize>,
 }
 
 /// Values from which an adjustment goes on: of all points, and of the unknowns of photos and shared cameras.
@@ -31,6 +33,9 @@ pub(super) struct Reached {
     points: Vec<[f64; 3]>,
     stations: Vec<f64>,
 }
+
+/// Points and photos that are not determined are few where there are so many times as many.
+const FEW: usize = 10;
 
 impl Assembled {
     /// Refuses what takes more memory than it may.
@@ -40,6 +45,33 @@ impl Assembled {
             Some(available) if needed > available => Err(NetworkError::Memory { needed, available }),
             _ => Ok(()),
         }
+    }
+
+    /// The points that an adjustment has ended with because their rays do not determine them, where they are so few that the others make
+    /// up a network without them: indices into it. None where observations beside images touch them.
+    pub fn few_points(&self, error: &AdjustError) -> Vec<usize> {
+        let AdjustError::UndeterminedLocals(locals) = error else { return vec![] };
+        let free = |&local: &usize| self.problem.model.points[local].held() == [false; 3];
+        let few = FEW * locals.len() <= self.problem.model.locals && locals.iter().all(free);
+        if few { locals.iter().map(|&local| self.points[local]).collect() } else { vec![] }
+    }
+
+    /// The photos that an adjustment has ended with because their images do not determine them, each by itself, where they are few.
+    pub fn few_photos(&self, error: &AdjustError) -> Vec<usize> {
+        let AdjustError::Undetermined(combinations) = error else { return vec![] };
+        let model = &self.problem.model;
+        let alone = |blocks: &Vec<usize>| match blocks[..] {
+            [block] => (block < model.cameras.len() && model.images_on[block] > 0).then_some(block),
+            _ => None,
+        };
+        let Some(mut photos) = combinations.iter().map(alone).collect::<Option<Vec<usize>>>() else {
+            return vec![];
+        };
+        photos.sort_unstable();
+        photos.dedup();
+        let is_frame = |photo: usize| model.mounts.iter().flatten().any(|mount| mount.frame == photo);
+        let few = FEW * photos.len() <= model.cameras.len() && !photos.iter().any(|&photo| is_frame(photo));
+        if few { photos } else { vec![] }
     }
 
     /// Begins where an adjustment has ended.
@@ -155,7 +187,9 @@ impl Network {
         // A frame is used when a photo on it is.
         let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
         self.mounts.iter().for_each(|mount| used[mount.frame] |= images_on[mount.photo] > 0);
-        let unused = |photo: usize| options.hold_unused && !used[photo];
+        let loose = screened.loose.clone();
+        let unused =
+            |photo: usize| !used[photo] && (options.hold_unused || loose.binary_search(&photo).is_ok());
         if reached.is_none() {
             self.check_rounding(&screened, |photo| !unused(photo))?;
         }
@@ -203,16 +237,17 @@ impl Network {
         let places = [centres, cameras, commons, tied].concat();
         let of_images = model.images.iter().flat_map(|image| image.sd);
         let of_ties = model.observations.iter().flat_map(|tied| vec![1.0; tied.root.nrows()]);
+        let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
         let problem = Problem {
             observation_sd: of_images.chain(of_ties).collect(),
-            system: System::new(layout(&model, places)?, options.ordering),
+            system: System::new(layout(&model, places)?.with_held(&held), options.ordering),
             initial,
             prior,
             sd,
             model,
         };
         self.check_observations(&problem)?;
-        Ok(Assembled { problem, points: screened.points, dropped: screened.dropped })
+        Ok(Assembled { problem, points: screened.points, dropped: screened.dropped, loose: screened.loose })
     }
 
     /// Refuses observations that cannot be computed from the initial values.

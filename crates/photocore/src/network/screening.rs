@@ -11,7 +11,7 @@ pub struct Dropped {
     pub reason: Reason,
 }
 
-/// Why a point was left out (GIANT guide, sections 6 and 11).
+/// Why a point was left out: the first three before the adjustment (GIANT guide, sections 6 and 11), the others because of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
     /// It has no image.
@@ -20,6 +20,10 @@ pub enum Reason {
     PassPointOnOnePhoto,
     /// A control point on one photo only, with more than one component not held.
     ControlPointOnOnePhoto,
+    /// The iterations have led it to the station of a photo that sees it, where it would harm all others.
+    RanIntoStation,
+    /// Its rays do not determine it: they are parallel, or one and the same.
+    NotDetermined,
 }
 
 impl Reason {
@@ -29,6 +33,8 @@ impl Reason {
             Reason::NotPhotographed => "not photographed",
             Reason::PassPointOnOnePhoto => "pass point on one photo",
             Reason::ControlPointOnOnePhoto => "control point on one photo",
+            Reason::RanIntoStation => "ran into the station of a photo",
+            Reason::NotDetermined => "its rays do not determine it",
         }
     }
 }
@@ -39,9 +45,9 @@ impl Network {
     /// A point on one photo stays when at most one of its components is not held: then there are at least four equations for
     /// three unknowns (specification, open point 21).
     ///
-    /// Points that observations touch stand behind all others.
-    pub(super) fn screen(&self, left_out: &[bool]) -> Screened {
-        let all = self.point_images();
+    /// Points that observations touch stand behind all others. Images on `loose` photos do not take part.
+    pub(super) fn screen(&self, left_out: &[bool], loose: &[bool]) -> Screened {
+        let all = self.point_images(loose);
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
         for point in self.along_curve(&all).into_iter().filter(|&point| !left_out[point]) {
             match self.reason(point, all.of(point)) {
@@ -65,7 +71,8 @@ impl Network {
             images.order.extend(all.of(point));
             images.start.push(images.order.len());
         }
-        Screened { points, locals, images, observations, dropped }
+        let loose = (0..loose.len()).filter(|&photo| loose[photo]).collect();
+        Screened { points, locals, images, observations, dropped, loose }
     }
 
     /// Why a point with the given images does not take part; None where it does.
@@ -93,15 +100,16 @@ impl Network {
         (0..self.observations.len()).filter(all_there).collect()
     }
 
-    /// The images of every point.
-    fn point_images(&self) -> PointImages {
+    /// The images of every point, but for those on loose photos.
+    fn point_images(&self, loose: &[bool]) -> PointImages {
         let mut start = vec![0; self.points.len() + 1];
-        self.images.iter().for_each(|image| start[image.point + 1] += 1);
+        let taken = |image: &super::Image| !loose[image.photo];
+        self.images.iter().filter(|image| taken(image)).for_each(|image| start[image.point + 1] += 1);
         for point in 0..self.points.len() {
             start[point + 1] += start[point];
         }
-        let (mut next, mut order) = (start.clone(), vec![0; self.images.len()]);
-        for (index, image) in self.images.iter().enumerate() {
+        let (mut next, mut order) = (start.clone(), vec![0; start[self.points.len()]]);
+        for (index, image) in self.images.iter().enumerate().filter(|(_, image)| taken(image)) {
             order[next[image.point]] = index;
             next[image.point] += 1;
         }
@@ -124,6 +132,8 @@ pub(super) struct Screened {
     pub images: PointImages,
     pub observations: Vec<usize>,
     pub dropped: Vec<Dropped>,
+    /// The photos whose images do not take part, ascending: they stay where they are.
+    pub loose: Vec<usize>,
 }
 
 /// The images of the points that take part, point by point: those of the i-th are `order[start[i]..start[i + 1]]`.

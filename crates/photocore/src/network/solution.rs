@@ -8,7 +8,7 @@ use super::model::{Owner, Placed, Station};
 use super::problem::Assembled;
 use super::{
     AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
-    Point, State, UnitVariance,
+    Point, State, UnitVariance, WeakPoint,
 };
 use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
@@ -132,8 +132,10 @@ pub struct Solution {
     pub datum: Vec<(usize, usize)>,
     /// The points that were left out at first.
     pub dropped: Vec<Dropped>,
-    /// The points that were left out because they ran into a station, ascending.
+    /// The points that were left out because they ran into a station, or their rays do not determine them, ascending.
     pub collapsed: Vec<usize>,
+    /// The points on nearly parallel rays, or at a station's own place.
+    pub weak_points: Vec<WeakPoint>,
     /// Weighted sums of squares.
     pub sums_of_squares: SumsOfSquares,
     /// Sums of redundancy numbers; None where there are no cofactors.
@@ -196,6 +198,7 @@ impl Solution {
             observations,
             behind: vec![],
             folded: vec![],
+            weak_points: vec![],
             undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, assembled)),
             weak: adjustment.weak.iter().filter_map(of_photo).collect(),
             weak_cameras: adjustment.weak.iter().filter_map(|&unknown| of_camera(problem, unknown)).collect(),
@@ -206,6 +209,7 @@ impl Solution {
                 unknowns: vec![],
                 held: adjustment.datum.clone(),
                 collapsed: collapsed.clone(),
+                loose: assembled.loose.clone(),
                 ordering: adjustment.ordering,
                 datum: None,
                 released: false,
@@ -219,27 +223,38 @@ impl Solution {
             variance_of_unit_weight,
             adjustment,
         };
-        solution.find_behind(assembled, &unknowns);
+        let squares = solution.find_behind(assembled, &unknowns);
+        let (model, points) = (&problem.model, &assembled.points[..]);
+        solution.weak_points = network.weak_points(model, points, &solution.points, &squares);
         solution.state.unknowns = unknowns;
         solution.adjustment.cofactors = None;
         solution.adjustment.release_observations();
         solution
     }
 
-    /// Finds the images whose point stands behind the camera, or beyond where its lens ends.
-    fn find_behind(&mut self, Assembled { problem, points, .. }: &Assembled, unknowns: &[f64]) {
+    /// Finds the images whose point stands behind the camera, or beyond where its lens ends; returns the squares of the distances of the
+    /// points from the nearest station.
+    fn find_behind(&mut self, Assembled { problem, points, .. }: &Assembled, unknowns: &[f64]) -> Vec<f64> {
         let model = &problem.model;
         let photos = model.photos(&unknowns[model.of_stations()]);
-        let folds: Vec<f64> = photos.iter().map(|station| station.camera.fold()).collect();
+        let mut of_shared = vec![None; model.stations()];
+        let fold = |(station, block): (&Station, &Option<usize>)| match *block {
+            None => station.camera.fold(),
+            Some(block) => *of_shared[block].get_or_insert_with(|| station.camera.fold()),
+        };
+        let mut squares = Vec::with_capacity(points.len());
+        let folds: Vec<f64> = photos.iter().zip(&model.camera_block).map(fold).collect();
         for ((&point, &at), images) in
             points.iter().zip(model.coordinates(unknowns)).zip(model.start.windows(2))
         {
             let position = model.space.cartesian(at);
             let before = self.behind.len();
+            let mut nearest = f64::INFINITY;
             for image in images[0]..images[1] {
                 let super::Image { photo, xy, .. } = model.images[image];
                 let Station { orientation, camera } = &photos[photo];
                 let u = orientation.pose().sight(&position);
+                nearest = nearest.min(u.norm_squared());
                 if !camera.faces(&u) {
                     self.behind.push(model.order[image]);
                 }
@@ -250,9 +265,11 @@ impl Solution {
             if let Some(point) = &mut self.points[point] {
                 point.behind = self.behind.len() - before;
             }
+            squares.push(nearest);
         }
         self.behind.sort_unstable();
         self.folded.sort_unstable();
+        squares
     }
 }
 

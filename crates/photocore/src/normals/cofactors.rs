@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use pulp::Simd;
 use rayon::prelude::*;
+use smallvec::{SmallVec, smallvec};
 
 use super::equations::{Equations, Prior};
 use super::incidence::Stacks;
@@ -12,7 +13,7 @@ use super::selected::SelectedInverse;
 use super::stack::{Part, Slot, Stack, dot};
 use super::system::System;
 use super::tie_equations::TieEquations;
-use super::vectorised::{Kernel, Rows, run, size};
+use super::vectorised::{Kernel, LANES, Rows, copy_vectors, run, size};
 use super::watch::Control;
 use super::workspace::zeros;
 
@@ -36,6 +37,9 @@ pub struct Cofactors {
     pub pairs: Vec<f64>,
     /// What the equations of each group have to do with each other, where that was asked for.
     pub groups: Option<GroupCofactors>,
+    /// Diagonal of the normal equations of the unknowns of all kept blocks before any elimination, priors counted: the reciprocal cofactor
+    /// that each would have if all other unknowns were known.
+    pub information: Vec<f64>,
 }
 
 /// What the equations a of each group have to do with each other. All blocks are square, row by row, one after the other.
@@ -50,12 +54,14 @@ pub struct GroupCofactors {
 }
 
 impl Cofactors {
-    /// Puts together what was found at each supernode, and last for the local blocks without equations; None without memory.
+    /// Puts together what was found at each supernode, and last for the local blocks without equations, with the information; None
+    /// without memory.
     pub(super) fn collect(
         system: &System,
         control: &Control,
         inverse: &SelectedInverse,
         found: &[AtHome],
+        information: Vec<f64>,
     ) -> Option<Self> {
         let layout = &system.layout;
         let (rows, l) = (layout.rows(), layout.local_dim());
@@ -97,7 +103,7 @@ impl Cofactors {
             border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
             kept_border = blocks.filter_map(|block| inverse.block(block, layout.kept())).flatten().collect();
         }
-        Some(Self { local, kept, border, kept_border, equations, ties, pairs, groups: None })
+        Some(Self { local, kept, border, kept_border, equations, ties, pairs, groups: None, information })
     }
 }
 
@@ -245,7 +251,8 @@ impl Others {
             self.strips.push((row, self.width, width));
             self.width += width;
         }
-        self.inverse.resize(self.width * self.width, 0.0);
+        // Products read beyond the end.
+        self.inverse.resize(self.width * self.width + LANES, 0.0);
         for &(from_column, to_column, columns) in &self.strips {
             for k in 0..columns {
                 let source = &front[(from_column + k) * height..][..height];
@@ -264,14 +271,15 @@ impl Others {
     }
 
     #[inline(always)]
-    fn cofactors_of<const R: usize, const L: usize, const D: usize>(
+    fn cofactors_of<S: Simd, const R: usize, const L: usize, const D: usize>(
         &mut self,
+        simd: S,
         stack: &Stack,
         t: usize,
         rows: usize,
         found: &mut AtHome,
     ) {
-        self.multiply::<L, D>(stack, t);
+        self.multiply::<S, L, D>(simd, stack, t);
         let width = self.width;
         let mut own = [[0.0; L]; L];
         for a in 0..L {
@@ -291,7 +299,8 @@ impl Others {
         for (slot, &(_, start, _)) in stack.slots.iter().zip(&self.strips) {
             for (k, p) in slot.groups.clone().enumerate() {
                 for row in 0..size::<R>(rows) {
-                    found.equations.push(self.equation::<R, L, D>(
+                    found.equations.push(self.equation::<S, R, L, D>(
+                        simd,
                         stack,
                         slot,
                         start,
@@ -376,8 +385,9 @@ impl Others {
 
     /// a Q a^T of one row of group `k` of a slot, `p` of the pattern, for local block `t` of the stack.
     #[inline(always)]
-    fn equation<const R: usize, const L: usize, const D: usize>(
+    fn equation<S: Simd, const R: usize, const L: usize, const D: usize>(
         &self,
+        simd: S,
         stack: &Stack,
         slot: &Slot,
         start: usize,
@@ -389,20 +399,54 @@ impl Others {
         let a = &stack.local_rows::<L>(t, p, rows)[row];
         let at = (t * slot.groups.len() + k) * rows + row;
         let kept = (start, &stack.slot_rows::<D>(slot, rows).rows.values[at * dim..][..dim]);
-        let mut q = self.product(kept, kept);
-        for d in 0..L {
-            let tied = dot(&self.hq[d * self.width + start..][..dim], kept.1);
-            q += a[d] * (dot(&own[d], a) - 2.0 * tied);
+        let mut q: f64 = (0..L).map(|d| a[d] * dot(&own[d], a)).sum();
+        q += self.tied::<S, L>(simd, a, &[], kept);
+        if !stack.parts(p).is_empty() {
+            let mut strips: SmallVec<[_; 4]> = smallvec![kept];
+            for part in stack.parts(p) {
+                let common = self.common(stack, (t, p, row), rows, part);
+                q += self.tied::<S, L>(simd, a, &strips, common);
+                strips.push(common);
+            }
         }
-        for (index, part) in stack.parts(p).iter().enumerate() {
-            let common = self.common(stack, (t, p, row), rows, part);
-            q += self.product(common, common) + 2.0 * self.product(kept, common);
+        q
+    }
+
+    /// What coefficients x of other unknowns, from a place on, add to a Q a^T: (x Q + 2 y Q - 2 a_l H Q) x^T, y those that were added
+    /// before.
+    #[inline(always)]
+    fn tied<S: Simd, const L: usize>(
+        &self,
+        simd: S,
+        a: &[f64; L],
+        before: &[(usize, &[f64])],
+        (start, x): (usize, &[f64]),
+    ) -> f64 {
+        let mut q = 0.0;
+        for first in (0..x.len()).step_by(LANES) {
+            let column = start + first;
+            let mut sums = [simd.splat_f64s(0.0); LANES];
+            let mut add = |from: &[f64], factor: f64| {
+                let vectors = S::as_simd_f64s(&from[..LANES]).0;
+                let factor = simd.splat_f64s(factor);
+                for k in 0..LANES / S::F64_LANES {
+                    sums[k] = simd.mul_add_f64s(vectors[k], factor, sums[k]);
+                }
+            };
             for d in 0..L {
-                q -= 2.0 * a[d] * dot(&self.hq[d * self.width + common.0..][..common.1.len()], common.1);
+                add(&self.hq[d * self.width + column..], -2.0 * a[d]);
             }
-            for other in &stack.parts(p)[..index] {
-                q += 2.0 * self.product(common, self.common(stack, (t, p, row), rows, other));
+            for &(other, y) in before {
+                for (i, value) in y.iter().enumerate() {
+                    add(&self.inverse[(other + i) * self.width + column..], 2.0 * value);
+                }
             }
+            for (i, value) in x.iter().enumerate() {
+                add(&self.inverse[(start + i) * self.width + column..], *value);
+            }
+            let mut values = [0.0; LANES];
+            copy_vectors::<S>(&sums, &mut values);
+            q += dot(&values, &x[first..]);
         }
         q
     }
@@ -425,7 +469,7 @@ impl Others {
 
     /// Computes H = L^-T V and its product with the inverse, for local block `t` of the stack.
     #[inline(always)]
-    fn multiply<const L: usize, const D: usize>(&mut self, stack: &Stack, t: usize) {
+    fn multiply<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, stack: &Stack, t: usize) {
         let width = self.width;
         self.h.resize(L * width, 0.0);
         let slots = stack.slots.iter().map(|slot| stack.slot_coupling::<L, D>(slot));
@@ -437,15 +481,21 @@ impl Others {
             }
         }
         stack.triangles[t].backward::<L>(&mut self.h, width);
-        self.hq.clear();
-        self.hq.resize(L * width, 0.0);
-        for (i, q) in self.inverse.chunks_exact(width.max(1)).enumerate() {
-            for d in 0..L {
-                let value = self.h[d * width + i];
-                let sums = &mut self.hq[d * width..][..width];
-                for k in 0..width {
-                    sums[k] += value * q[k];
+        self.hq.resize(L * width + LANES, 0.0);
+        for first in (0..width).step_by(LANES) {
+            let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
+            for i in 0..width {
+                let vectors = S::as_simd_f64s(&self.inverse[i * width + first..][..LANES]).0;
+                for d in 0..L {
+                    let factor = simd.splat_f64s(self.h[d * width + i]);
+                    for k in 0..LANES / S::F64_LANES {
+                        sums[d][k] = simd.mul_add_f64s(vectors[k], factor, sums[d][k]);
+                    }
                 }
+            }
+            let count = LANES.min(width - first);
+            for d in 0..L {
+                copy_vectors::<S>(&sums[d], &mut self.hq[d * width + first..][..count]);
             }
         }
     }
@@ -467,9 +517,9 @@ struct Find<'a> {
 
 impl Kernel for Find<'_> {
     #[inline(always)]
-    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
         for t in 0..self.stack.locals.len() {
-            self.others.cofactors_of::<R, L, D>(self.stack, t, self.rows, self.found);
+            self.others.cofactors_of::<S, R, L, D>(simd, self.stack, t, self.rows, self.found);
         }
     }
 }

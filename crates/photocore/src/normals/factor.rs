@@ -385,6 +385,17 @@ impl Factor {
         found
     }
 
+    /// Diagonal of the normal equations of the unknowns of kept blocks before any elimination, in the order of the layout.
+    pub(super) fn information(&self, layout: &Layout) -> Vec<f64> {
+        let kept = layout.all_kept();
+        let mut information = vec![0.0; kept.len()];
+        let diagonal = self.unknowns(layout).zip(&self.diagonal);
+        diagonal
+            .filter(|(unknown, _)| kept.contains(unknown))
+            .for_each(|(unknown, &n)| information[unknown - kept.start] = n);
+        information
+    }
+
     /// The corrections of the unknowns that are not local, in the order of the layout.
     pub fn reduced_corrections(&self, layout: &Layout) -> Vec<f64> {
         let (first, mut x) = (layout.all_locals().end, self.right.clone());

@@ -5,7 +5,7 @@ use std::ops::Range;
 use pulp::Simd;
 
 use super::panels::skip;
-use super::vectorised::{Rows, add_difference, add_product, size};
+use super::vectorised::{Rows, add_difference, add_product, add_products, add_right};
 
 /// A front: the columns of a supernode, and what their elimination will leave for the parent. Rows and columns are those of the
 /// supernode's panel, its own blocks before the coupled ones. Lower triangles; what stands above carries no meaning.
@@ -137,29 +137,30 @@ impl Columns<'_> {
         }
     }
 
-    /// Adds `sign` A^T b to the right-hand side.
+    /// Adds several products, each with its sign, in the rows of their A and the columns of their B: those of the first.
     #[inline(always)]
-    pub fn add_right<const D: usize>(&mut self, sign: f64, a: Strip<'_>, b: &[f64]) {
-        let (width, stride) = (size::<D>(a.rows.width), size::<D>(a.rows.stride));
-        let target = &mut self.right[a.at - self.columns.start..][..width];
-        for row in 0..a.rows.count {
-            let (values, factor) = (&a.rows.values[row * stride..][..width], sign * b[row]);
-            for k in 0..width {
-                target[k] += factor * values[k];
-            }
-        }
+    pub fn add_products<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        products: [(f64, Strip<'_>, Strip<'_>); N],
+    ) {
+        let Some(&(_, a, b)) = products.first() else { return };
+        let (target, stride) = self.target(a.at, b.at);
+        add_products(simd, target, stride, products.map(|(sign, a, b)| (sign, a.rows, b.rows)));
     }
 
-    /// Adds the squares of the elements of A to the diagonal before elimination.
+    /// Adds A^T b to the right-hand side, and the squares of the elements of A to the diagonal before elimination.
     #[inline(always)]
-    pub fn add_diagonal<const D: usize>(&mut self, a: Strip<'_>) {
-        let (width, stride) = (size::<D>(a.rows.width), size::<D>(a.rows.stride));
-        let target = &mut self.diagonal[a.at - self.columns.start..][..width];
-        for row in 0..a.rows.count {
-            let values = &a.rows.values[row * stride..][..width];
-            for k in 0..width {
-                target[k] += values[k] * values[k];
-            }
-        }
+    pub fn add_equations<S: Simd>(&mut self, simd: S, a: Strip<'_>, b: &[f64]) {
+        let own = a.at - self.columns.start..a.at - self.columns.start + a.rows.width;
+        let diagonal = Some(&mut self.diagonal[own.clone()]);
+        add_right(simd, &mut self.right[own], diagonal, 1.0, a.rows, b);
+    }
+
+    /// Takes A^T b off the right-hand side.
+    #[inline(always)]
+    pub fn subtract_right<S: Simd>(&mut self, simd: S, a: Strip<'_>, b: &[f64]) {
+        let own = a.at - self.columns.start..a.at - self.columns.start + a.rows.width;
+        add_right(simd, &mut self.right[own], None, -1.0, a.rows, b);
     }
 }

@@ -69,7 +69,8 @@ impl System {
     ) -> ControlFlow<Stopped, Inversion> {
         watched(pool, between, |control| {
             let walk = Walk { system: self, equations, prior, control, by_group };
-            walk.invert(factor.panels)
+            let information = factor.information(&self.layout);
+            walk.invert(factor.panels, information)
         })
     }
 }
@@ -87,7 +88,7 @@ struct Walk<'a, E> {
 
 impl<E: Equations> Walk<'_, E> {
     /// None without memory.
-    fn invert(&self, mut panels: Panels) -> Option<Inversion> {
+    fn invert(&self, mut panels: Panels, information: Vec<f64>) -> Option<Inversion> {
         let symbolic = &*self.system.symbolic;
         let count = symbolic.supernode_count();
         // The front of its parent for each supernode still to be done; a front lives until the last child has taken it.
@@ -111,7 +112,7 @@ impl<E: Equations> Walk<'_, E> {
         }
         found.push(self.at_home(count, &[], 0));
         let selected = SelectedInverse { panels };
-        let mut cofactors = Cofactors::collect(self.system, self.control, &selected, &found)?;
+        let mut cofactors = Cofactors::collect(self.system, self.control, &selected, &found, information)?;
         if self.by_group {
             cofactors.groups = Some(GroupCofactors::collect(self.system, self.control, &found)?);
         }

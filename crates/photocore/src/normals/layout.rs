@@ -33,6 +33,8 @@ pub struct Layout {
     /// Where the square block of the equations of each tie starts; one more at the end.
     block_ptr: Vec<usize>,
     places: Option<Vec<[f64; 3]>>,
+    /// The unknowns of each kept block that are not held, as ranges; empty where none is held anywhere.
+    free: Vec<Vec<Range<usize>>>,
     /// Pairs of kept blocks, ascending, and where the block of each starts among those of all; one more at the end.
     pairs: Vec<[u32; 2]>,
     pair_ptr: Vec<usize>,
@@ -163,6 +165,7 @@ impl Layout {
             tie_ptr: vec![0],
             block_ptr: vec![0],
             places: None,
+            free: Vec::new(),
             pairs: Vec::new(),
             pair_ptr: vec![0],
         })
@@ -236,6 +239,23 @@ impl Layout {
         }
         self.ties = ties;
         Ok(self)
+    }
+
+    /// Says which unknowns are held whatever their equations are asked for: `held` of all unknowns. Their coefficients, which must be zero,
+    /// are left out of the products of what groups have in common with others.
+    pub fn with_held(mut self, held: &[bool]) -> Self {
+        let of_kept = held.get(self.all_kept()).unwrap_or_default();
+        if of_kept.contains(&true) {
+            self.free = (0..self.kept()).map(|block| free_ranges(&held[self.kept_range(block)])).collect();
+        }
+        self
+    }
+
+    /// The unknowns of a kept block that are not held, counted from its first, as ranges.
+    pub(super) fn free_of(&self, block: usize) -> impl Iterator<Item = Range<usize>> + '_ {
+        let known = self.free.get(block);
+        let all = known.is_none().then(|| 0..self.kept_dim(block));
+        known.into_iter().flatten().cloned().chain(all)
     }
 
     /// Asks for the cofactors of pairs of kept blocks, the first of which have the rows; those are found that some equations touch
@@ -432,4 +452,16 @@ impl Layout {
     pub fn border_range(&self) -> Range<usize> {
         self.kept_offset[self.kept()]..self.unknowns()
     }
+}
+
+/// The runs of what is not held.
+fn free_ranges(held: &[bool]) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for k in (0..held.len()).filter(|&k| !held[k]) {
+        match ranges.last_mut().filter(|last| last.end == k) {
+            Some(last) => last.end += 1,
+            None => ranges.push(k..k + 1),
+        }
+    }
+    ranges
 }

@@ -2,6 +2,10 @@
 
 use std::cmp::Ordering::Greater;
 
+use pulp::Simd;
+
+use super::vectorised::LANES;
+
 /// A pivot smaller than this fraction of its diagonal element before elimination is rounding error: the unknown is not determined.
 /// What rounding leaves of a zero pivot is some tens of units in the last place; weights that alone make a datum (GIANT's default
 /// of 60000 m for a station) leave ten times this and more.
@@ -49,6 +53,21 @@ impl Triangle {
                 subtract_row(row, self.values[a][b], &above[b * width..][..width]);
             }
             row.iter_mut().for_each(|value| *value *= self.values[a][a]);
+        }
+    }
+
+    /// The same of N rows in vectors.
+    #[inline(always)]
+    pub fn forward_vectors<S: Simd, const N: usize>(&self, simd: S, rows: &mut [[S::f64s; LANES]; N]) {
+        for k in 0..LANES / S::F64_LANES {
+            for a in 0..N {
+                let mut value = rows[a][k];
+                for b in 0..a {
+                    let factor = simd.splat_f64s(-self.values[a][b]);
+                    value = simd.mul_add_f64s(rows[b][k], factor, value);
+                }
+                rows[a][k] = simd.mul_f64s(value, simd.splat_f64s(self.values[a][a]));
+            }
         }
     }
 

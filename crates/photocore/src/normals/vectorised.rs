@@ -90,20 +90,60 @@ pub(super) fn add_product<S: Simd>(
     a: Rows<'_>,
     b: Rows<'_>,
 ) {
-    for i in (0..a.width).step_by(LANES) {
+    add_products(simd, target, stride, [(sign, a, b)]);
+}
+
+/// The same of several products, summed together before the target is touched; all a have one width, and so have all b.
+#[inline(always)]
+pub(super) fn add_products<S: Simd, const N: usize>(
+    simd: S,
+    target: &mut [f64],
+    stride: usize,
+    products: [(f64, Rows<'_>, Rows<'_>); N],
+) {
+    let Some(&(_, Rows { width: height, .. }, Rows { width, .. })) = products.first() else { return };
+    for i in (0..height).step_by(LANES) {
         let target = &mut target[i..];
         let mut j = 0;
-        while j + TOGETHER <= b.width {
-            add_columns::<S, TOGETHER>(simd, &mut target[j * stride..], stride, sign, a, i, b, j);
-            j += TOGETHER;
+        while j < width {
+            let target = &mut target[j * stride..];
+            // Eight columns are twice four, not six and two that wait for each other.
+            j += match width - j {
+                8 | 4 | 5 => add_columns::<S, N, 4>(simd, target, stride, &products, i, j),
+                3 => add_columns::<S, N, 3>(simd, target, stride, &products, i, j),
+                2 => add_columns::<S, N, 2>(simd, target, stride, &products, i, j),
+                1 => add_columns::<S, N, 1>(simd, target, stride, &products, i, j),
+                _ => add_columns::<S, N, TOGETHER>(simd, target, stride, &products, i, j),
+            };
         }
-        while j + 3 <= b.width {
-            add_columns::<S, 3>(simd, &mut target[j * stride..], stride, sign, a, i, b, j);
-            j += 3;
+    }
+}
+
+/// right += sign times the sum over rows of a[row] b[row], and diagonal, where there is one, the sum of the squares of a.
+#[inline(always)]
+pub(super) fn add_right<S: Simd>(
+    simd: S,
+    right: &mut [f64],
+    diagonal: Option<&mut [f64]>,
+    sign: f64,
+    a: Rows<'_>,
+    b: &[f64],
+) {
+    let mut diagonal = diagonal;
+    for i in (0..a.width).step_by(LANES) {
+        let height = LANES.min(a.width - i);
+        let mut sums = [[simd.splat_f64s(0.0); LANES]; 2];
+        for row in 0..a.count {
+            let vectors = S::as_simd_f64s(&a.values[row * a.stride + i..][..LANES]).0;
+            let factor = simd.splat_f64s(b[row]);
+            for k in 0..LANES / S::F64_LANES {
+                sums[0][k] = simd.mul_add_f64s(vectors[k], factor, sums[0][k]);
+                sums[1][k] = simd.mul_add_f64s(vectors[k], vectors[k], sums[1][k]);
+            }
         }
-        while j < b.width {
-            add_columns::<S, 1>(simd, &mut target[j * stride..], stride, sign, a, i, b, j);
-            j += 1;
+        add_sums::<S, 1>(&mut right[i..], 0, sign, &[sums[0]], height);
+        if let Some(diagonal) = &mut diagonal {
+            add_sums::<S, 1>(&mut diagonal[i..], 0, 1.0, &[sums[1]], height);
         }
     }
 }
@@ -133,21 +173,22 @@ pub(super) fn add_difference<S: Simd>(
     }
 }
 
-/// C columns of the product, and as many rows as there are lanes.
+/// C columns of the products, and as many rows as there are lanes; returns C.
 #[inline(always)]
-fn add_columns<S: Simd, const C: usize>(
+fn add_columns<S: Simd, const N: usize, const C: usize>(
     simd: S,
     target: &mut [f64],
     stride: usize,
-    sign: f64,
-    a: Rows<'_>,
+    products: &[(f64, Rows<'_>, Rows<'_>); N],
     i: usize,
-    b: Rows<'_>,
     j: usize,
-) {
+) -> usize {
     let mut sums = [[simd.splat_f64s(0.0); LANES]; C];
-    sum::<S, C>(simd, &mut sums, 1.0, a, i, b, j, 0..a.count);
-    add_sums::<S, C>(target, stride, sign, &sums, LANES.min(a.width - i));
+    for &(sign, a, b) in products {
+        sum::<S, C>(simd, &mut sums, sign, a, i, b, j, 0..a.count);
+    }
+    add_sums::<S, C>(target, stride, 1.0, &sums, LANES.min(products[0].1.width - i));
+    C
 }
 
 #[inline(always)]
@@ -206,10 +247,18 @@ fn add_sums<S: Simd, const C: usize>(
 ) {
     for c in 0..C {
         let mut values = [0.0; LANES];
-        S::as_mut_simd_f64s(&mut values).0.copy_from_slice(&sums[c][..LANES / S::F64_LANES]);
+        copy_vectors::<S>(&sums[c], &mut values);
         let column = &mut target[c * stride..][..height];
         for k in 0..height {
             column[k] += sign * values[k];
         }
     }
+}
+
+/// Copies the first elements of [`LANES`] ones in vectors.
+#[inline(always)]
+pub(super) fn copy_vectors<S: Simd>(vectors: &[S::f64s; LANES], target: &mut [f64]) {
+    let mut values = [0.0; LANES];
+    S::as_mut_simd_f64s(&mut values).0.copy_from_slice(&vectors[..LANES / S::F64_LANES]);
+    target.copy_from_slice(&values[..target.len()]);
 }

@@ -1,7 +1,7 @@
 //! What an adjustment of a network has found, as arrays.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use photocore::network::{AdjustedCamera, AdjustedPhoto, Solution};
+use photocore::network::{AdjustedCamera, AdjustedPhoto, Reason, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -57,6 +57,12 @@ fn photo_redundancy<'py>(
         }
     }
     PyArray1::from_vec(py, all).reshape([photos.len(), unknowns])
+}
+
+/// The points that were left out for a reason.
+fn left_out(solution: &Solution, reason: Reason) -> Vec<usize> {
+    let own = solution.dropped.iter().filter(|dropped| dropped.reason == reason);
+    own.map(|dropped| dropped.point).collect()
 }
 
 /// Parameters, cofactors row by row, redundancy numbers, diagonal of the normal equations, photos and images of an adjusted camera.
@@ -277,6 +283,16 @@ solution_class! {
         }
 
         #[getter]
+        fn loose_photos(&self) -> Vec<usize> {
+            self.solution.state.loose.clone()
+        }
+
+        #[getter]
+        fn weak_points(&self) -> Vec<(usize, f64, f64)> {
+            self.solution.weak_points.iter().map(|weak| (weak.point, weak.ratio, weak.distance)).collect()
+        }
+
+        #[getter]
         fn weak_unknowns(&self) -> Vec<(usize, usize)> {
             self.solution.weak_commons.clone()
         }
@@ -350,7 +366,12 @@ solution_class! {
 
         #[getter]
         fn collapsed(&self) -> Vec<usize> {
-            self.solution.collapsed.clone()
+            left_out(&self.solution, Reason::RanIntoStation)
+        }
+
+        #[getter]
+        fn not_determined(&self) -> Vec<usize> {
+            left_out(&self.solution, Reason::NotDetermined)
         }
 
         #[getter]

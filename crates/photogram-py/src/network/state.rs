@@ -32,8 +32,8 @@ fn row_of(datum: &NetworkDatum) -> DatumRow {
     (name.to_owned(), points, photos, scale, attitudes, radius)
 }
 
-/// Adjusted unknowns, those held, points left out, ordering, datum, whether control was given up for it.
-type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, String, Option<DatumRow>, bool);
+/// Adjusted unknowns, those held, points and photos left out, ordering, datum, whether control was given up for it.
+type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, Vec<usize>, String, Option<DatumRow>, bool);
 
 /// Where an adjustment has ended.
 #[pyclass(frozen, module = "photogram._photocore")]
@@ -48,17 +48,19 @@ impl BlockState {
         unknowns: Vec<f64>,
         held: Vec<usize>,
         collapsed: Vec<usize>,
+        loose: Vec<usize>,
         ordering: &str,
         datum: Option<DatumRow>,
         released: bool,
     ) -> PyResult<Self> {
         let (ordering, datum) = (named_ordering(ordering)?, datum.map(datum_of).transpose()?);
-        Ok(Self { state: State { unknowns, held, collapsed, ordering, datum, released } })
+        Ok(Self { state: State { unknowns, held, collapsed, loose, ordering, datum, released } })
     }
 
     /// So that results are copied and sent to other processes.
     fn __getnewargs__(&self) -> StateRow {
-        let State { unknowns, held, collapsed, ordering, datum, released } = self.state.clone();
-        (unknowns, held, collapsed, ordering.name().to_owned(), datum.as_ref().map(row_of), released)
+        let State { unknowns, held, collapsed, loose, ordering, datum, released } = self.state.clone();
+        let datum = datum.as_ref().map(row_of);
+        (unknowns, held, collapsed, loose, ordering.name().to_owned(), datum, released)
     }
 }

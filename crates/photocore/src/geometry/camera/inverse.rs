@@ -19,6 +19,9 @@ pub struct RadialLimit {
     pub distorted: f64,
 }
 
+/// Those of the longest N and D.
+pub const ALL_POWERS: [usize; 2] = [6, 3];
+
 /// s(q) = N(q) / D(q) of the square q of a radius r, which becomes r s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RadialFactor {
@@ -38,25 +41,31 @@ impl RadialFactor {
         Self { numerator, denominator: [1.0, 0.0, 0.0, 0.0] }
     }
 
-    /// N, D and their derivatives by q.
+    /// N, D and their derivatives by q; coefficients beyond the given powers are zero.
     #[inline(always)]
-    pub fn at(&self, q: f64) -> [f64; 4] {
-        let (n, by_n) = horner(&self.numerator, q);
-        let (d, by_d) = horner(&self.denominator, q);
+    pub fn at(&self, q: f64, [numerator, denominator]: [usize; 2]) -> [f64; 4] {
+        let (n, by_n) = horner(&self.numerator[..=numerator], q);
+        let (d, by_d) = horner(&self.denominator[..=denominator], q);
         [n, d, by_n, by_d]
+    }
+
+    /// The powers beyond which the coefficients of N and D are zero.
+    fn powers(&self) -> [usize; 2] {
+        let last = |coefficients: &[f64]| coefficients.iter().rposition(|&c| c != 0.0).unwrap_or_default();
+        [last(&self.numerator), last(&self.denominator)]
     }
 
     /// s.
     pub fn value(&self, q: f64) -> f64 {
-        let [n, d, ..] = self.at(q);
+        let [n, d, ..] = self.at(q, ALL_POWERS);
         n / d
     }
 
     /// D^2 d(r s)/dr = N D + 2 q (N' D - N D'): the lens is one-to-one while this and D are positive.
     fn slope(&self) -> [f64; 10] {
-        let mut slope = [0.0; 10];
-        for (i, n) in self.numerator.iter().enumerate() {
-            for (j, d) in self.denominator.iter().enumerate() {
+        let ([numerator, denominator], mut slope) = (self.powers(), [0.0; 10]);
+        for (i, n) in self.numerator[..=numerator].iter().enumerate() {
+            for (j, d) in self.denominator[..=denominator].iter().enumerate() {
                 slope[i + j] += n * d * (1.0 + 2.0 * i as f64 - 2.0 * j as f64);
             }
         }
@@ -87,31 +96,32 @@ impl RadialFactor {
             return None;
         }
         let slope = self.slope();
-        let free = self.newton(distorted, &slope, f64::INFINITY);
+        let free = self.newton(distorted, f64::INFINITY);
         if let Some(radius) = free.filter(|&radius| self.surely_rises(&slope, radius)) {
             return Some(radius);
         }
         match self.limit() {
             Some(limit) if distorted >= limit.distorted => None,
-            Some(limit) => self.newton(distorted, &slope, limit.radius),
-            None => self.newton(distorted, &slope, f64::INFINITY),
+            Some(limit) => self.newton(distorted, limit.radius),
+            None => self.newton(distorted, f64::INFINITY),
         }
     }
 
     /// Newton's method for the radius, kept between what is too small and too large by bisection.
-    fn newton(&self, distorted: f64, slope: &[f64], limit: f64) -> Option<f64> {
+    fn newton(&self, distorted: f64, limit: f64) -> Option<f64> {
+        let powers = self.powers();
         let (mut low, mut high) = (0.0f64, limit);
         let mut radius = distorted.min(limit);
         for _ in 0..STEPS {
             let q = radius * radius;
-            let [n, d, ..] = self.at(q);
+            let [n, d, by_n, by_d] = self.at(q, powers);
             let excess = radius * n / d - distorted;
             if excess > 0.0 {
                 high = radius
             } else {
                 low = radius
             }
-            let next = radius - excess * d * d / horner(slope, q).0;
+            let next = radius - excess * d * d / (n * d + 2.0 * q * (by_n * d - n * by_d));
             let middle = if high.is_finite() { 0.5 * (low + high) } else { 2.0 * low };
             let next = if next >= low && next <= high { next } else { middle };
             let change = (next - radius).abs();
@@ -126,10 +136,12 @@ impl RadialFactor {
     }
 }
 
-/// A polynomial and its derivative.
+/// A polynomial and its derivative, without products with zero: a compiler may not leave these out.
 #[inline(always)]
 fn horner(coefficients: &[f64], x: f64) -> (f64, f64) {
-    coefficients.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * x + c, slope * x + value))
+    let Some((&last, rest)) = coefficients.split_last() else { return (0.0, 0.0) };
+    let Some((&next, rest)) = rest.split_last() else { return (last, 0.0) };
+    rest.iter().rev().fold((last * x + next, last), |(value, slope), c| (value * x + c, slope * x + value))
 }
 
 /// What a polynomial is nowhere less than from zero to x: its constant and its negative terms at x.
@@ -210,7 +222,7 @@ pub fn way_back(
         }
         let step = times(&inverted(by), [target[0] - value[0], target[1] - value[1]]);
         at = [at[0] + step[0], at[1] + step[1]];
-        let [length, size] = [step, at].map(|[a, b]| a.hypot(b));
+        let [length, size] = [step, at].map(|[a, b]| (a * a + b * b).sqrt());
         grown += usize::from(length >= before);
         before = length;
         if length <= ROUNDING * size {

@@ -1,6 +1,6 @@
 //! The terms of Brown (1966, 1971), Conrady (1919) and those who came after: radial, tangential, thin prism.
 
-use super::inverse::{Matrix2, RadialFactor};
+use super::inverse::{ALL_POWERS, Matrix2, RadialFactor};
 
 /// The lens
 ///
@@ -21,6 +21,19 @@ pub struct RadialTangential {
     pub prism: Matrix2,
 }
 
+/// Which terms of a lens may be other than zero.
+#[derive(Debug, Clone, Copy)]
+pub struct Terms {
+    /// The highest powers of N and D.
+    pub powers: [usize; 2],
+    /// Whether there are terms of a thin prism.
+    pub prism: bool,
+}
+
+impl Terms {
+    /// All of them.
+    pub const ALL: Self = Self { powers: ALL_POWERS, prism: true };
+}
 /// How tangential terms grow beyond their own powers: they are multiplied by 1 + p3 q + p4 q^2 (Brown 1966).
 pub type Profile = [f64; 2];
 
@@ -47,37 +60,43 @@ impl RadialTangential {
     /// Where a place goes.
     #[inline(always)]
     pub fn bend(&self, place: [f64; 2]) -> Bent {
+        self.bend_by(place, Terms::ALL)
+    }
+
+    /// The same of a lens of which it is known that all but some terms are zero.
+    #[inline(always)]
+    pub fn bend_by(&self, place: [f64; 2], terms: Terms) -> Bent {
         let [a, b] = place;
         let ([t1, t2], [[s1, s2], [s3, s4]]) = (self.tangential, self.prism);
         let square = a * a + b * b;
-        let [n, d, by_n, by_d] = self.radial.at(square);
+        let [n, d, by_n, by_d] = self.radial.at(square, terms.powers);
         let reciprocal = d.recip();
         let factor = n * reciprocal;
         let slope = 2.0 * (by_n - factor * by_d) * reciprocal;
         let cross = slope * a * b + 2.0 * (t1 * b + t2 * a);
-        let [along_x, along_y] = [2.0 * (s1 + 2.0 * s2 * square), 2.0 * (s3 + 2.0 * s4 * square)];
-        Bent {
-            xy: [
-                a * factor + t1 * (square + 2.0 * a * a) + 2.0 * t2 * a * b + square * (s1 + s2 * square),
-                b * factor + t2 * (square + 2.0 * b * b) + 2.0 * t1 * a * b + square * (s3 + s4 * square),
-            ],
-            by_place: [
-                [factor + slope * a * a + 6.0 * t1 * a + 2.0 * t2 * b + along_x * a, cross + along_x * b],
-                [cross + along_y * a, factor + slope * b * b + 6.0 * t2 * b + 2.0 * t1 * a + along_y * b],
-            ],
-            place,
-            square,
-            reciprocal,
-            factor,
-            profile: 1.0,
-            decentring: [0.0; 2],
+        let mut xy = [
+            a * factor + t1 * (square + 2.0 * a * a) + 2.0 * t2 * a * b,
+            b * factor + t2 * (square + 2.0 * b * b) + 2.0 * t1 * a * b,
+        ];
+        let mut by_place = [
+            [factor + slope * a * a + 6.0 * t1 * a + 2.0 * t2 * b, cross],
+            [cross, factor + slope * b * b + 6.0 * t2 * b + 2.0 * t1 * a],
+        ];
+        if terms.prism {
+            for (k, [first, second]) in [[s1, s2], [s3, s4]].into_iter().enumerate() {
+                let along = 2.0 * (first + 2.0 * second * square);
+                xy[k] += square * (first + second * square);
+                by_place[k][0] += along * a;
+                by_place[k][1] += along * b;
+            }
         }
+        Bent { xy, by_place, place, square, reciprocal, factor, profile: 1.0, decentring: [0.0; 2] }
     }
 
     /// Where a place goes with tangential terms that have a profile.
     #[inline(always)]
-    pub fn bend_profiled(&self, place: [f64; 2], [p3, p4]: Profile) -> Bent {
-        let ([a, b], [t1, t2], bent) = (place, self.tangential, self.bend(place));
+    pub fn bend_profiled(&self, place: [f64; 2], [p3, p4]: Profile, terms: Terms) -> Bent {
+        let ([a, b], [t1, t2], bent) = (place, self.tangential, self.bend_by(place, terms));
         let [by_t1, by_t2] = bent.by_tangential();
         let decentring = [0, 1].map(|k| t1 * by_t1[k] + t2 * by_t2[k]);
         let excess = bent.square * (p3 + p4 * bent.square);

@@ -8,7 +8,7 @@ use super::projections::{
     Central, DivisionByRadius, Equidistant, Equisolid as EquisolidRays, ExtendedUnified, FieldOfView,
     RayProjection, Seen, Stereographic as StereographicRays,
 };
-use super::radial_tangential::{Bent, Profile, RadialTangential};
+use super::radial_tangential::{Bent, Profile, RadialTangential, Terms};
 use super::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
@@ -45,7 +45,7 @@ enum Role {
 /// What a lens does to a place: all terms at once, radial terms first and the others on what these have bent, or all at once with a
 /// profile of the tangential ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Terms {
+enum Action {
     Whole,
     Staged,
     Profiled,
@@ -62,6 +62,22 @@ impl Role {
             }
         }
     }
+}
+
+/// The terms of a lens that some parameters are of.
+const fn terms(roles: &[Role]) -> Terms {
+    let mut terms = Terms { powers: [0, 0], prism: false };
+    let mut i = 0;
+    while i < roles.len() {
+        match roles[i] {
+            Role::N(power) if power > terms.powers[0] => terms.powers[0] = power,
+            Role::D(power) if power > terms.powers[1] => terms.powers[1] = power,
+            Role::S(_) => terms.prism = true,
+            _ => {}
+        }
+        i += 1;
+    }
+    terms
 }
 
 /// What a camera is made of: image = (fx a + shear b + x0, fy b + y0) of the bent a, b.
@@ -111,11 +127,11 @@ impl Parts {
 
     /// The place that a lens bends, and what it is then.
     #[inline(always)]
-    fn bend(&self, ab: [f64; 2], terms: Terms) -> Bending {
-        if terms != Terms::Staged {
-            let bent = match terms {
-                Terms::Profiled => self.lens.bend_profiled(ab, self.profile),
-                _ => self.lens.bend(ab),
+    fn bend(&self, ab: [f64; 2], action: Action, terms: Terms) -> Bending {
+        if action != Action::Staged {
+            let bent = match action {
+                Action::Profiled => self.lens.bend_profiled(ab, self.profile, terms),
+                _ => self.lens.bend_by(ab, terms),
             };
             return Bending {
                 first: bent,
@@ -125,8 +141,10 @@ impl Parts {
             };
         }
         let straight = RadialFactor::polynomial(&[]);
-        let first = RadialTangential { tangential: [0.0; 2], prism: [[0.0; 2]; 2], ..self.lens }.bend(ab);
-        let last = RadialTangential { radial: straight, ..self.lens }.bend(first.xy);
+        let first = RadialTangential { tangential: [0.0; 2], prism: [[0.0; 2]; 2], ..self.lens };
+        let first = first.bend_by(ab, Terms { prism: false, ..terms });
+        let last = RadialTangential { radial: straight, ..self.lens };
+        let last = last.bend_by(first.xy, Terms { powers: [0, 0], ..terms });
         let (to, from) = (last.by_place, first.by_place);
         let by_place = [0, 1].map(|i| [0, 1].map(|k| to[i][0] * from[0][k] + to[i][1] * from[1][k]));
         Bending { first, last, by_first: to, by_place }
@@ -184,8 +202,9 @@ struct Bending {
 /// A model as a table: the projection, how its terms act, and the roles.
 trait Table<const N: usize>: Copy {
     type Projection: RayProjection;
-    const TERMS: Terms;
+    const ACTION: Action;
     const ROLES: [Role; N];
+    const TERMS: Terms = terms(&Self::ROLES);
 
     fn values(&self) -> &[f64; N];
 
@@ -198,14 +217,14 @@ trait Table<const N: usize>: Copy {
     fn place(&self, u: &Vector3) -> [f64; 2] {
         let parts = self.parts();
         let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
-        parts.image(parts.bend(seen.ab, Self::TERMS).last.xy)
+        parts.image(parts.bend(seen.ab, Self::ACTION, Self::TERMS).last.xy)
     }
 
     #[inline(always)]
     fn with_partials(&self, u: &Vector3) -> Image<[f64; N]> {
         let parts = self.parts();
         let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
-        let bending = parts.bend(seen.ab, Self::TERMS);
+        let bending = parts.bend(seen.ab, Self::ACTION, Self::TERMS);
         let by_ray = [0, 1, 2]
             .map(|k| parts.moved(super::inverse::times(&bending.by_place, seen.by_ray.map(|row| row[k]))));
         let by_u = |row: usize| Vector3::new(by_ray[0][row], -by_ray[1][row], -by_ray[2][row]);
@@ -219,7 +238,7 @@ trait Table<const N: usize>: Copy {
         let b = (y - parts.origin[1]) / parts.focal[1];
         let a = (x - parts.origin[0] - parts.shear * b) / parts.focal[0];
         let ab = from_radial(&parts.lens.radial, [a, b], |place| {
-            let bending = parts.bend(place, Self::TERMS);
+            let bending = parts.bend(place, Self::ACTION, Self::TERMS);
             (bending.last.xy, bending.by_place)
         })?;
         let [x, y, z] = Self::Projection::ray(ab, parts.own)?;
@@ -248,7 +267,7 @@ trait Table<const N: usize>: Copy {
 /// Declares cameras: name and number of parameters, what files call it, projection, formula of the lens, parameters with their roles. The
 /// last `constants` of them are never unknowns.
 macro_rules! cameras_of_vision {
-    ($($(#[$doc:meta])* $name:ident[$count:literal] = $said:literal, $projection:ident, $terms:ident, $constants:literal,
+    ($($(#[$doc:meta])* $name:ident[$count:literal] = $said:literal, $projection:ident, $action:ident, $constants:literal,
        $formula:expr, [$($parameter:literal: $role:expr),* $(,)?];)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq)]
@@ -259,7 +278,7 @@ macro_rules! cameras_of_vision {
 
         impl Table<$count> for $name {
             type Projection = $projection;
-            const TERMS: Terms = Terms::$terms;
+            const ACTION: Action = Action::$action;
             const ROLES: [Role; $count] = [$($role),*];
 
             #[inline(always)]

@@ -2,7 +2,7 @@
 
 use pulp::Simd;
 
-use super::Stack;
+use super::{Part, Stack};
 use crate::normals::front::{Columns, Strip};
 use crate::normals::layout::Layout;
 use crate::normals::vectorised::{Kernel, Rows, run, size};
@@ -28,23 +28,30 @@ impl Stack {
             let own = self.slot_rows::<D>(slot, rows);
             let constants = &self.constants[slot.constants..][..slot.groups.len() * self.locals.len() * rows];
             columns.add_difference(simd, own, v, self.locals.len());
-            columns.add_diagonal::<D>(own);
-            columns.add_right::<D>(1.0, own, constants);
-            columns.add_right::<D>(-1.0, v, &self.reduced);
+            columns.add_equations(simd, own, constants);
+            columns.subtract_right(simd, v, &self.reduced);
             for other in &self.slots[index + 1..] {
                 columns.add_product(simd, -1.0, self.slot_coupling::<L, D>(other), v);
             }
             for segment in self.segments.iter().filter(|segment| segment.row > slot.row) {
-                columns.add_product(simd, -1.0, self.segment_coupling::<L>(segment), v);
+                let taken = (-1.0, self.segment_coupling::<L>(segment), v);
+                match segment.run_of(slot.groups.start) {
+                    Some(run) => {
+                        let common = self.run_rows(segment, run, slot.groups.clone(), rows);
+                        columns.add_products(simd, [(1.0, common, own), taken]);
+                    }
+                    None => columns.add_products(simd, [taken]),
+                }
             }
         }
         if !self.segments.is_empty() {
             self.add_parts::<S, D>(simd, columns, rows);
-            self.add_segments::<S, L, D>(simd, columns);
+            self.add_segments::<S, L, D>(simd, columns, rows);
         }
     }
 
-    /// Adds the products of what groups have in common with others: with itself and with their main blocks.
+    /// Adds the products of what groups have in common with others, with itself and with their main blocks, that do not stand together
+    /// with others.
     #[inline(always)]
     fn add_parts<S: Simd, const D: usize>(&self, simd: S, columns: &mut Columns<'_>, rows: usize) {
         for slot in &self.slots {
@@ -53,6 +60,15 @@ impl Stack {
             let together = if slot.groups.len() == 1 { self.locals.len() } else { 1 };
             let count = together * rows;
             for (k, p) in slot.groups.clone().enumerate() {
+                let in_run = |part: &Part| self.segments[part.segment].run_of(p).is_some();
+                if self.parts(p).len() == 1
+                    && self
+                        .parts(p)
+                        .iter()
+                        .all(|part| in_run(part) && self.segments[part.segment].row > slot.row)
+                {
+                    continue;
+                }
                 for t in (0..self.locals.len()).step_by(together) {
                     let at = (t * slot.groups.len() + k) * rows;
                     let values = &self.kept_rows[slot.kept + at * width..];
@@ -61,14 +77,16 @@ impl Stack {
                     for (index, part) in self.parts(p).iter().enumerate() {
                         let equations = t * rows..t * rows + count;
                         let own = self.part_rows(p, part, equations.clone());
-                        add_below(simd, columns, own, kept);
                         for other in &self.parts(p)[..index] {
                             add_below(simd, columns, own, self.part_rows(p, other, equations.clone()));
                         }
-                        if columns.contain(own.at) {
+                        let in_run = in_run(part);
+                        if !in_run || self.segments[part.segment].row < slot.row {
+                            add_below(simd, columns, own, kept);
+                        }
+                        if !in_run && columns.contain(own.at) {
                             columns.add_product(simd, 1.0, own, own);
-                            columns.add_diagonal::<0>(own);
-                            columns.add_right::<0>(1.0, own, constants);
+                            columns.add_equations(simd, own, constants);
                         }
                     }
                 }
@@ -76,16 +94,34 @@ impl Stack {
         }
     }
 
-    /// Takes off what the elimination takes in the columns of the segments.
+    /// Adds what stands together in the columns of the segments, and takes off what the elimination takes there.
     #[inline(always)]
-    fn add_segments<S: Simd, const L: usize, const D: usize>(&self, simd: S, columns: &mut Columns<'_>) {
+    fn add_segments<S: Simd, const L: usize, const D: usize>(
+        &self,
+        simd: S,
+        columns: &mut Columns<'_>,
+        rows: usize,
+    ) {
         for (index, segment) in self.segments.iter().enumerate() {
             if !columns.contain(segment.row) {
                 continue;
             }
             let v = self.segment_coupling::<L>(segment);
-            columns.add_right::<0>(-1.0, v, &self.reduced);
-            for other in &self.segments[index..] {
+            let taken = (-1.0, v, v);
+            for (number, run) in segment.runs.iter().enumerate() {
+                let own = self.run_rows(segment, run, run.places.clone(), rows);
+                let first = run.places.start * self.locals.len() * rows;
+                columns.add_equations(simd, own, &self.constants[first..]);
+                match number {
+                    0 => columns.add_products(simd, [(1.0, own, own), taken]),
+                    _ => columns.add_product(simd, 1.0, own, own),
+                }
+            }
+            if segment.runs.is_empty() {
+                columns.add_products(simd, [taken]);
+            }
+            columns.subtract_right(simd, v, &self.reduced);
+            for other in &self.segments[index + 1..] {
                 columns.add_product(simd, -1.0, self.segment_coupling::<L>(other), v);
             }
             for slot in self.slots.iter().filter(|slot| slot.row > segment.row) {

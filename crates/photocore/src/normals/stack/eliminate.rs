@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use pulp::Simd;
 
-use super::{Place, Stack};
+use super::{Place, Segment, Stack};
 use crate::normals::equations::Prior;
 use crate::normals::layout::Layout;
 use crate::normals::triangle::Triangle;
-use crate::normals::vectorised::{Kernel, run, size};
+use crate::normals::vectorised::{Kernel, LANES, copy_vectors, run, size};
 
 impl Stack {
     /// Eliminates the unknowns of the local blocks. `damping` is added to the diagonal of each as a fraction of it.
@@ -19,8 +19,9 @@ impl Stack {
     }
 
     #[inline(always)]
-    fn eliminate_one<const L: usize, const D: usize>(
+    fn eliminate_one<S: Simd, const L: usize, const D: usize>(
         &mut self,
+        simd: S,
         t: usize,
         rows: usize,
         mut normal: [[f64; L]; L],
@@ -51,13 +52,19 @@ impl Stack {
         triangle.forward::<L>(&mut right, 1);
         self.decrease += right.iter().map(|v| v * v).sum::<f64>();
         self.reduced[t * L..][..L].copy_from_slice(&right);
-        self.couple::<L, D>(t, rows, &triangle);
+        self.couple::<S, L, D>(simd, t, rows, &triangle);
         self.triangles[t] = triangle;
     }
 
     /// Computes the coupling V of local block `t` of the stack to everything else.
     #[inline(always)]
-    fn couple<const L: usize, const D: usize>(&mut self, t: usize, rows: usize, triangle: &Triangle) {
+    fn couple<S: Simd, const L: usize, const D: usize>(
+        &mut self,
+        simd: S,
+        t: usize,
+        rows: usize,
+        triangle: &Triangle,
+    ) {
         for slot in &self.slots {
             let dim = size::<D>(slot.dim);
             let coupling = &mut self.coupling[slot.coupling + t * L * dim..][..L * dim];
@@ -69,14 +76,22 @@ impl Stack {
             }
             triangle.forward::<L>(coupling, dim);
         }
-        if !self.segments.is_empty() {
+        for segment in &self.segments {
+            if segment.plain {
+                let stack = (&self.places[..], &self.local_rows[..], &self.common_rows[..]);
+                let width = segment.unknowns.len();
+                let coupling = &mut self.coupling[segment.coupling + t * L * width..];
+                couple_runs::<S, L>(simd, stack, segment, t, rows, triangle, coupling);
+            }
+        }
+        if !self.segments.iter().all(|segment| segment.plain) {
             self.couple_segments::<L>(t, rows, triangle);
         }
     }
 
     #[inline(always)]
     fn couple_segments<const L: usize>(&mut self, t: usize, rows: usize, triangle: &Triangle) {
-        for segment in &self.segments {
+        for segment in self.segments.iter().filter(|segment| !segment.plain) {
             let width = segment.unknowns.len();
             self.coupling[segment.coupling + t * L * width..][..L * width].fill(0.0);
         }
@@ -85,13 +100,16 @@ impl Stack {
             let common = &self.common_rows[start + t * rows * width..][..rows * width];
             for part in &self.parts[parts.clone()] {
                 let segment = &self.segments[part.segment];
+                if segment.plain {
+                    continue;
+                }
                 let stride = segment.unknowns.len();
                 let coupling = &mut self.coupling[segment.coupling + t * L * stride..][..L * stride];
                 let columns = part.column..part.column + part.width();
                 add_product::<L>(&mut coupling[part.shift..], stride, own, common, width, columns);
             }
         }
-        for segment in &self.segments {
+        for segment in self.segments.iter().filter(|segment| !segment.plain) {
             let width = segment.unknowns.len();
             triangle.forward::<L>(&mut self.coupling[segment.coupling + t * L * width..][..L * width], width);
         }
@@ -107,10 +125,50 @@ struct Eliminate<'a> {
 
 impl Kernel for Eliminate<'_> {
     #[inline(always)]
-    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
         for t in 0..self.stack.locals.len() {
             let (normal, right) = self.prior.of_local::<L>(self.layout, self.stack.locals[t] as usize);
-            self.stack.eliminate_one::<L, D>(t, size::<R>(self.layout.rows()), normal, right, self.damping);
+            let rows = size::<R>(self.layout.rows());
+            self.stack.eliminate_one::<S, L, D>(simd, t, rows, normal, right, self.damping);
+        }
+    }
+}
+
+/// The coupling V of local block `t` of a stack to a segment that runs are all of: their products summed in registers, L^-1 times them
+/// written. The stack is its places, coefficients of local blocks and those that are in common with others.
+#[inline(always)]
+fn couple_runs<S: Simd, const L: usize>(
+    simd: S,
+    (places, local_rows, common_rows): (&[Place], &[f64], &[f64]),
+    segment: &Segment,
+    t: usize,
+    rows: usize,
+    triangle: &Triangle,
+    coupling: &mut [f64],
+) {
+    let width = segment.unknowns.len();
+    for first in (0..width).step_by(LANES) {
+        let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
+        for run in &segment.runs {
+            for p in run.places.clone() {
+                let Place { width: stride, rows: start, .. } = places[p];
+                let own = &local_rows[(t * places.len() + p) * rows * L..][..rows * L];
+                for (row, local) in own.as_chunks::<L>().0.iter().enumerate() {
+                    let at = start + (t * rows + row) * stride + run.column + first;
+                    let vectors = S::as_simd_f64s(&common_rows[at..][..LANES]).0;
+                    for d in 0..L {
+                        let factor = simd.splat_f64s(local[d]);
+                        for k in 0..LANES / S::F64_LANES {
+                            sums[d][k] = simd.mul_add_f64s(vectors[k], factor, sums[d][k]);
+                        }
+                    }
+                }
+            }
+        }
+        triangle.forward_vectors::<S, L>(simd, &mut sums);
+        let height = LANES.min(width - first);
+        for d in 0..L {
+            copy_vectors::<S>(&sums[d], &mut coupling[d * width + first..][..height]);
         }
     }
 }

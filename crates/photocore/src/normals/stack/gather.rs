@@ -1,8 +1,11 @@
 //! The equations of a stack, gathered.
 
-use pulp::Simd;
+use std::ops::Range;
 
-use super::{Part, Place, Segment, Slot, Stack};
+use pulp::Simd;
+use smallvec::SmallVec;
+
+use super::{Part, Place, Run, Segment, Slot, Stack};
 use crate::normals::equations::{Equations, GroupRows};
 use crate::normals::layout::Layout;
 use crate::normals::symbolic::Symbolic;
@@ -69,7 +72,8 @@ impl Stack {
             self.places.push(Place { parts: start..self.parts.len(), width, rows: common });
             common += depth * rows * width;
         }
-        let further = self.parts.iter().map(|part| part.position);
+        let further = groups.iter().flat_map(|&group| layout.further_of(group as usize));
+        let further = further.map(|&block| symbolic.position(block as usize));
         let home = further.chain(positions.first().map(|&main| main as usize)).min();
         let home = home.map_or(0, |first| symbolic.supernode_of(first));
         let (mut kept, mut coupling) = (0, 0);
@@ -95,24 +99,28 @@ impl Stack {
     /// Appends the parts of what a group has in common with others; returns how many unknowns they have.
     fn place_parts(&mut self, layout: &Layout, symbolic: &Symbolic, group: usize) -> usize {
         let mut width = 0;
-        let further = layout.further_of(group).iter().map(|&block| {
-            let position = symbolic.position(block as usize);
-            (position, 0..symbolic.dim(position))
-        });
-        // The border is the last block.
-        let border = std::iter::once((symbolic.blocks() - 1, layout.border_of(group)));
-        for (position, unknowns) in further.chain(border.filter(|(_, unknowns)| !unknowns.is_empty())) {
-            let column = width;
-            width += unknowns.len();
+        let mut add = |position: usize, unknowns: Range<usize>, column: usize| {
             self.parts.push(Part { position, unknowns, segment: 0, shift: 0, column });
+        };
+        for &block in layout.further_of(group) {
+            let (position, block) = (symbolic.position(block as usize), block as usize);
+            for free in layout.free_of(block) {
+                add(position, free.clone(), width + free.start);
+            }
+            width += layout.kept_dim(block);
         }
-        width
+        // The border is the last block.
+        let border = layout.border_of(group);
+        if !border.is_empty() {
+            add(symbolic.blocks() - 1, border.clone(), width);
+        }
+        width + border.len()
     }
 
     /// Unites the parts that overlap or meet in one block; each segment takes `depth` rows of the coupling from `start` on.
     fn place_segments(&mut self, symbolic: &Symbolic, home: usize, depth: usize, start: usize) -> usize {
         self.segments.clear();
-        let mut parts: Vec<&Part> = self.parts.iter().collect();
+        let mut parts: SmallVec<[&Part; 16]> = self.parts.iter().collect();
         parts.sort_unstable_by_key(|part| (part.position, part.unknowns.start));
         for part in parts {
             match self.segments.last_mut() {
@@ -124,6 +132,8 @@ impl Stack {
                     unknowns: part.unknowns.clone(),
                     row: 0,
                     coupling: 0,
+                    runs: SmallVec::new(),
+                    plain: false,
                 }),
             }
         }
@@ -141,7 +151,34 @@ impl Stack {
             part.segment = after.saturating_sub(1);
             part.shift = part.unknowns.start - self.segments[part.segment].unknowns.start;
         }
+        self.find_runs();
         coupling
+    }
+
+    /// Finds the groups whose coefficients in a segment stand one below the other.
+    fn find_runs(&mut self) {
+        let single = self.slots.iter().filter(|slot| slot.groups.len() == 1).map(|slot| slot.groups.start);
+        for p in single {
+            let place = &self.places[p];
+            for &Part { segment, column, ref unknowns, .. } in &self.parts[place.parts.clone()] {
+                let Segment { unknowns: all, runs, .. } = &mut self.segments[segment];
+                if unknowns.len() < all.len() {
+                    continue;
+                }
+                let goes_on = |run: &&mut Run| {
+                    let width = self.places[run.places.start].width;
+                    run.places.end == p && run.column == column && width == place.width
+                };
+                match runs.last_mut().filter(goes_on) {
+                    Some(run) => run.places.end += 1,
+                    None => runs.push(Run { places: p..p + 1, column }),
+                }
+            }
+        }
+        for (index, segment) in self.segments.iter_mut().enumerate() {
+            let touching = self.parts.iter().filter(|part| part.segment == index).count();
+            segment.plain = segment.runs.iter().map(|run| run.places.len()).sum::<usize>() == touching;
+        }
     }
 }
 

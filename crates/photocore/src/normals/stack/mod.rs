@@ -7,6 +7,8 @@ mod solve;
 
 use std::ops::Range;
 
+use smallvec::SmallVec;
+
 use super::front::Strip;
 use super::symbolic::Symbolic;
 use super::triangle::Triangle;
@@ -39,9 +41,27 @@ pub(super) struct Segment {
     /// Its first row in the front.
     pub row: usize,
     coupling: usize,
+    /// The groups that touch all of it, each the only one on its main block.
+    runs: SmallVec<[Run; 2]>,
+    /// Whether they are all that touch it.
+    plain: bool,
+}
+
+/// Consecutive groups of the pattern whose coefficients in a segment stand one below the other.
+#[derive(Debug, Clone)]
+struct Run {
+    places: Range<usize>,
+    /// The first of their columns among those that each has in common with others.
+    column: usize,
 }
 
 impl Segment {
+    /// The run that a group of the pattern belongs to.
+    #[inline(always)]
+    fn run_of(&self, p: usize) -> Option<&Run> {
+        self.runs.iter().find(|run| run.places.contains(&p))
+    }
+
     /// Where its unknowns stand in the order of elimination.
     pub fn range(&self, symbolic: &Symbolic) -> Range<usize> {
         let start = symbolic.range(self.position).start;
@@ -153,6 +173,15 @@ impl Stack {
     #[inline(always)]
     pub fn local_rows<const L: usize>(&self, t: usize, p: usize, rows: usize) -> &[[f64; L]] {
         self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L].as_chunks().0
+    }
+
+    /// The coefficients of a segment in all equations of some groups of one of its runs, group by group and local block by local block.
+    #[inline(always)]
+    fn run_rows(&self, segment: &Segment, run: &Run, places: Range<usize>, rows: usize) -> Strip<'_> {
+        let Place { width: stride, rows: start, .. } = self.places[places.start];
+        let values = &self.common_rows[start + run.column..];
+        let count = places.len() * self.locals.len() * rows;
+        Strip { at: segment.row, rows: Rows { values, width: segment.unknowns.len(), stride, count } }
     }
 
     /// What group `p` of the pattern has in common with others.

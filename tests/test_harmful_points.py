@@ -1,0 +1,157 @@
+"""Points that harm the whole: named, left out or kept with a warning; never why nothing is known."""
+
+import json
+import pickle
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import photogram
+from photogram import Block, adjust, simulate
+from photogram.network.geometry import project
+from photogram.results.weakest import weakest_photos, weakest_points
+
+
+@pytest.fixture(scope="module")
+def made():
+    return simulate(strips=2, photos_per_strip=4, seed=3)
+
+
+def with_point(block: Block, images: dict[int, np.ndarray], position: np.ndarray | None = None) -> Block:
+    """Return the block with a further pass point, X, and its images, by photo."""
+    new, count = len(block.point_ids), len(images)
+    place = np.full(3, np.nan) if position is None else position
+    sd = np.broadcast_to(np.asarray(block.image_sd, dtype=float), block.image_xy.shape)
+    return block.replace(
+        point_ids=[*block.point_ids, "X"],
+        point_positions=np.vstack([block.point_positions, place]),
+        point_sd=np.vstack([block.point_sd, np.full((1, 3), np.inf)]),
+        image_photos=np.concatenate([block.image_photos, list(images)]),
+        image_points=np.concatenate([block.image_points, np.full(count, new)]),
+        image_xy=np.vstack([block.image_xy, *images.values()]),
+        image_sd=np.vstack([sd, sd[:count]]),
+    )
+
+
+def images_of(truth: Block, photos: list[int], position: np.ndarray) -> dict[int, np.ndarray]:
+    """Return the true images of a position."""
+    found = project(
+        np.tile(position, (len(photos), 1)),
+        truth.photo_positions[photos],
+        truth.photo_attitudes[photos],
+        np.full(len(photos), -152.74),
+    )
+    return dict(zip(photos, found, strict=True))
+
+
+def same_as(result, other):
+    """Compare the photos: they agree within their standard deviations, which are those of the others."""
+    assert (np.abs(result.photo_positions - other.photo_positions) < other.photo_sd[:, :3]).all()
+    np.testing.assert_allclose(result.photo_sd, other.photo_sd, rtol=0.1)
+
+
+def test_a_point_on_nearly_parallel_rays_is_named_and_harms_nothing(made):
+    far = made.truth.photo_positions[0] + 3e7 * np.array([0.1, 0.05, -1.0])
+    result = adjust(with_point(made.block, images_of(made.truth, [0, 1], far)))
+    assert result.converged
+    [said] = [str(each) for each in result.messages if "nearly parallel rays: points X" in str(each)]
+    assert "say nothing of the distance" in said
+    same_as(result, adjust(made.block))
+    worst = weakest_points(result)
+    assert worst[0].point == "X"
+    assert worst[0].ratio > 1e4
+    assert len(worst) == 10
+    assert all(a.ratio >= b.ratio for a, b in pairwise(worst))
+    # The same by hand, of an ordinary point.
+    row = result.block.point_ids.index(worst[-1].point)
+    values = np.linalg.eigvalsh(result.point_cofactors[row])
+    assert worst[-1].ratio == pytest.approx(np.sqrt(values[-1] / values[0]))
+
+
+def test_a_point_that_its_rays_do_not_determine_is_left_out(made):
+    """Two photos at one place: its rays are one ray, whatever its distance."""
+    block, twin = made.block, len(made.block.photo_ids)
+    photo_fields = {
+        name: np.concatenate([getattr(block, name), getattr(block, name)[:1]])
+        for name in ("photo_positions", "photo_attitudes", "principal_distances")
+    }
+    sd = np.full((twin + 1, 3), np.inf)
+    fixed = sd.copy()
+    fixed[[0, twin]] = 0.0
+    known = block.replace(
+        **photo_fields,
+        photo_ids=[*block.photo_ids, "TWIN"],
+        photo_position_sd=fixed,
+        photo_attitude_sd=fixed,
+    )
+    xy = np.array([10.0, 20.0])
+    result = adjust(with_point(known, {0: xy, twin: xy}))
+    assert result.converged
+    assert result.dropped == {"X": "its rays do not determine it"}
+    assert "left out, its rays do not determine it: X" in [str(each) for each in result.messages]
+    assert np.isfinite(result.point_sd[:-1][result.point_rays[:-1] > 0]).all()
+
+
+def test_a_photo_that_its_images_do_not_determine_is_left_out():
+    """Two images are four equations for six unknowns."""
+    block = simulate(strips=2, photos_per_strip=6, seed=3).block
+    own = np.flatnonzero(block.image_photos == 3)
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    two = own[np.argsort(-rays[block.image_points[own]], kind="stable")[:2]]
+    kept = (block.image_photos != 3) | np.isin(np.arange(len(block.image_photos)), two)
+    few = block.replace(
+        image_photos=block.image_photos[kept],
+        image_points=block.image_points[kept],
+        image_xy=block.image_xy[kept],
+        image_sd=np.broadcast_to(np.asarray(block.image_sd, dtype=float), block.image_xy.shape)[kept],
+    )
+    result = adjust(few)
+    assert result.converged
+    [said] = [
+        str(each) for each in result.messages if "photos that their images do not determine" in str(each)
+    ]
+    assert block.photo_ids[3] in said
+    others = np.arange(len(block.photo_ids)) != 3
+    assert np.isfinite(result.photo_sd[others]).all()
+    assert np.isnan(result.photo_sd[3]).all()
+    np.testing.assert_array_equal(result.photo_positions[3], block.photo_positions[3])
+    assert not result.used_images[few.image_photos == 3].any()
+    # It is as if it had no images; its state goes to other processes.
+    again = pickle.loads(pickle.dumps(result))
+    photo = block.photo_ids[0]
+    joint = again.covariance([("photo", photo)])
+    np.testing.assert_allclose(np.diag(joint)[:3], result.photo_sd[0, :3] ** 2, rtol=1e-6)
+
+
+@pytest.mark.parametrize("metres", [1.0, 0.01])
+def test_a_point_at_a_station_is_left_out_or_named(made, metres):
+    """It is given, and seen, beside a station; another photo has an image of it that is any point's."""
+    at = made.truth.photo_positions[1] + metres * np.array([0.3, 0.1, -1.0])
+    images = images_of(made.truth, [1], at) | {0: np.array([40.0, 50.0])}
+    result = adjust(with_point(made.block, images, at))
+    assert any("X" in str(each) for each in result.messages), result.messages
+    assert np.isfinite(result.photo_sd).all()
+    if result.converged:
+        same_as(result, adjust(made.block))
+
+
+def test_the_report_and_the_document_have_the_worst(made):
+    result = adjust(made.block)
+    assert not [each for each in result.messages if "parallel" in str(each) or "station's" in str(each)]
+    report = result.report()
+    assert "Weakest points and photos" in report
+    points, photos = weakest_points(result), weakest_photos(result)
+    assert len(photos) == len(result.block.photo_ids)
+    assert f"{photos[0].photo:<16}{photos[0].condition:>12.4g}" in report
+    document = json.loads(result.to_json())["weakest"]
+    assert [each["point"] for each in document["points"]] == [each.point for each in points]
+    assert [each["condition"] for each in document["photos"]] == [each.condition for each in photos]
+    # A photo's condition by hand.
+    row = result.block.photo_ids.index(photos[0].photo)
+    sd = np.sqrt(np.diag(result.photo_cofactors[row]))
+    assert photos[0].condition == pytest.approx(
+        np.linalg.cond(result.photo_cofactors[row] / np.outer(sd, sd))
+    )
+    assert weakest_points(adjust(made.block, covariance=False)) == []
+    assert photogram.results.weakest.weakest_lines(adjust(made.block, covariance=False)) == []
