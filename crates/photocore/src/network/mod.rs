@@ -401,7 +401,7 @@ impl Network {
         pool: &ThreadPool,
     ) -> Result<problem::Assembled, NetworkError> {
         self.check()?;
-        let screened = self.screen(&vec![false; self.points.len()]);
+        let screened = self.screen(&vec![false; self.points.len()], &vec![false; self.photos.len()]);
         if screened.points.is_empty() {
             return Err(NetworkError::Empty);
         }
