@@ -19,8 +19,8 @@ PACKAGE = [
     and path.parent.name != "stellar"
     and ROOT / "python" / "photogram" / "formats" not in path.parents
 ]
-"""Without the calibration by stars, whose plots have a radial axis, and the files of other programs, which say
-what lenses and formats are called there."""
+"""Without the calibration by stars, whose plots have a radial axis, and the files of other programs, which
+say what lenses and formats are called there."""
 CRATE = [path for path in (ROOT / "crates" / "photocore" / "src").rglob("*.rs") if path.name != "golden.rs"]
 BINDING = [*(ROOT / "crates" / "photogram-py" / "src").rglob("*.rs")]
 EXTENSIONS = {
