@@ -1,8 +1,8 @@
 """A block that calibrates its cameras, in COLMAP: OPENCV cameras that photos share, solved by Ceres.
 
-The axes of COLMAP's cameras are x right, y down, z forward, F = diag(1, -1, -1) from those of a photo; its
-camera OPENCV is ours by name and order. COLMAP gives every image coordinate the weight 1, so lengths in the
-image are counted in their standard deviation. Control has priors of its standard deviations.
+COLMAP's camera OPENCV is ours by name and order of parameters. Every image coordinate has the weight 1 there,
+so lengths in the image are counted in their standard deviation, one for each camera. Control has priors of
+its standard deviations.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from photogram import Block
 from photogram.network.directions import without_lenses
 
 NOT_HELD = 1e9
-FLIP = np.diag([1.0, -1.0, -1.0])
 
 
 def colmap_solution(block: Block) -> Callable[[], float]:
     """Return what solves a block by COLMAP and gives the weighted sum of squares; once only."""
     points = intersections(without_lenses(block))
-    [sd] = np.unique(block.image_sd)
-    reconstruction = pycolmap.Reconstruction()
+    reconstruction, deviations = pycolmap.Reconstruction(), []
     for number, camera in enumerate(block.cameras):
+        [sd] = np.unique(block.image_sd[block.photo_cameras[block.image_photos] == number])
+        deviations.append(sd)
         lengths, terms = camera.values[:4] / sd, camera.values[4:]
         own = pycolmap.Camera(
             camera_id=number + 1, model="OPENCV", width=1, height=1, params=[*lengths, *terms]
@@ -36,17 +36,16 @@ def colmap_solution(block: Block) -> Callable[[], float]:
     order = np.argsort(block.image_photos, kind="stable")
     starts = np.searchsorted(block.image_photos[order], np.arange(len(block.photo_ids) + 1))
     tracks, config = [pycolmap.Track() for _ in block.point_ids], pycolmap.BundleAdjustmentConfig()
-    to_photo = to_object_space(block).transpose(0, 2, 1)
-    for photo, (matrix, centre) in enumerate(zip(to_photo, block.photo_positions, strict=True)):
+    to_camera = to_object_space(block).transpose(0, 2, 1)
+    for photo, (matrix, centre) in enumerate(zip(to_camera, block.photo_positions, strict=True)):
         own = order[starts[photo] : starts[photo + 1]]
-        turned = FLIP @ matrix
         image = pycolmap.Image(
             name=block.photo_ids[photo],
-            keypoints=block.image_xy[own] / sd,
+            keypoints=block.image_xy[own] / deviations[block.photo_cameras[photo]],
             camera_id=int(block.photo_cameras[photo]) + 1,
             image_id=photo + 1,
         )
-        pose = pycolmap.Rigid3d(pycolmap.Rotation3d(turned), -turned @ centre)
+        pose = pycolmap.Rigid3d(pycolmap.Rotation3d(matrix), -matrix @ centre)
         reconstruction.add_image_with_trivial_frame(image, pose)
         config.add_image(photo + 1)
         for number, point in enumerate(block.image_points[own]):
@@ -66,8 +65,11 @@ def colmap_solution(block: Block) -> Callable[[], float]:
         priors.append(pyceres.factors.NormalPrior(known, np.diag(variance)))
         adjuster.problem.add_residual_block(priors[-1], None, [reconstruction.point3D(ids[control]).xyz])
 
+    alive = reconstruction, priors
+
     def solve() -> float:
-        assert priors or not held.any()  # kept alive: the adjuster points to them
+        # The adjuster points into these.
+        assert alive
         return 2.0 * float(adjuster.solve().ceres_summary.final_cost)
 
     return solve
