@@ -5,13 +5,17 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 import giant_check as planted
 from giant_check import GULF, explained, hits, seeds
-from photogram import Block, adjust, check, simulate
+from photogram import Attitudes, Block, Camera, Simulation, adjust, check, simulate
+from photogram.network.geometry import rotation_matrix
+from photogram.network.observations import Position
+from photogram.network.simulated_observations import with_distances, with_gnss
+from photogram.network.unknowns import LeverArm
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,11 @@ def outcome(plant: Plant, seed: int, verbose: bool) -> tuple[bool, int]:
 
 
 def network(seed: int, *, rectangular: bool = False, **more: object) -> Block:
+    """Simulate a network; see :func:`simulation_of`."""
+    return simulation_of(seed, rectangular=rectangular, **more).block
+
+
+def simulation_of(seed: int, *, rectangular: bool = False, **more: object) -> Simulation:
     """Simulate a network: its size, density, space, sense and control follow from the seed."""
     choice = np.random.default_rng([seed, 3])
     space = GULF if choice.integers(2) and not rectangular else {}
@@ -97,7 +106,7 @@ def network(seed: int, *, rectangular: bool = False, **more: object) -> Block:
             **space,
             **more,
         }
-    ).block
+    )
 
 
 def of_block(plant: Callable[[Block, np.random.Generator], Planted]) -> Plant:
@@ -182,6 +191,90 @@ def station_error(seed: int, rng: np.random.Generator) -> Planted:
     )
 
 
+def with_positions(change: Callable[[Block, Position], dict[str, object]], said: str, **gnss: float) -> Plant:
+    """Plant a mistake in all positions of photos observed by GNSS."""
+
+    def plant(seed: int, _rng: np.random.Generator) -> Planted:
+        simulation = simulation_of(seed, rectangular=True, photos_per_strip=7)
+        block = with_gnss(simulation, **{"sd": 0.05, "seconds": 5.0, "seed": seed, **gnss}).block
+        changed = [
+            Position(
+                **{
+                    "photo": each.photo,
+                    "position": each.position,
+                    "sd": 0.05,
+                    "lever_arm": each.lever_arm.value if isinstance(each.lever_arm, LeverArm) else 0.0,
+                    "time": each.time,
+                    **change(block, each),
+                }
+            )
+            for each in block.observations
+        ]
+        changed_block = block.replace(observations=changed)
+        return Planted(changed_block, [set()], [{"observed-positions"}], said=said)
+
+    return plant
+
+
+def later(block: Block, position: Position) -> dict[str, object]:
+    """Return the position of a fiftieth of a second later, at five seconds from photo to photo."""
+    axis = np.argmax(np.abs(np.diff(block.photo_positions[:2], axis=0)[0]))
+    row = block.photo_ids.index(position.photo)
+    strip = [i for i, name in enumerate(block.photo_ids) if name[:2] == position.photo[:2]]
+    velocity = np.zeros(3)
+    velocity[axis] = np.gradient(block.photo_positions[strip, axis], 5.0)[strip.index(row)]
+    return {"position": np.asarray(position.position) + 0.02 * velocity}
+
+
+def used_twice(block: Block, rng: np.random.Generator) -> Planted:
+    """Give two pass points that share no photo one name."""
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    given = np.isfinite(block.point_positions).any(axis=1)
+    points = np.flatnonzero((rays >= 2) & ~given)
+    photos = {point: {*block.image_photos[block.image_points == point].tolist()} for point in points.tolist()}
+    pairs = [
+        (p, q)
+        for p in points.tolist()
+        for q in points.tolist()
+        if p < q and not photos[p] & photos[q] and rays[p] + rays[q] >= 5
+    ]
+    one, other = pairs[int(rng.integers(len(pairs)))]
+    image_points = np.where(block.image_points == other, one, block.image_points)
+    name = block.point_ids[one]
+    return Planted(block.replace(image_points=image_points), [{name}], [{"name-used-twice"}])
+
+
+def millimetres(seed: int, _rng: np.random.Generator) -> Planted:
+    """Give observed distances in millimetres."""
+    block = with_distances(simulation_of(seed, rectangular=True), count=8, seed=seed).block
+    longer = [replace(each, length=1000 * each.length) for each in block.observations]
+    said = "observed distances are in millimetres"
+    return Planted(block.replace(observations=longer), [set()], [{"convention"}], said=said)
+
+
+def lens(factor: float, power: int, said: str) -> Plant:
+    """Give a lens whose radial terms are wrong: multiplied by a power of the principal distance."""
+
+    def plant(seed: int, _rng: np.random.Generator) -> Planted:
+        camera = Camera("brown", {"c": -152.74, "K1": -1e-7, "K2": 2e-12})
+        block = network(seed, cameras=[camera])
+        terms = {"K1": factor * 152.74**power * -1e-7, "K2": factor * 152.74 ** (2 * power) * 2e-12}
+        wrong = replace(camera, parameters={**camera.parameters, **terms})
+        return Planted(block.replace(cameras=[wrong]), [set()], [{"lens"}], said=said)
+
+    return plant
+
+
+def quaternions(block: Block) -> dict[str, object]:
+    """Return attitudes whose quaternions were taken in another order."""
+    to_object = rotation_matrix(block.photo_attitudes)
+    if not block.photo_to_ground:
+        to_object = to_object.transpose(0, 2, 1)
+    read = np.roll(Attitudes(to_object).values("quaternion"), 1, axis=1)
+    form = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    return {"photo_attitudes": Attitudes.of("quaternion", read).values(form)}
+
+
 def feet(*axes: int) -> np.ndarray:
     """Return factors that turn metres into feet."""
     return np.where(np.isin(np.arange(3), axes), 1 / 0.3048, 1.0)
@@ -245,6 +338,23 @@ KINDS: dict[str, Plant] = {
     "control, test value 10": of_block(control_error),
     "exchanged control, image 1 mm": of_block(planted.exchanged_control_and_image),
     "observed position of a photo, test value 10": station_error,
+    "observed positions above the ellipsoid": with_positions(
+        lambda _, each: {"position": np.add(each.position, [0, 0, 46.2])}, "ellipsoidal"
+    ),
+    "observed positions in feet": with_positions(
+        lambda _, each: {"position": np.asarray(each.position) / 0.3048}, "are in feet"
+    ),
+    "observed positions of 0.02 s later": with_positions(later, "those of another time"),
+    "lever arm with the wrong sign": with_positions(
+        lambda _, each: {"lever_arm": -np.asarray(each.lever_arm.value)},
+        "lever arm",
+        lever_arm=[1.2, 0.3, 2.5],
+    ),
+    "observed distances in millimetres": millimetres,
+    "one name for two points": of_block(used_twice),
+    "radial terms with the wrong sign": lens(-1.0, 0, "wrong sign"),
+    "radial terms divided by the principal distance": lens(1.0, 2, "divided by the principal distance"),
+    "quaternions in another order": of_all("convention", "quaternions", quaternions),
 }
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
 """Simulated nights that are hard to identify: how many end right, refused, or wrong.
 
-    python benches/star_nights.py [EXPOSURES] [FIRST_SEED] [PROCESSES]
+    python benches/star_nights.py [EXPOSURES] [FIRST_SEED] [PROCESSES] [MINUTES]
 
 Every night has two to six exposures of stars to magnitude 6 of the Hipparcos catalogue; nights are made
-until there are so many exposures. The catalogue that is given is zero to three magnitudes deeper, every third
-field of view is up to 10 % wrong (half of these nights say so), 30 % of the images are of no star, a tenth of
-the stars is missing, attitudes are up to 1.5 degrees wrong or, in every fifth night, up to 8. The roll of
-every second night is unknown, and it says so, but for every tenth of them. Some exposures are of another part
-of the sky than is said. A night ends
+until there are so many exposures, or so many minutes are over. The catalogue that is given is zero to three
+magnitudes deeper, every third field of view is up to 10 % wrong (half of these nights say so), 30 % of the
+images are of no star, a tenth of the stars is missing, attitudes are up to 1.5 degrees wrong or, in every
+fifth night, up to 8. The roll of every second night is unknown, and it says so, but for every tenth of them.
+Some exposures are of another part of the sky than is said. A night ends
 
     right       every exposure that takes part has its own stars, and the camera is that of the night
     named       an error, or a message that the camera must not be used: nothing that could be taken for one
@@ -19,6 +19,7 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 import sys
+import time
 from collections import Counter
 from dataclasses import dataclass
 
@@ -158,17 +159,18 @@ def one(seed: int) -> tuple[int, str, str, int, str, int]:
     return seed, end, about, taken, given_as, len(sky.night.names)
 
 
-def main(exposures: int, first: int, processes: int) -> None:
+def main(exposures: int, first: int, processes: int, minutes: float) -> None:
     """Print how the nights end, those that do not end right one by one."""
     ends: Counter[str] = Counter()
     taken = given = nights = 0
+    until = time.monotonic() + 60 * minutes
     with multiprocessing.Pool(processes) as pool:
         for seed, end, about, used, given_as, count in pool.imap(one, itertools.count(first)):
             ends[end] += 1
             taken, given, nights = taken + used * (end == "right"), given + count, nights + 1
             if end != "right":
                 print(f"night {seed}: {end}; {given_as}: {about}", flush=True)
-            if given >= exposures:
+            if given >= exposures or time.monotonic() > until:
                 pool.terminate()
                 break
     print(
@@ -179,5 +181,5 @@ def main(exposures: int, first: int, processes: int) -> None:
 
 
 if __name__ == "__main__":
-    numbers = [int(word) for word in sys.argv[1:4]]
-    main(*(numbers + [400, 0, 1][len(numbers) :]))
+    numbers = [int(word) for word in sys.argv[1:5]]
+    main(*(numbers + [400, 0, 1, 10**6][len(numbers) :]))

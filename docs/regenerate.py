@@ -18,6 +18,7 @@ from pathlib import Path
 import calibration_numbers
 import comparator_numbers
 import stellar_numbers
+import tests_numbers
 
 DOCS = Path(__file__).parent
 PAGES: dict[str, Mapping[str, Callable[[], list[str]]]] = {
@@ -25,6 +26,7 @@ PAGES: dict[str, Mapping[str, Callable[[], list[str]]]] = {
     "extending.md": {},
     "self-calibration.md": calibration_numbers.BLOCKS,
     "stellar-camera.md": stellar_numbers.BLOCKS,
+    "tests.md": tests_numbers.BLOCKS,
 }
 BLOCK = re.compile(r"(<!-- numbers: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 QUOTE = re.compile(r"(<!-- quote: (\S+)(?: \| (.*?))? -->\n).*?(<!-- end -->)", re.DOTALL)

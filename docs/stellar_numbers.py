@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
+import runpy
 from dataclasses import replace
 from functools import cache
 from importlib.resources import as_file, files
+from pathlib import Path
 
 import erfa
 import numpy as np
 
 from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Result, calibrate, refraction
+from photogram.stellar.lenses import LENSES
 from photogram.stellar.listing import summary
 from photogram.stellar.night import CalibratedNight, calibrate_night
 from photogram.stellar.night_file import read_night
+from photogram.stellar.night_report import report
 from photogram.stellar.night_report import summary as night_summary
 from photogram.stellar.parameters import GRAD, NAMES, UNITS
 from photogram.stellar.plain import read_plain
+from photogram.stellar.sky_cameras import SkyCamera
 
 
 @cache
@@ -79,9 +84,40 @@ def night_lines() -> list[str]:
     return [*figures, "", *camera]
 
 
+def section_lines(result: CalibratedNight, *titles: str) -> list[str]:
+    """Take sections of a report."""
+    parts = report(result).split("\n\n")
+    lines: list[str] = []
+    for title in titles:
+        (found,) = [part for part in parts if part.startswith(f"{title}\n-")]
+        lines += ["", *found.splitlines()[2:]] if lines else found.splitlines()[2:]
+    return lines
+
+
+def lens_lines() -> list[str]:
+    """Show the tests of the packaged night's lens."""
+    return section_lines(night(), "Tests of the lens")
+
+
+def odds_lines() -> list[str]:
+    """Show the odds and the attitudes in ICRS of the packaged night."""
+    return section_lines(night(), "Identification", "Attitudes in ICRS")
+
+
+def choice_lines() -> list[str]:
+    """Show which lens the stars choose for an all-sky camera."""
+    example = runpy.run_path(str(Path(__file__).parents[1] / "examples" / "all_sky_camera.py"))
+    start = SkyCamera.of_field(*example["FRAME"], example["field_of"]("equisolid"), "kannala_brandt")
+    made, _ = example["night"]("equisolid", 8, start, lenses=tuple(LENSES), tripod=True)
+    return section_lines(calibrate_night(made), "Lenses that were tried")
+
+
 BLOCKS = {
     "adjustment": adjustment_lines,
     "parameters": parameter_lines,
     "refraction": refraction_lines,
     "night": night_lines,
+    "odds": odds_lines,
+    "lens": lens_lines,
+    "choice": choice_lines,
 }

@@ -94,15 +94,17 @@ def main() -> None:
     """Write the example, with no more digits than the numbers deserve."""
     random = np.random.default_rng(SEED)
     photos = [f"DJI_{number:04d}" for number in range(101, 107)]
-    centres = np.array([[x, y, 90.0] for y in (-20.0, 20.0) for x in (-25.0, 0.0, 25.0)])
+    centres = np.array([[x, y, 105.0] for y in (-20.0, 20.0) for x in (-25.0, 0.0, 25.0)])
     centres += random.normal(0.0, 1.5, centres.shape)
     angles = random.normal(0.0, 2.0, (6, 3)) + np.array([[0.0, 0.0, 3.0]] * 3 + [[0.0, 0.0, 176.0]] * 3)
     angles[4, 0] += 12.0
-    grid = np.array([[x, y] for y in (-30, -10, 10, 30) for x in (-40, -24, -8, 8, 24, 40)], dtype=float)
+    grid = np.array(
+        [[x, y] for y in (-36, -18, 0, 18, 36) for x in (-42, -28, -14, 0, 14, 28, 42)], dtype=float
+    )
     ground = np.column_stack([grid + random.normal(0, 2.0, grid.shape), random.uniform(-6, 8, len(grid))])
     names = [f"t{number:02d}" for number in range(1, len(ground) + 1)]
     for place, name in zip(
-        (0, 5, 18, 23, 9), ("south-1", "south-2", "north-1", "north-2", "middle"), strict=True
+        (1, 5, 29, 33, 17), ("south-1", "south-2", "north-1", "north-2", "middle"), strict=True
     ):
         names[place] = name
     matrices = Attitudes.of("omega_phi_kappa", np.radians(angles)).matrices

@@ -26,8 +26,8 @@ PACKAGES = (
     "photogram.stellar",
 )
 MADE_BY_THE_LIBRARY = {
-    "photogram": "FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection Result"
-    " Simulation VarianceComponents",
+    "photogram": "Cleaned FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection"
+    " Result Simulation VarianceComponents VarianceFunction",
     "photogram.absolute_orientation": "Orientation",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
@@ -106,6 +106,8 @@ def good(tmp_path_factory):
     session = comparator.simulate_calibration(plate, cases=1, sequence=range(1, 26)).session
     options = comparator.Options(joint=False, polynomial=False)
     calibration = comparator.calibrate(session, options)
+    star_camera = folder / "camera.json"
+    star_camera.write_bytes(stellar.BrownCamera.of_field(6000, 4000, 0.6).to_json())
     readings, deck, own_grid = folder / "readings.csv", folder / "deck.txt", folder / "grid.csv"
     readings.write_bytes(comparator.to_csv(session))
     deck.write_bytes(comparator.to_cards(session))
@@ -113,6 +115,10 @@ def good(tmp_path_factory):
     grid_deck = examples / "perspective_center" / "grid.deck"
     grid = perspective_center.read_deck(grid_deck)[0]
     problem = read_plain(examples / "stellar" / "plate.toml")
+    lens = photogram.Camera("brown", {"c": -152.74}, sd={"K1": 1e-8})
+    calibrated = photogram.adjust(
+        block.replace(cameras=[lens], photo_cameras=[0] * 3, principal_distances=None)
+    )
     points, places = np.array([[100.0, 200.0, 30.0]]), np.array([[0.0, 0.0, 1000.0]])
     resected = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 5.0], [0.0, 100.0, 3.0], [100.0, 100.0, 0.0]])
     seen = photogram.network.geometry.project(
@@ -135,11 +141,19 @@ def good(tmp_path_factory):
             "Refraction": {"air": "giant", "water": None, "water_level": 0.0, "refractive_index": 1.34},
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},
+            "check": {"network": block},
             "first_values": {"block": block},
+            "camera_from": {"path": star_camera, "name": "stars", "weighted": True},
+            "clean": {"network": block},
+            "compare": {"results": {"one": calibrated, "two": calibrated}},
+            "eliminate_terms": {"block": calibrated.block},
+            "score_test": {"result": calibrated, "names": ["K3"]},
+            "terms_test": {"result": calibrated, "names": ["K1"]},
             "group_sums": {"result": photogram.adjust(block)},
             "hints": {"block": block},
             "orient": {"stations": stations},
             "variance_components": {"network": block, "max_steps": 3},
+            "variance_function": {"network": block, "max_steps": 2, "bins": 2},
             "plan": {"patterns": {"one": block}},
             "predict": {"block": block},
             "resect": {"object_points": resected, "image_xy": seen, "principal_distance": -150.0},

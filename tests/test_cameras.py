@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import Block, Camera, InputError, RankError, adjust, predict
+from photogram import AdjustmentError, Block, Camera, InputError, RankError, adjust, predict
 from photogram.adjustment.undetermined import in_words
 from photogram.checks.rays import Rays
 from photogram.giant import Project
@@ -375,7 +375,70 @@ def test_images_beyond_where_a_lens_ends_are_named(example, block):
     said = next(message for message in messages if "one-to-one" in message)
     assert said.startswith("1 image point lies beyond")
     photo, point = block.photo_ids[block.image_photos[7]], block.point_ids[block.image_points[7]]
-    assert said.endswith(f"points {point} on photos {photo}")
+    assert f"points {point} on photos {photo}; the lens of barrel folds at a radius of 45.64 mm" in said
+
+
+def test_control_beyond_where_a_lens_ends_is_an_error(example, block):
+    """Where the point is known its ray is: something is wrong by far more than a measurement."""
+    camera = example.TRUTH.replace(parameters={"c": -24.3, "K1": -1.6e-4}, name="barrel")
+    xy, sd = block.image_xy.copy(), np.full(block.image_sd.shape, 0.5)
+    xy[7], sd[7] = [60.0, 0.0], 1e6
+    photo, point = block.image_photos[7], block.image_points[7]
+    truth = adjust(block.replace(cameras=[camera], image_sd=np.full(sd.shape, 0.5))).point_positions
+    positions, deviations = block.point_positions.copy(), block.point_sd.copy()
+    positions[point], deviations[point] = truth[point], 0.01
+    known = block.replace(
+        cameras=[camera], image_xy=xy, image_sd=sd, point_positions=positions, point_sd=deviations
+    )
+    with pytest.raises(AdjustmentError, match="control lies beyond where the lens") as caught:
+        adjust(known)
+    of = f"point {block.point_ids[point]} on photo {block.photo_ids[photo]}"
+    assert f"{of}; the lens of barrel folds at a radius of 45.64 mm, which becomes 30.43" in str(caught.value)
+
+
+def test_the_tilts_of_opencv_are_a_rotated_sensor():
+    """The documents of OpenCV, written out: R = Ry Rx, projected back to the plane of the lens."""
+    tau_x, tau_y, f, c = 0.08, -0.05, np.array([1200.0, 1190.0]), np.array([640.0, 480.0])
+    lens = {"k1": -0.1, "k2": 0.02, "p1": 1e-3, "p2": -2e-3, "s1": 1e-3, "s4": 2e-4}
+    names = {"fx": f[0], "fy": f[1], "cx": c[0], "cy": c[1]}
+    u = np.column_stack([np.random.default_rng(2).uniform(-0.4, 0.4, (20, 2)), -np.ones(20)])
+    plain = (Camera("opencv_pinhole", names | lens).project(u) - c) / f
+    (sx, sy), (cx, cy) = np.sin([tau_x, tau_y]), np.cos([tau_x, tau_y])
+    r = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
+    back = np.array([[r[2, 2], 0, -r[0, 2]], [0, r[2, 2], -r[1, 2]], [0, 0, 1]])
+    h = np.column_stack([plain, np.ones(20)]) @ (back @ r).T
+    tilted = Camera("opencv_tilted", names | lens | {"tau_x": tau_x, "tau_y": tau_y})
+    np.testing.assert_allclose(tilted.project(u), f * h[:, :2] / h[:, 2:] + c, atol=1e-9)
+    np.testing.assert_allclose(
+        tilted.rays(tilted.project(u)), u / np.linalg.norm(u, axis=1)[:, None], atol=1e-12
+    )
+    straight = Camera("opencv_tilted", names | lens)
+    np.testing.assert_allclose(straight.project(u), plain * f + c, atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["frame", "fisheye"])
+def test_p3_and_p4_of_agisoft_multiply_the_tangential_terms(kind):
+    given = {
+        "f": 3000.0,
+        "cx": 10.0,
+        "cy": -5.0,
+        "b1": 1.0,
+        "b2": -2.0,
+        "k1": -0.05,
+        "w": 4000.0,
+        "h": 3000.0,
+    }
+    tangential, p3, p4 = {"p1": 2e-3, "p2": -1e-3}, 0.3, -0.1
+    u = np.column_stack([np.random.default_rng(3).uniform(-0.5, 0.5, (20, 2)), -np.ones(20)])
+    rho = np.hypot(u[:, 0], u[:, 1])
+    ab = u[:, :2] * [1, -1] * (np.arctan(rho) / rho if kind == "fisheye" else np.ones(20))[:, None]
+    square = (ab**2).sum(axis=1)
+    without = Camera(f"agisoft_{kind}", given).project(u)
+    terms = Camera(f"agisoft_{kind}", given | tangential).project(u) - without
+    expected = without + terms * (1 + p3 * square + p4 * square**2)[:, None]
+    camera = Camera(f"agisoft_{kind}_p4", given | tangential | {"p3": p3, "p4": p4})
+    np.testing.assert_allclose(camera.project(u), expected, atol=1e-9)
+    np.testing.assert_allclose(camera.rays(expected), u / np.linalg.norm(u, axis=1)[:, None], atol=1e-12)
 
 
 def test_a_fisheye_sees_behind_its_own_plane():

@@ -234,6 +234,29 @@ def test_the_packaged_example(run, tmp_path):
     assert names(tmp_path / "galveston-adjusted") == OUTPUTS
 
 
+def test_components_and_the_unit_variance_of_redundancy_numbers(run, tmp_path):
+    options = ("--components", "kind", "--unit-variance", "redundancy")
+    result = run("giant", "--example", *options, "--json", "result.json")
+    assert result.exit_code in (0, 4), result.output
+    assert names(tmp_path / "galveston-adjusted") == OUTPUTS | {"components.txt"}
+    assert "Variance components" in result.output
+    text = (tmp_path / "galveston-adjusted" / "components.txt").read_text()
+    assert "images" in text
+    assert "factor of sd" in text
+    report = (tmp_path / "galveston-adjusted" / "report.txt").read_text()
+    assert "(redundancy numbers)" in report
+    assert "Redundancy by kind of observation" in report
+    document = json.loads(Path("result.json").read_bytes())
+    assert document["unit_variance"] == "redundancy"
+    assert document["redundancy"]["total"] == pytest.approx(round(document["redundancy"]["total"]), abs=1e-5)
+
+
+def test_components_of_a_collection(run):
+    result = run("collection", "--example", "--components", "component", "--out", "out")
+    assert result.exit_code in (0, 4), result.output
+    assert "images, x" in Path("out/components.txt").read_text()
+
+
 def test_strasbourg(run, tmp_path):
     if not STRASBOURG.exists():
         pytest.skip("the Strasbourg block is not beside the repository")

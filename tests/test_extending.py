@@ -15,9 +15,12 @@ FORMATS = Path("python/photogram/collection/formats")
 PACKAGE = [
     path
     for path in (ROOT / "python" / "photogram").rglob("*.py*")
-    if path.suffix in (".py", ".pyi") and path.parent.name != "stellar"
+    if path.suffix in (".py", ".pyi")
+    and path.parent.name != "stellar"
+    and ROOT / "python" / "photogram" / "formats" not in path.parents
 ]
-"""Without the calibration by stars, whose plots have a radial axis."""
+"""Without the calibration by stars, whose plots have a radial axis, and the files of other programs, which
+say what lenses and formats are called there."""
 CRATE = [path for path in (ROOT / "crates" / "photocore" / "src").rglob("*.rs") if path.name != "golden.rs"]
 BINDING = [*(ROOT / "crates" / "photogram-py" / "src").rglob("*.rs")]
 EXTENSIONS = {

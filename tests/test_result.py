@@ -220,7 +220,7 @@ def test_the_report_begins_with_the_problems(result):
     assert report.startswith("photogram ")
     assert "A BLOCK OF TWO STRIPS" in report.split("\n")[0]
     titles = list(sections(report))
-    assert titles[:3] == ["Problems", "Adjustment", "Residuals"]
+    assert titles[:4] == ["Verdict", "Problems", "Adjustment", "Residuals"]
     problems = sections(report)["Problems"]
     assert any("left out, pass point on one photo: SINGLE" in line for line in problems)
 
@@ -306,7 +306,7 @@ def test_members_of_the_document(result, document):
         "initial_weighted_sum_of_squares", "iterations", "weighted_sum_of_squares", "degrees_of_freedom",
         "unit_variance", "variance_of_unit_weight", "covariance_scale", "photos", "points", "observations",
         "observations_beside_images",
-        "control", "stations", "problems", "global_test",
+        "control", "stations", "problems", "global_test", "verdict",
         "check_points", "dropped_points", "ordering", "predictions", "operations", "refraction", "seconds",
         "datum", "redundancy", "weakest",
     }  # fmt: skip

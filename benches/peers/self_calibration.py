@@ -1,9 +1,10 @@
-"""Blocks that calibrate two cameras of eight parameters, beside the same with known cameras, and gtsam.
+"""Blocks that calibrate two cameras of eight parameters, beside the same with known cameras, and the peers.
 
-python benches/peers/self_calibration.py [20x50 ...] [--repetitions N] [--without-gtsam]
+python benches/peers/self_calibration.py [20x50 ...] [--repetitions N] [--without gtsam colmap]
 
 photogram computes the adjustment with all covariances and redundancy numbers; gtsam (`Cal3DS2` as an unknown
-that photos share, skew held) the bare solution, from the same initial values. All runs are interleaved.
+that photos share, skew held) and pycolmap (OPENCV cameras, Ceres) the bare solution, from the same initial
+values. All runs are interleaved.
 """
 
 from __future__ import annotations
@@ -76,17 +77,28 @@ def gtsam_solution(block: Block) -> Callable[[], float]:
     return solve
 
 
+def of_colmap(block: Block) -> Callable[[], float]:
+    """Return the same by COLMAP."""
+    from colmap_lenses import colmap_solution
+
+    return colmap_solution(block)
+
+
+PEERS: dict[str, Callable[[Block], Callable[[], float]]] = {"gtsam": gtsam_solution, "colmap": of_colmap}
+
+
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sizes", nargs="*", type=Size.parse, default=[Size(20, 50)], metavar="STRIPSxPHOTOS")
     parser.add_argument("--repetitions", type=int, default=3)
-    parser.add_argument("--without-gtsam", action="store_true")
+    parser.add_argument("--without", nargs="*", choices=list(PEERS), default=[])
     arguments = parser.parse_args()
     print(f"{processor()}; seconds, the fastest of {arguments.repetitions}; cpu: of all processors\n")
     head = ["photos", "known cameras", "cpu", "steps", "two of 8 unknown", "cpu", "steps", "ratio", "of cpu"]
-    if not arguments.without_gtsam:
-        head += ["gtsam, bare", "gtsam / photogram"]
+    peers = [name for name in PEERS if name not in arguments.without]
+    for name in peers:
+        head += [f"{name}, bare", f"{name} / photogram"]
     print("| " + " | ".join(head) + " |\n|" + "---:|" * len(head))
     for size in arguments.sizes:
         known, unknown = blocks(size)
@@ -94,13 +106,13 @@ def main() -> None:
             "known": lambda block=known: photogram.adjust(block),
             "unknown": lambda block=unknown: photogram.adjust(block),
         }
-        if not arguments.without_gtsam:
-            work["gtsam"] = gtsam_solution(unknown)
-        seconds: dict[str, float] = dict.fromkeys(work, np.inf)
+        seconds: dict[str, float] = dict.fromkeys([*work, *peers], np.inf)
         cpu = dict(seconds)
         found: dict[str, object] = {}
         for _ in range(arguments.repetitions):
-            for side, run in work.items():
+            # A solution of a peer cannot be repeated from where it has ended.
+            ready = work | {name: PEERS[name](unknown) for name in peers}
+            for side, run in ready.items():
                 start, start_cpu = time.perf_counter(), time.process_time()
                 found[side] = run()
                 seconds[side] = min(seconds[side], time.perf_counter() - start)
@@ -117,11 +129,11 @@ def row(size: Size, seconds: dict[str, float], cpu: dict[str, float], found: dic
     for side, result in (("known", known), ("unknown", unknown)):
         cells += [f"{seconds[side]:.2f}", f"{cpu[side]:.2f}", str(len(result.iterations))]
     cells += [f"{each['unknown'] / each['known']:.2f}" for each in (seconds, cpu)]
-    if "gtsam" in seconds:
-        ours, theirs = unknown.sums_of_squares.total, float(str(found["gtsam"]))
+    for name in [name for name in PEERS if name in seconds]:
+        ours, theirs = unknown.sums_of_squares.total, float(str(found[name]))
         if abs(theirs / ours - 1.0) > 1e-4:
-            raise SystemExit(f"The solutions do NOT agree: {ours} and {theirs}")
-        cells += [f"{seconds['gtsam']:.1f}", f"{seconds['gtsam'] / seconds['unknown']:.1f}"]
+            raise SystemExit(f"The solutions do NOT agree: {ours} and {theirs} of {name}")
+        cells += [f"{seconds[name]:.1f}", f"{seconds[name] / seconds['unknown']:.1f}"]
     return "| " + " | ".join(cells) + " |"
 
 

@@ -11,12 +11,15 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.cleaning import Cleaned, clean
     from photogram.adjustment.components import variance_components
+    from photogram.adjustment.elimination import eliminate_terms
     from photogram.adjustment.first_values import FirstValues, first_values
     from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.adjustment.snooping import snoop
+    from photogram.adjustment.variance_function import variance_function
     from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.messages import Message
@@ -31,8 +34,11 @@ if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
     from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
+    from photogram.results.model_tests import compare, score_test, terms_test
     from photogram.results.result import Result
     from photogram.results.snooped import Snooped
+    from photogram.results.variance_function import VarianceFunction
+    from photogram.stellar.cameras import camera_from
 
 __all__ = [
     "AdjustmentError",
@@ -40,6 +46,7 @@ __all__ = [
     "Attitudes",
     "Block",
     "Camera",
+    "Cleaned",
     "FirstValues",
     "GroupSums",
     "InnerConstraints",
@@ -61,9 +68,14 @@ __all__ = [
     "Snooped",
     "Spheroid",
     "VarianceComponents",
+    "VarianceFunction",
     "__version__",
     "adjust",
+    "camera_from",
     "check",
+    "clean",
+    "compare",
+    "eliminate_terms",
     "first_values",
     "group_sums",
     "hints",
@@ -71,9 +83,12 @@ __all__ = [
     "plan",
     "predict",
     "resect",
+    "score_test",
     "simulate",
     "snoop",
+    "terms_test",
     "variance_components",
+    "variance_function",
 ]
 
 _HOMES = {
@@ -83,6 +98,7 @@ _HOMES = {
     "Block": "network.block",
     "Camera": "network.cameras",
     "VarianceComponents": "results.components",
+    "VarianceFunction": "results.variance_function",
     "FirstValues": "adjustment.first_values",
     "GroupSums": "results.group_sums",
     "InnerConstraints": "network.datum",
@@ -105,7 +121,14 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "camera_from": "stellar.cameras",
     "check": "checks.checking",
+    "Cleaned": "adjustment.cleaning",
+    "clean": "adjustment.cleaning",
+    "compare": "results.model_tests",
+    "eliminate_terms": "adjustment.elimination",
+    "score_test": "results.model_tests",
+    "terms_test": "results.model_tests",
     "first_values": "adjustment.first_values",
     "group_sums": "results.group_sums",
     "hints": "adjustment.hints",
@@ -116,6 +139,7 @@ _HOMES = {
     "simulate": "network.simulation",
     "snoop": "adjustment.snooping",
     "variance_components": "adjustment.components",
+    "variance_function": "adjustment.variance_function",
 }
 """The module of each name, loaded when it is first asked for.
 

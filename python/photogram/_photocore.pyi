@@ -31,6 +31,9 @@ CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
 """Of an adjusted camera: k parameters, k x k cofactors row by row, k redundancy numbers, the diagonal of the
 normal equations (k), photos, images."""
 
+_DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
+"""What a datum is: its name, points, photos, whether scale counts, photos whose attitudes count, radius."""
+
 RefractionRow = tuple[str | None, str | None, float, float, float]
 """Model of the air (`giant`, `standard` or None), model of the water (`giant`, `snell` or None), water level
 (linear unit), refractive index of the water, metres in the linear unit."""
@@ -674,7 +677,7 @@ class BlockNetwork:
     def adjust(
         self,
         *,
-        datum: tuple[str, list[int], list[int], bool] | None,
+        datum: _DatumRow | None,
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
         start: BlockState | None = None,
@@ -688,7 +691,7 @@ class BlockNetwork:
     def in_datum(
         self,
         state: BlockState,
-        datum: tuple[str, list[int], list[int], bool],
+        datum: _DatumRow,
         *,
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
@@ -704,8 +707,8 @@ class BlockNetwork:
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended, in the datum that it was taken to."""
 
-    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
-        """Prepare for trials without some observations, from where the adjustment has ended."""
+    def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where an adjustment ended, or from the start."""
 
     def resistance(self, state: BlockState, *, threads: int) -> list[tuple[str, float]]:
         """Return what keeps the block from moving as a whole: kinds of observations.
@@ -745,14 +748,12 @@ class NetworkTrial:
     def deviations(self) -> _Floats:
         """(M,) standard deviations a priori, in the units of the observations."""
 
-    def stand(self, held: list[int]) -> tuple[str, int, float, int, list[int]]:
-        """Take the network as it stands, with everything in it; return how it stands, as `adjust`.
+    @property
+    def photos(self) -> list[list[float]]:
+        """The values of each photo where the last trial has ended: as they are given, pose first."""
 
-        Parameters
-        ----------
-        held
-            Unknowns that were held for a datum.
-        """
+    def stand(self) -> tuple[str, int, float, int, list[int]]:
+        """Take the network as its adjustment has ended, with everything in it; return what `adjust` does."""
 
     def adjust(
         self,
@@ -879,7 +880,10 @@ class BlockState:
     ordering
         The name of the ordering in force.
     datum
-        Its name, points, photos, and whether scale counts; None for that of what was held.
+        Its name, points, photos, whether scale counts, photos whose attitudes count, and what makes turns
+        comparable with shifts; None for that of what was held.
+    released
+        Whether control that was exactly minimal was given up for it.
 
     Raises
     ------
@@ -894,18 +898,12 @@ class BlockState:
         collapsed: list[int],
         loose: list[int],
         ordering: str,
-        datum: tuple[str, list[int], list[int], bool] | None,
+        datum: _DatumRow | None,
+        released: bool,
     ) -> BlockState: ...
     def __getnewargs__(
         self,
-    ) -> tuple[
-        list[float],
-        list[int],
-        list[int],
-        list[int],
-        str,
-        tuple[str, list[int], list[int], bool] | None,
-    ]: ...
+    ) -> tuple[list[float], list[int], list[int], list[int], str, _DatumRow | None, bool]: ...
 
 @final
 class BlockCovariances:
@@ -1150,6 +1148,10 @@ class BlockSolution(_NetworkSolution):
     @property
     def lost_digits(self) -> float:
         """About how large a part of the variances rounding may be in the datum that it was taken to."""
+
+    @property
+    def minimal_control(self) -> bool:
+        """Whether control and weights of poses are exactly what a datum takes."""
 
     @property
     def weak_unknowns(self) -> list[tuple[int, int]]:
@@ -2035,8 +2037,8 @@ class CollectionNetwork:
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended."""
 
-    def trial(self, state: BlockState, *, threads: int) -> NetworkTrial:
-        """Prepare for trials without some observations, from where the adjustment has ended."""
+    def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:
+        """Prepare for trials without some observations, from where an adjustment ended, or from the start."""
 
 @final
 class CollectionSolution(_NetworkSolution):

@@ -46,6 +46,7 @@ RUNS = {
     "stellar-camera plate": (["stellar-camera", "plate.toml"], ["plate.toml", "stars.csv", "images.csv"]),
     "stellar-camera exposures": (["stellar-camera", "exposures", "night.toml"], ["night.toml", "images.csv"]),
     "adjust": (["adjust", "project"], ["project/images.csv", "project/project.toml"]),
+    "check": (["check", "project"], ["project/images.csv"]),
     "info": (["info", "project"], ["project/images.csv"]),
     "convert": (["convert", "project"], ["project/images.csv"]),
     "new": (["new"], []),

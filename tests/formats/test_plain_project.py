@@ -8,7 +8,7 @@ import pytest
 from block import check_adjustment, check_poses, same_blocks, sample, truth, with_control, with_noise
 from damaged import check_damaged
 
-from photogram import Camera, InputError, adjust, first_values, formats, simulate
+from photogram import Attitudes, Camera, InputError, adjust, first_values, formats, simulate
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
 from photogram.network.observations import Attitude, Control, Difference, Distance, Position
@@ -69,6 +69,9 @@ def test_the_small_sample_has_no_more_than_it_needs():
     known = truth()["photos"]
     for name, position in zip(result.block.photo_ids, result.photo_positions, strict=True):
         np.testing.assert_allclose(position, known[name]["centre"], atol=1e-6)
+    matrices = Attitudes.of("omega_phi_kappa", result.photo_attitudes).values("matrix_to_photo")
+    for name, matrix in zip(result.block.photo_ids, matrices, strict=True):
+        np.testing.assert_allclose(matrix, known[name]["rotation"], atol=1e-6)
     assert "--sd images" in project.lacks[0]
 
 
@@ -174,7 +177,7 @@ def test_every_kind_of_observation_comes_back(tmp_path):
     boresight = Boresight("imu", body, np.radians(0.5))
     covariance = np.array([[4.0, 1.0, 0.5], [1.0, 5.0, -0.3], [0.5, -0.3, 9.0]]) * 1e-4
     free = next(row for row in range(len(points)) if not np.isfinite(block.point_positions[row]).any())
-    camera = Camera("brown", {"c": 152.0, "xp": 0.01, "K1": 1e-8}, {"c": np.inf, "K1": 1e-9}, name="A")
+    camera = Camera("brown", {"c": -152.0, "xp": 0.01, "K1": 1e-8}, {"c": np.inf, "K1": 1e-9}, name="A")
     observations = [
         *(
             Position(
@@ -257,18 +260,18 @@ def test_a_round_trip_gives_the_same_adjustment(example, tmp_path):
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
-        ("images.csv", "DJI_0101,t02", "DJI_0101,t03", ["images.csv", "record", "already"]),
-        ("images.csv", "DJI_0101,t02", "DJI_0101,", ["images.csv", "record 4", "column point", "empty"]),
-        ("images.csv", "DJI_0101,t02", "DJI_0101,NaN", ["record 4", "column point", "no name"]),
-        ("images.csv", "DJI_0101,t02", "DJI_0101,T02", ["images.csv", "column point", "case alone"]),
-        ("images.csv", "DJI_0101,t02", "dji_0101,t02", ["record 4", "column photo"]),
+        ("images.csv", "DJI_0101,t03", "DJI_0101,t04", ["images.csv", "record", "already"]),
+        ("images.csv", "DJI_0101,t03", "DJI_0101,", ["images.csv", "record 5", "column point", "empty"]),
+        ("images.csv", "DJI_0101,t03", "DJI_0101,NaN", ["record 5", "column point", "no name"]),
+        ("images.csv", "DJI_0101,t03", "DJI_0101,T03", ["images.csv", "column point", "case alone"]),
+        ("images.csv", "DJI_0101,t03", "dji_0101,t03", ["record 5", "column photo"]),
         (
             "images.csv",
-            "DJI_0101,t02,",
-            "DJI_0101,t02,x",
-            ["record 4", "column column", "is not a number", "|DJI_0101,t02,x"],
+            "DJI_0101,t03,",
+            "DJI_0101,t03,x",
+            ["record 5", "column column", "is not a number", "|DJI_0101,t03,x"],
         ),
-        ("images.csv", "DJI_0101,t02,", "DJI_0101,t02,nan,", ["record 4"]),
+        ("images.csv", "DJI_0101,t03,", "DJI_0101,t03,nan,", ["record 5"]),
         ("images.csv", "photo,point,column,row", "photo,point,colum,row", ["record 2", "missing"]),
         ("photos.csv", "DJI_0102,", "DJI_0101,", ["photos.csv", "record 5", "twice"]),
         ("photos.csv", "DJI_0102,drone", "DJI_0102,phone", ["record 5", "column camera", "phone"]),
@@ -294,7 +297,7 @@ def test_a_fault_is_named_with_file_row_and_column(example, file, old, new, word
 
 
 def test_names_that_differ_by_blanks_inside_are_an_error(example):
-    text = (example / "images.csv").read_text().replace("t02", "t 2").replace("t03", "t  2")
+    text = (example / "images.csv").read_text().replace("t01", "t 2").replace("t03", "t  2")
     (example / "images.csv").write_text(text)
     with pytest.raises(InputError, match="differs from 't 2' by blanks or case alone"):
         formats.read(example)
@@ -318,3 +321,28 @@ def test_a_point_that_is_known_twice_must_be_the_same(example):
 @pytest.mark.parametrize("seed", range(5))
 def test_damaged_projects_end_in_a_message(example, tmp_path, seed):
     assert check_damaged(example, tmp_path / "damaged", None if seed else "plain", 100, seed) > 30
+
+
+def test_tables_of_parquet_are_read_as_those_of_text(example):
+    pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    plain = formats.read(example)
+    table = read_columns(example / "images.csv")
+    columns = {
+        "photo": pyarrow.array(table.texts("photo")).dictionary_encode(),
+        "point": table.texts("point"),
+        "column": table.numbers("column"),
+        "row": table.numbers("row"),
+    }
+    (example / "images.csv").unlink()
+    parquet.write_table(pyarrow.table(columns), example / "images.parquet", compression="zstd")
+    other = formats.read(example)
+    assert other.block.point_ids == plain.block.point_ids
+    np.testing.assert_array_equal(other.block.image_xy, plain.block.image_xy)
+    columns["point"] = [*columns["point"][:-1], None]
+    parquet.write_table(pyarrow.table(columns), example / "images.parquet")
+    with pytest.raises(InputError, match="column point: is empty"):
+        formats.read(example)
+    (example / "images.parquet").write_bytes(b"PAR1 and no more")
+    with pytest.raises(InputError, match="cannot be read as Parquet"):
+        formats.read(example)

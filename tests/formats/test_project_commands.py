@@ -133,6 +133,25 @@ def test_a_user_adds_what_a_project_lacks(run, tmp_path):
         assert say in refused.stderr
 
 
+def test_a_blunder_is_said_and_taken_out(run, tmp_path):
+    run("new", "own")
+    path = tmp_path / "own" / "images.csv"
+    lines = path.read_text().splitlines()
+    row = next(k for k, line in enumerate(lines) if line.startswith("DJI_0105,t24,"))
+    photo, point, column, height = lines[row].split(",")
+    lines[row] = f"{photo},{point},{float(column) + 30!r},{height}"
+    path.write_text("\n".join(lines) + "\n")
+    plain = run("adjust", "own")
+    assert plain.exit_code == 4, plain.output
+    done = run("adjust", "own", "--snoop", "--out", "out")
+    assert done.exit_code in (0, 4), done.output
+    removed = pd.read_csv(tmp_path / "out" / "removed.csv")
+    assert any("t24" in name and "DJI_0105" in name for name in removed["name"])
+    assert run("adjust", "own", "--snoop", "--datum", "inner").exit_code == 2
+    checked = run("check", "own")
+    assert "t24" in checked.output
+
+
 def test_what_a_format_cannot_hold_is_listed(run, tmp_path):
     run("new", "own")
     done = run("convert", "own", "other")

@@ -21,7 +21,14 @@ from .sound import SOUND, Files
 
 __all__ = ["ENDINGS", "Fuzzer", "Outcome", "kind_of"]
 
-ENDINGS = ("converged", "not converged", "refused by the adjustment", "refused as input", "failed")
+ENDINGS = (
+    "converged",
+    "not usable",
+    "not converged",
+    "refused by the adjustment",
+    "refused as input",
+    "failed",
+)
 """How an input ends."""
 _FORMATS = list(PROGRAMS)
 _WEIGHTS = [often for _, often in PROGRAMS.values()]
@@ -119,6 +126,8 @@ class Fuzzer:
         except typer.Exit as leaving:
             if leaving.exit_code == 3:
                 return "not converged", None, []
+            if leaving.exit_code == 4:
+                return "not usable", None, []
             return "failed", f"exit code {leaving.exit_code}", None
         except typer.BadParameter:
             return "refused as input", None, None

@@ -1,9 +1,16 @@
 """A camera calibrated by stars is one that blocks take, with its covariance."""
 
-import numpy as np
+import re
+from dataclasses import replace
 
-from photogram import adjust, simulate
-from photogram.stellar.cameras import BrownCamera
+import numpy as np
+import pytest
+import star_plates
+
+from photogram import InputError, adjust, camera_from, simulate
+from photogram.stellar import calibrate
+from photogram.stellar.cameras import BrownCamera, camera_document
+from photogram.stellar.parameters import INDEX, NAMES, UNITS
 
 VALUES = np.array([8000.0, 8010.0, 6010.0, 5990.0, -0.02, 0.004, -3e-4, 1e-4, -2e-4])
 SD = np.array([0.5, 0.5, 0.8, 0.8, 2e-4, 2e-4, 1e-5, 1e-5, 0.0])
@@ -42,3 +49,80 @@ def test_it_is_an_observation_with_its_covariance():
     assert (found.sd[places] <= SD[:8] * max(1.0, np.sqrt(result.covariance_scale)) * (1 + 1e-9)).all()
     assert found.redundancy[places].sum() > 0
     assert (found.redundancy[places] < 1).all()
+
+
+@pytest.mark.parametrize("form", ["published", "scale first", "scale last", "one scale"])
+def test_a_plate_has_the_images_of_its_calibration_and_its_covariance(plate, form):
+    options = {
+        "published": {"as_published": True},
+        "scale last": {"distortion_first": 0.3},
+        "one scale": {"common_scale": True},
+    }
+    problem = replace(plate, options=replace(plate.options, **options.get(form, {})))
+    result = calibrate(problem)
+    camera = result.as_camera("plate")
+    own = result.combined or result
+    parameters = own.solved.parameters
+    # What the calibration sees in standard coordinates is seen in the axes m, n, q of an attitude.
+    standard = star_plates.standard_coordinates(own.problem, parameters, own.solved.places)
+    turned = np.empty((len(standard), 3))
+    for group in range(3):
+        chosen = own.problem.image_groups == group
+        turned[chosen] = standard[chosen] @ star_plates.matrix(parameters[3 * group : 3 * group + 3]).T
+    images = camera.project(turned * [1.0, -1.0, -1.0])
+    expected = 1000.0 * star_plates.images(own.problem, parameters, own.solved.places)
+    np.testing.assert_allclose(images, expected, atol=1e-10)
+    back = camera.rays(images)
+    np.testing.assert_allclose(
+        back, turned * [1, -1, -1] / np.linalg.norm(turned, axis=1)[:, None], atol=1e-12
+    )
+    # Every variance and covariance, in mm.
+    names, found = camera.covariance
+    known = [name for name in NAMES[9:22] if own.covariance[INDEX[name], INDEX[name]] > 0]
+    assert [{"c": "cx", "c_y": "cy"}.get(name, name) for name in names] == known
+    powers = [
+        {"rad": 0, "m": 1}[unit] if unit in ("rad", "m") else int(unit[2:]) for unit in map(UNITS.get, known)
+    ]
+    unit = 1000.0 ** np.array(powers, float)
+    rows = [INDEX[name] for name in known]
+    np.testing.assert_allclose(found, own.covariance[np.ix_(rows, rows)] * np.outer(unit, unit), rtol=1e-12)
+    assert (camera.parameters["c_y"] == 0) == (form == "one scale")
+
+
+def test_cameras_are_read_from_the_files_of_calibrations(plate, tmp_path):
+    result, file = calibrate(plate), tmp_path / "camera.json"
+    file.write_bytes(camera_document(result))
+    read, own = camera_from(file, "plate"), result.as_camera("plate")
+    assert (read.model, read.name, read.parameters) == (own.model, own.name, own.parameters)
+    np.testing.assert_array_equal(read.covariance[1], own.covariance[1])
+    assert camera_from(str(file), weighted=False).is_held
+    file.write_bytes(CALIBRATED.to_json())
+    assert camera_from(file).model == "full_opencv"
+    for content, message in (
+        (b'{"kind": "report"}', "is a report, not a brown camera or a sky camera"),
+        (b'{"nonorthogonality_rad": 0.0}', "comparator.Correction.read"),
+        (b"[1", "is not a camera"),
+        (b"[1]", "is not a camera: no JSON object"),
+        (b'{"kind": "brown camera"}', "is not a camera: 'parameters'"),
+    ):
+        file.write_bytes(content)
+        with pytest.raises(InputError, match=re.escape(message)):
+            camera_from(file)
+
+
+def test_a_plate_camera_is_a_prior_of_a_block(plate):
+    """With the images of the block the camera is known better than before, never worse."""
+    camera = calibrate(plate).as_camera("plate")
+    simulation = simulate(
+        strips=2, photos_per_strip=4, frame_size=90.0, seed=3, cameras=[camera], start_cameras=[camera]
+    )
+    result = adjust(simulation.block)
+    assert result.converged
+    names, prior = camera.covariance
+    rows = [camera.names.index(name) for name in names]
+    found, given = result.cameras[0].covariance[np.ix_(rows, rows)], np.asarray(prior)
+    scale = 1 / np.sqrt(np.diag(given))
+    gain = given - found / result.covariance_scale
+    assert np.linalg.eigvalsh(gain * np.outer(scale, scale)).min() > -1e-9
+    assert 0 < result.cameras[0].redundancy.sum() < len(names)
+    assert result.variance_of_unit_weight == pytest.approx(1.0, abs=0.3)

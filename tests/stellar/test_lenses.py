@@ -2,16 +2,20 @@
 
 from dataclasses import replace
 
-import allsky
 import numpy as np
 import pytest
 
+from example_scripts import load
 from photogram import InputError, _photocore
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.night import calibrate_night
+from photogram.stellar.night_plots import figures
 from photogram.stellar.night_report import report
+from photogram.stellar.places import apparent_places, sidereal_time
+from photogram.stellar.skies import partials, project_sky
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 
+allsky = load("all_sky_camera")
 FISHEYES = ("equidistant", "equisolid", "stereographic", "kannala_brandt")
 
 
@@ -125,3 +129,46 @@ def test_projections_and_their_ways_back(model):
         step = np.eye(6)[k] * 1e-6
         ends = [_photocore.camera_images(model, values + sign * step, u) for sign in (1, -1)]
         assert by_parameters[:, :, k] == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5, abs=1e-3)
+
+
+@pytest.mark.parametrize("common_scale", [False, True])
+@pytest.mark.parametrize("lens", LENSES)
+def test_partials_of_every_lens_are_those_of_its_images(lens, common_scale):
+    """By attitude and camera, against differences of projected stars."""
+    truth = replace(allsky.camera(lens), common_scale=common_scale)
+    exposures, stars, bright = allsky.exposures(lens, np.random.default_rng(1), count=1)
+    exposure = replace(exposures[0], stars=stars[0])
+    by_attitude, by_camera = partials([exposure], truth, allsky.SITE, bright)
+    places = apparent_places(bright, exposure.utc)[stars[0][stars[0] >= 0]]
+    time = sidereal_time(allsky.SITE, exposure.utc)
+
+    def seen(camera, attitude):
+        return project_sky(camera, attitude, allsky.SITE, places, time)
+
+    for k in range(3):
+        step = np.eye(3)[k] * 1e-6
+        ends = [seen(truth, exposure.attitude + sign * step) for sign in (1, -1)]
+        assert by_attitude[:, :, k] == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5, abs=1e-3)
+    for k in range(len(truth.values)):
+        size = 1e-3 if k < 4 else 1e-6
+        step = np.eye(len(truth.values))[k] * size
+        ends = [
+            seen(replace(truth, values=truth.values + sign * step), exposure.attitude) for sign in (1, -1)
+        ]
+        expected = (ends[0] - ends[1]) / (2 * size)
+        if common_scale and k == 1:
+            assert not expected.any()
+        assert by_camera[:, :, k] == pytest.approx(expected, rel=1e-5, abs=1e-4)
+
+
+@pytest.mark.parametrize("lens", ["equisolid", "kannala_brandt"])
+def test_pictures_of_a_fisheye(lens):
+    """The curve over the angle, and what the terms change: nothing where there are none."""
+    night, _ = allsky.night(lens, 7)
+    left, right = figures(calibrate_night(night))["distortion"].axes
+    (curve,), (terms,) = left.lines, right.lines
+    theta = np.radians(curve.get_xdata())
+    assert curve.get_ydata()[-1] > 900
+    change = 950 * theta * (0.03 * theta**2 - 0.01 * theta**4 + 0.004 * theta**6 - 6e-4 * theta**8)
+    expected = change if lens == "kannala_brandt" else 0 * theta
+    assert terms.get_ydata() == pytest.approx(expected, abs=0.5)

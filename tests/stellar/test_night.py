@@ -332,6 +332,10 @@ def test_command_line(tmp_path, monkeypatch):
     assert written == {
         "report.txt",
         "camera.json",
+        "camera.yaml",
+        "camera-ros.yaml",
+        "exposures.csv",
+        "star-images.csv",
         "stars.png",
         "residuals.png",
         "histogram.png",

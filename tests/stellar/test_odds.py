@@ -66,11 +66,11 @@ def test_a_crowded_field_is_not_counted():
     assert not found.accepted
 
 
-@pytest.mark.parametrize("seed", [0, 1, 4, 5, 17])
+@pytest.mark.parametrize("seed", [0, 1, 4, 5, 7, 17, 19])
 def test_no_simulated_night_ends_wrong(seed):
-    """`benches/star_nights.py` runs hundreds."""
+    """`benches/star_nights.py` runs hundreds; roll unknown in the odd ones, and not said in 19."""
     sky = NIGHTS["make"](seed)
     end, about, _ = NIGHTS["verdict"](sky)
     assert end != "wrong", about
-    if abs(sky.field_error) < 0.01:
+    if abs(sky.field_error) < 0.01 and sky.roll != "unknown, not said":
         assert end == "right", about

@@ -13,7 +13,14 @@ fn sample(name: &str, numbers: &[f64]) -> Camera {
     // Terms of a lens, of which together a third at the most.
     let part = 0.3 / parameters.len() as f64;
     let value = |(&(parameter, unit), number): (&(&str, Unit), &f64)| match (parameter, unit) {
-        ("cx" | "cy" | "xp" | "yp" | "r0" | "b1" | "b2", Unit::Image) => 100.0 * number,
+        ("cx" | "cy" | "xp" | "yp" | "r0" | "b1" | "b2" | "dx" | "dy" | "x0" | "y0", Unit::Image) => {
+            100.0 * number
+        }
+        (polynomial, Unit::Image)
+            if name.starts_with("on_comparator") && polynomial.starts_with(['x', 'y']) =>
+        {
+            part * 100.0 * number
+        }
         ("alpha" | "omega", _) => 0.7 + 0.2 * number,
         ("beta", _) => 1.0 + 0.2 * number,
         (_, Unit::Image) => 900.0 + 600.0 * number,

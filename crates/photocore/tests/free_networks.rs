@@ -184,7 +184,12 @@ fn inner_constraints_are_those_of_the_pseudo_inverse() {
         (points[2..6].to_vec(), vec![0, 3]),
         (points, photos),
     ] {
-        let inner = InnerConstraints { points: points.clone(), photos: photos.clone(), scale: true };
+        let inner = InnerConstraints {
+            points: points.clone(),
+            photos: photos.clone(),
+            scale: true,
+            ..Default::default()
+        };
         let found = in_datum(&network, &inner).unwrap();
         let carriers: Vec<usize> = points
             .iter()
@@ -255,7 +260,12 @@ fn cofactors_of_everything_go_over_to_any_datum() {
     let a = design(&network, &minimal);
     assert!(greatest(&whole(&network, &minimal, None), &dense(&a, &held)) < 1e-8);
 
-    let inner = InnerConstraints { points: points.clone(), photos: photos.clone(), scale: true };
+    let inner = InnerConstraints {
+        points: points.clone(),
+        photos: photos.clone(),
+        scale: true,
+        ..Default::default()
+    };
     let found = in_datum(&network, &inner).unwrap();
     let carriers: Vec<usize> =
         (0..3 * POINTS).chain(photos.iter().map(step).flat_map(|first| first..first + 3)).collect();
@@ -267,7 +277,8 @@ fn cofactors_of_everything_go_over_to_any_datum() {
     let mut go = |_| ControlFlow::Continue(());
     let (options, pool) = (options(FINE), pool());
     let datum = NetworkDatum::Inner(inner);
-    let two = NetworkDatum::Inner(InnerConstraints { points: vec![3, 7, 9], photos: vec![], scale: true });
+    let two =
+        NetworkDatum::Inner(InnerConstraints { points: vec![3, 7, 9], scale: true, ..Default::default() });
     let by_two = network.in_datum(&options, &minimal.state, &two, &pool, &mut go).unwrap();
     for from in [&minimal, &by_two] {
         let there = network.in_datum(&options, &from.state, &datum, &pool, &mut go).unwrap();
@@ -351,7 +362,7 @@ fn rigid(solution: &Solution) -> Mat<f64> {
 fn scale_stays_where_it_is_held_unless_it_is_asked_for() {
     let network = around();
     let minimal = adjust(&network, FINE).unwrap();
-    let inner = InnerConstraints { points: (0..POINTS).collect(), photos: vec![], scale: false };
+    let inner = InnerConstraints { points: (0..POINTS).collect(), ..Default::default() };
     let found = in_datum(&network, &inner).unwrap();
     for (a, b) in [(0, 1), (3, 11), (7, 2)] {
         let distance = |solution: &Solution| {
@@ -365,7 +376,7 @@ fn scale_stays_where_it_is_held_unless_it_is_asked_for() {
 #[test]
 fn what_is_not_free_or_not_carried_is_refused() {
     let network = around();
-    let inner = |points: Vec<usize>| InnerConstraints { points, photos: vec![], scale: true };
+    let inner = |points: Vec<usize>| InnerConstraints { points, scale: true, ..Default::default() };
     let not_carried = Some(NetworkError::Datum(DatumError::NotCarried));
     assert_eq!(in_datum(&network, &inner(vec![])).err(), not_carried);
     assert_eq!(
@@ -421,8 +432,12 @@ fn geographic_networks_are_free_to_move_too() {
     // Geocentric coordinates are good to a nanometre.
     let minimal = adjust(&network, Method::default()).unwrap();
     assert_eq!((minimal.adjustment.status, minimal.datum.len()), (Status::Converged, 7));
-    let inner =
-        InnerConstraints { points: (0..POINTS).collect(), photos: (0..PHOTOS).collect(), scale: true };
+    let inner = InnerConstraints {
+        points: (0..POINTS).collect(),
+        photos: (0..PHOTOS).collect(),
+        scale: true,
+        ..Default::default()
+    };
     let mut given = options(Method::default());
     given.start = Start::Given;
     let found = network.adjust_in_datum(&given, &inner, &pool(), &mut |_| ControlFlow::Continue(())).unwrap();

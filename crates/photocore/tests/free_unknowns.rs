@@ -165,7 +165,7 @@ fn common_unknowns_move_with_a_free_network() {
     assert!(minimal.datum.iter().all(|&(photo, _)| photo < 5), "frames are held, not photos on them");
 
     let datum = |points: std::ops::Range<usize>| {
-        NetworkDatum::Inner(InnerConstraints { points: points.collect(), photos: vec![], scale: false })
+        NetworkDatum::Inner(InnerConstraints { points: points.collect(), ..Default::default() })
     };
     let (first, second) = (datum(0..7), datum(7..14));
     let by_first = network.in_datum(&options(), &minimal.state, &first, &pool, &mut go).unwrap();

@@ -202,6 +202,7 @@ fn a_free_network_with_and_without_scale_bars_in_four_datums() {
             points: points.iter().map(|&name| index[name]).collect(),
             photos: photos.iter().map(|&name| index[name]).collect(),
             scale: golden["with_scale"].as_bool().unwrap(),
+            ..Default::default()
         };
         assert_solution(&adjust(&network, Some(&datum)), golden, &index, name);
     }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photogram.adjustment import findings  # noqa: F401  (what the verdict on a resection rests on)
+
 if TYPE_CHECKING:
     from photogram.adjustment.adjustment import AsPublished, Ordering, Progress, UnitVariance, adjust
 

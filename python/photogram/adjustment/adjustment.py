@@ -14,6 +14,7 @@ from photogram import _photocore
 from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
 from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
+from photogram.adjustment.started import started
 from photogram.adjustment.undetermined import undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
@@ -193,6 +194,7 @@ def adjust(
             photo_positions_observed=None,
             photo_attitudes_observed=None,
         )
+    block = started(block)
     inner = datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
     options = CoreOptions(
         criterion="percent" if as_published else "fraction",

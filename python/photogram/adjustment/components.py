@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import singledispatch
 from typing import Any
 
@@ -26,7 +26,7 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 
-__all__ = ["Weighing", "variance_components", "weighing"]
+__all__ = ["Settings", "Weighing", "of_grouping", "scaled", "variance_components", "weighing"]
 
 NOTHING = 1e-6
 """A redundancy that is rounding."""
@@ -65,7 +65,7 @@ class _Block(Weighing):
         self.result = self.first = adjust(block, tolerance=tolerance, threads=threads)
 
     def adjust(self, grouping: Grouping, factors: Floats) -> Result:
-        self.network = scaled(self.given, grouping, factors)
+        self.network = _scaled_block(self.given, grouping, factors)
         self.result = adjusted_again(
             self.network, self.result.options, self.result.state, threads=self.threads
         )
@@ -89,8 +89,14 @@ def _(network: Block, *, threads: int | None, tolerance: float) -> Weighing:
     return _Block(network, threads, tolerance)
 
 
-def scaled(block: Block, grouping: Grouping, factors: Floats) -> Block:
-    """Return a block with the variances of groups multiplied by factors."""
+@singledispatch
+def scaled(network: Any, grouping: Grouping, factors: Floats) -> Any:
+    """Return a block or collection with the variances of (G,) groups multiplied by factors."""
+    raise InputError(f"no block or collection: {shown(network)}")
+
+
+@scaled.register
+def _scaled_block(block: Block, grouping: Grouping, factors: Floats) -> Block:
     roots = np.sqrt(factors)
     of_photos = grouping.factors(roots, grouping.photos)
     of_observations = grouping.factors(factors, grouping.observations)
@@ -175,12 +181,37 @@ def variance_components(
         raise InputError(f"the tolerance of components is between 0 and 1, not {tolerance:g}")
     if max_steps < 1:
         raise InputError("there must be one step at least")
-    probing = probing or Probing()
     grouping = grouped(observables(network), groups)
+    settings = Settings(tolerance, max_steps, least_redundancy, level, equality, probing or Probing())
+    return of_grouping(network, grouping, settings, held=held, threads=threads, progress=progress)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How components are estimated: see :func:`variance_components`."""
+
+    tolerance: float = 1e-4
+    max_steps: int = 100
+    least_redundancy: float = LEAST_REDUNDANCY
+    level: float = 0.05
+    equality: bool = True
+    probing: Probing = field(default_factory=Probing)
+
+
+def of_grouping(
+    network: object,
+    grouping: Grouping,
+    settings: Settings,
+    *,
+    held: Sequence[str] = (),
+    threads: int | None = None,
+    progress: Callable[[int, Floats], None] | None = None,
+) -> VarianceComponents:
+    """Estimate the components of groups that are numbered already; see :func:`variance_components`."""
     names = grouping.groups.names
     if unknown := [name for name in held if name not in names]:
         raise InputError(f"no group is called {shown(unknown[0])}; there are {', '.join(names[:20])}")
-    own = weighing(network, threads=threads, tolerance=min(1e-5, SHARPER * tolerance))
+    own = weighing(network, threads=threads, tolerance=min(1e-5, SHARPER * settings.tolerance))
     number = 0
 
     def adjusted(factors: Floats) -> Left:
@@ -191,7 +222,7 @@ def variance_components(
         if progress is not None:
             progress(number, factors[:-1].copy())
         number += 1
-        return Left(result, grouping, *own.total(), own.factored, probing)
+        return Left(result, grouping, *own.total(), own.factored, settings.probing)
 
     found = estimate(
         adjusted,
@@ -202,11 +233,11 @@ def variance_components(
             images=(*grouping.groups.images, False),
             held={names.index(name): "as asked" for name in held} | {len(names): "its weights are given"},
         ),
-        tolerance=tolerance,
-        max_steps=max_steps,
-        least_redundancy=least_redundancy,
-        level=level,
-        equality=equality,
+        tolerance=settings.tolerance,
+        max_steps=settings.max_steps,
+        least_redundancy=settings.least_redundancy,
+        level=settings.level,
+        equality=settings.equality,
     )
     if not any(each.redundancy > 0 for each in found.components):
         raise InputError("the network has no redundancy: nothing can be said of its weights")

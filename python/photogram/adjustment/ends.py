@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.adjustment.undetermined import weak_in_words
 from photogram.errors import AdjustmentError
 from photogram.messages import Message, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
-
-if TYPE_CHECKING:
-    from photogram import _photocore
 
 __all__ = ["behind", "folded", "harmful", "hidden", "rounded", "too_coarse", "undetermined"]
 
@@ -133,19 +130,51 @@ def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
 
 
 def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Remark on images beyond where the radial terms of a lens are one-to-one: they fit two directions."""
-    images = solution.images_folded
+    """Remark on images beyond where the radial terms of a lens are one-to-one: they fit two directions.
+
+    Points that are known give the ray, so that camera, pose or coordinates are wrong by more than an error of
+    measurement: that is an error. Where the point itself is unknown, one image may be a mistake, which its
+    residual shows: that is a remark, and the result is there to look for it.
+
+    Raises
+    ------
+    AdjustmentError
+        The point of such an image has given coordinates.
+    """
+    images = np.asarray(solution.images_folded)
     if not len(images):
         return []
+    given = np.asarray(np.isfinite(block.point_sd).any(axis=1))[block.image_points[images]]
+    ends = _fold_of(block, solution, int(images[given.argmax()]))
+    if given.any():
+        own = zip(block.image_points[images[given]], block.image_photos[images[given]], strict=True)
+        where = [f"point {block.point_ids[point]} on photo {block.photo_ids[photo]}" for point, photo in own]
+        raise AdjustmentError(
+            f"control lies beyond where the lens of its camera is one-to-one: {listed(where)}; {ends}:"
+            " coordinates, pose or lens are wrong"
+        )
     points = listed([block.point_ids[point] for point in np.unique(block.image_points[images])])
     photos = listed([block.photo_ids[photo] for photo in np.unique(block.image_photos[images])])
     count = "1 image point lies" if len(images) == 1 else f"{len(images)} image points lie"
     return [
         Message(
             f"{count} beyond where the lens of the camera is one-to-one: its radial terms fold back there,"
-            f" and the result is not to be trusted: points {points} on photos {photos}"
+            f" and the result is not to be trusted: points {points} on photos {photos}; {ends}"
         )
     ]
+
+
+def _fold_of(block: Block, solution: _photocore.BlockSolution, image: int) -> str:
+    """Say where the lens of an image's camera ends, at its adjusted parameters."""
+    row = 0 if block.photo_cameras is None else int(block.photo_cameras[block.image_photos[image]])
+    camera = block.cameras[row]
+    domain = _photocore.radial_domain(camera.model, np.array(solution.cameras[row][0]))
+    if domain is None:
+        return f"the lens of {block.camera_names[row]}"
+    radius, end = domain
+    unit = f" {camera.unit}" if camera.direction == "backward" else " principal distances"
+    at = f"{radius:.4g}{unit}, which becomes {end:.4g}"
+    return f"the lens of {block.camera_names[row]} folds at a radius of {at}"
 
 
 def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:

@@ -36,7 +36,7 @@ from photogram.network.observations import Distance
 from photogram.network.rays import Rays
 from photogram.results.result import Result
 
-__all__ = ["Verdict", "hinted", "hints", "verdicts", "with_hints"]
+__all__ = ["Verdict", "distances_in_millimetres", "hinted", "hints", "verdicts", "with_hints"]
 
 SUSPICION = 0.35
 """Misfit m above which photos are looked at more closely."""
@@ -52,8 +52,8 @@ CLEARLY = 5.0
 """So many times nearer to the resected attitudes must those of a rival reading be."""
 BAD = 5.0
 """Sigma0 above which an adjustment that has converged is doubted."""
-BAR_FACTOR, BAR_WITHIN = 1000.0, 0.05
-"""A distance in millimetres among metres."""
+BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
+"""A distance in millimetres among metres: within so much in the median, and each (logarithm)."""
 
 
 class Verdict:
@@ -129,7 +129,9 @@ def hints(block: Block | Result) -> list[Message]:
     with np.errstate(all="ignore"):
         block = _of_frames(without_lenses(checked(block)))
         found = [Message(verdict.text) for verdict in verdicts(block)]
-        return [*found, *_latitudes(block), *(_readings(block) if not found else []), *_bars(block)]
+        bar = distances_in_millimetres(block)
+        bars = [] if bar is None else [Message(bar.text)]
+        return [*found, *_latitudes(block), *(_readings(block) if not found else []), *bars]
 
 
 def _of_frames(block: Block) -> Block:
@@ -304,11 +306,11 @@ def _apart(given: Floats, found: Floats) -> float:
     return float(np.sqrt((np.arccos(np.clip((trace - 1) / 2, -1, 1)) ** 2).mean()))
 
 
-def _bars(block: Block) -> list[Message]:
+def distances_in_millimetres(block: Block) -> Hypothesis | None:
     """Compare observed distances with those between points: millimetres for metres, all alike."""
     bars = [each for each in block.observations if isinstance(each, Distance)]
     if not bars:
-        return []
+        return None
     place = {name: row for row, name in enumerate(block.point_ids)}
     rays = Rays.of(block)
     positions = rays.axes.positions(block.point_positions)
@@ -323,7 +325,19 @@ def _bars(block: Block) -> list[Message]:
         (BAR_FACTOR, "in millimetres, all else in metres"),
         (1 / BAR_FACTOR, "in metres, all else in millimetres"),
     ):
-        if (np.abs(ratios / factor - 1) < BAR_WITHIN).all():
+        relative = ratios / factor
+        if abs(np.median(relative) - 1) < BAR_WITHIN and (np.abs(np.log(relative)) < BAR_EACH).all():
             names = listed([each.name for each in bars])
-            return [Message(f"probably observed distances are {text}: {names} are {factor:g} times too long")]
-    return []
+            text = f"probably observed distances are {text}: {names} are {factor:g} times too long"
+            return Hypothesis("distances", text, partial(_shorter, factor=factor))
+    return None
+
+
+def _shorter(block: Block, factor: float) -> Block:
+    """Return a block with its observed distances divided by a factor."""
+    return block.replace(
+        observations=[
+            replace(each, length=each.length / factor) if isinstance(each, Distance) else each
+            for each in block.observations
+        ]
+    )

@@ -30,6 +30,9 @@ from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 from photogram.network.geometry import Spheroid
 from photogram.results.iteration import Iteration
+from photogram.show.ways import Judged
+from photogram.statistics.limits import GlobalTest, global_test
+from photogram.statistics.reliability import standardized
 
 __all__ = ["Pose", "Resection", "resect"]
 
@@ -74,7 +77,7 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
-class Resection:
+class Resection(Judged):
     """A resected photo with n control points, in the order of the input.
 
     Positions are X, Y, Z or longitude (rad), latitude (rad), height; angles are radians, image coordinates
@@ -99,6 +102,10 @@ class Resection:
     residuals, redundancy, standardized
         (n, 2) each: observed minus computed in millimetres, redundancy numbers, and residual / (standard
         deviation x root of redundancy number) for a priori unit weight (Baarda's w; NaN without redundancy).
+    pose_standardized, point_standardized
+        (6,) and (n, 3): the same of position and attitude, and of control, as observations.
+    point_ids
+        Names of the points.
     weighted_sum_of_squares, degrees_of_freedom
         Of everything observed: image coordinates, weighted control, weighted position and attitude.
     start
@@ -125,6 +132,9 @@ class Resection:
     residuals: Floats
     redundancy: Floats
     standardized: Floats
+    pose_standardized: Floats
+    point_standardized: Floats
+    point_ids: list[str]
     weighted_sum_of_squares: float
     degrees_of_freedom: int
     start: Pose
@@ -136,6 +146,11 @@ class Resection:
     def converged(self) -> bool:
         """Whether the criterion of convergence was met."""
         return self.status == "converged"
+
+    @property
+    def global_test(self) -> GlobalTest | None:
+        """The test of all residuals together; None without degrees of freedom."""
+        return global_test(self.weighted_sum_of_squares, self.degrees_of_freedom)
 
     @property
     def variance_of_unit_weight(self) -> float | None:
@@ -239,12 +254,13 @@ def resect(
     limit = number("tolerance", tolerance)
     if whole_number("max_iterations", max_iterations) < 1 or not 0 < limit < math.inf:
         raise InputError("there must be one iteration at least, and a positive criterion of convergence")
+    known_sd = np.concatenate(
+        [_deviations("position_sd", position_sd, (3,)), _deviations("attitude_sd", attitude_sd, (3,))]
+    )
     solution = solve(
         given,
         known=known,
-        known_sd=np.concatenate(
-            [_deviations("position_sd", position_sd, (3,)), _deviations("attitude_sd", attitude_sd, (3,))]
-        ),
+        known_sd=known_sd,
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
         limit=limit,
@@ -263,6 +279,17 @@ def resect(
         residuals=solution.residuals,
         redundancy=solution.redundancy,
         standardized=solution.standardized,
+        pose_standardized=standardized(
+            _nearest(known - solution.pose, [*([0] if spheroid else []), 3, 4, 5]),
+            known_sd,
+            solution.pose_redundancy,
+        ),
+        point_standardized=standardized(
+            _nearest(given.points - solution.point_positions, [0] if spheroid else []),
+            given.point_sd,
+            solution.point_redundancy,
+        ),
+        point_ids=given.names,
         weighted_sum_of_squares=solution.sum_of_squares,
         degrees_of_freedom=solution.degrees_of_freedom,
         start=Pose.of(solution.start),
@@ -270,6 +297,13 @@ def resect(
         alternatives=[Pose.of(*other) for other in solution.alternatives],
         outside_danger_cylinder=solution.outside_danger_cylinder,
     )
+
+
+def _nearest(differences: Floats, angles: list[int]) -> Floats:
+    """Take whole turns off the components that are angles."""
+    nearest = differences.copy()
+    nearest[..., angles] -= math.tau * np.round(nearest[..., angles] / math.tau)
+    return nearest
 
 
 @dataclass(frozen=True, eq=False)

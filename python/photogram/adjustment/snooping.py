@@ -11,7 +11,15 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, UnitVariance, adjust, core_threads
-from photogram.adjustment.network_trial import (
+from photogram.arguments.arrays import number, one_of, truth_value, whole_number
+from photogram.arguments.types import Floats
+from photogram.errors import AdjustmentError, InputError
+from photogram.messages import Message
+from photogram.network.block import Block, checked
+from photogram.network.core import CoreOptions, block_network
+from photogram.network.observations import observation_rows
+from photogram.network.refracted import check_cameras
+from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
     IMAGE,
@@ -19,26 +27,14 @@ from photogram.adjustment.network_trial import (
     POSITION,
     NetworkTrial,
 )
-from photogram.adjustment.suspects import block_suspects
-from photogram.arguments.arrays import number, one_of, truth_value, whole_number
-from photogram.arguments.types import Floats
-from photogram.errors import AdjustmentError, InputError
-from photogram.messages import Message
-from photogram.network.block import Block, checked
-from photogram.network.core import block_network
-from photogram.network.observations import observation_rows
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
+from photogram.results.suspects import network_trial
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.snooping.snooping import Settings, snooped
 from photogram.statistics.snooping.suspects import LostSupportError, Out
 
 __all__ = ["block_trial", "settings_of", "snoop"]
-
-TOLERANCE = 1e-3
-"""Of the standard deviations: an adjustment between two rounds need not be better."""
-EXACT = 1e-9
-"""The same where R of all rows is used: a small network."""
 
 
 @singledispatch
@@ -148,45 +144,66 @@ def _snoop_block(
     progress: Callable[[Progress], None] | None = None,
 ) -> Snooped:
     checked(block)
+    check_cameras(block)
     settings = settings_of(level, fdr, unit_weight, robust, max_rounds)
-    first = adjust(block, unit_variance=unit_variance, covariance=False, threads=threads, progress=progress)
-    if not first.converged and robust is not False:
-        first = adjust(block, loss="huber", covariance=False, threads=threads, progress=progress)
-    trial = block_trial(first, threads, parts=parts)
+    truth_value("parts", parts)
+
+    def adjusted(given: Block, **options: Any) -> Result:
+        return adjust(given, unit_variance=unit_variance, threads=threads, progress=progress, **options)
+
     try:
+        trial = block_trial(block, None, options_of(unit_variance), threads, parts=parts)
         outcome = snooped(trial, settings)
-    except LostSupportError as lost:
-        raise AdjustmentError(f"the block cannot be tested: {lost}") from lost
-    cleaned = _without(block, first, outcome.out, trial.core)
-    result = adjust(cleaned, unit_variance=unit_variance, threads=threads, progress=progress)
+    except (LostSupportError, _photocore.BlockError):
+        # It says by name what is not determined, or goes on where points have to leave.
+        first = adjusted(block, covariance=False)
+        if not first.converged and robust is not False:
+            first = adjusted(block, covariance=False, loss="huber")
+        trial = block_trial(first.block, first.state, first.options, threads, parts=parts)
+        try:
+            outcome = snooped(trial, settings)
+        except LostSupportError as lost:
+            raise AdjustmentError(f"the block cannot be tested: {lost}") from lost
+    result = adjusted(_without(block, trial, outcome.out))
     remarks = [Message(remark) for remark in outcome.remarks]
     result = dataclasses.replace(result, messages=[*remarks, *result.messages])
     return Snooped(result=result, outcome=outcome, suspects=trial.suspects, settings=settings)
 
 
-def block_trial(result: Result, threads: int | None = None, *, parts: bool = True) -> NetworkTrial:
-    """Return an adjusted block as snooping asks it."""
-    block = result.block
-    options = dataclasses.replace(result.options, covariance=True, loss=None)
-    core = block_network(block, options).trial(result.state, threads=core_threads(threads))
-    deviations = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
-    suspects = block_suspects(block, core, parts=parts)
-    trial = NetworkTrial(
-        core=core,
-        suspects=suspects,
-        images=np.stack([block.image_photos, block.image_points], axis=1),
-        supported=np.asarray(np.isfinite(deviations).all(axis=1)),
-        tolerance=TOLERANCE,
+def options_of(unit_variance: UnitVariance) -> CoreOptions:
+    """Return how the core adjusts a block that is snooped: as :func:`photogram.adjust` does by default."""
+    return CoreOptions(
+        criterion="fraction",
+        limit=1e-5,
+        max_iterations=50,
+        covariance=True,
+        loss=None,
+        ordering="auto",
+        unit_variance=unit_variance,
+        minimum=None,
     )
-    if trial.whole:
-        trial.tolerance = EXACT
-    return trial
 
 
-def _without(block: Block, first: Result, out: Out, core: _photocore.NetworkTrial) -> Block:
-    """Return a block without what is out, from adjusted values on."""
+def block_trial(
+    block: Block,
+    state: _photocore.BlockState | None,
+    options: CoreOptions,
+    threads: int | None = None,
+    *,
+    parts: bool = True,
+) -> NetworkTrial:
+    """Return a block as snooping asks it, from the start or from where an adjustment has ended."""
+    options = dataclasses.replace(options, covariance=True, loss=None)
+    core = block_network(block, options).trial(state, threads=core_threads(threads))
+    return network_trial(block, core, parts=parts)
+
+
+def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
+    """Return a block without what is out, from where the last trial has ended."""
+    core = trial.core
     kinds, subjects = core.subjects
     starts, components = core.row_starts, core.components
+    reached = np.array([values[:6] for values in core.photos])
     group = np.repeat(np.arange(len(kinds)), np.diff(starts))
     gone = {kind: out.rows & (kinds[group] == kind) for kind in range(OBSERVATION + 1)}
     subject = subjects[group]
@@ -197,6 +214,9 @@ def _without(block: Block, first: Result, out: Out, core: _photocore.NetworkTria
     position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
     position_sd[subject[gone[POSITION]], components[gone[POSITION]]] = np.inf
     attitude_sd[subject[gone[ATTITUDE]], components[gone[ATTITUDE]]] = np.inf
+    # Nothing is left that determines them: they stay where they are.
+    alone = sorted(out.photos)
+    position_sd[alone], attitude_sd[alone] = 0.0, 0.0
     rows = [
         row
         for own, _ in observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
@@ -205,8 +225,8 @@ def _without(block: Block, first: Result, out: Out, core: _photocore.NetworkTria
     dropped = {rows[index] for index in subject[gone[OBSERVATION]].tolist()}
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
     return block.replace(
-        photo_positions=np.where(position_sd == 0, block.photo_positions, first.photo_positions),
-        photo_attitudes=np.where(attitude_sd == 0, block.photo_attitudes, first.photo_attitudes),
+        photo_positions=np.where(position_sd == 0, block.photo_positions, reached[:, :3]),
+        photo_attitudes=np.where(attitude_sd == 0, block.photo_attitudes, reached[:, 3:]),
         photo_positions_observed=_observed(block.photo_positions, positions, position_sd),
         photo_attitudes_observed=_observed(block.photo_attitudes, attitudes, attitude_sd),
         photo_position_sd=position_sd,

@@ -15,18 +15,21 @@ from typing import Any
 
 import numpy as np
 
+from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import shown
 from photogram.checks.adjusting import Adjuster
 from photogram.checks.control import control
-from photogram.checks.control_sets import doubtful, explain, free_model
+from photogram.checks.control_sets import Explained, doubtful, explain, free_model
 from photogram.checks.conventions import conventions, further
-from photogram.checks.editing import HOPELESS, Edited, blunder_section, edit, without_photos
+from photogram.checks.editing import BESIDE, HOPELESS, Edited, blunder_section, edit, without_photos
 from photogram.checks.findings import Check, Finding, Level, Section
 from photogram.checks.gross import Suspects, disproved, gross, without
 from photogram.checks.heights import two_ray_heights
 from photogram.checks.key_numbers import key_numbers
+from photogram.checks.lenses import half_pixel, lenses_put_right
 from photogram.checks.orientation import orientation, spare_explained
+from photogram.checks.positions import Wrong, wrong_positions
 from photogram.checks.residuals import residuals
 from photogram.checks.stations import stations
 from photogram.checks.structure import structure_section
@@ -34,12 +37,15 @@ from photogram.checks.views import View, kept_images
 from photogram.checks.words import Words
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
+from photogram.network.observations import Position
 from photogram.network.rays import Rays
 
-__all__ = ["Manner", "check", "check_block"]
+__all__ = ["Manner", "check", "check_block", "check_of"]
 
 FINAL_STATIONS = 5.0
 """Stations count as adjusted when half the residuals are below so many standard deviations."""
+HARDLY = 10.0
+"""So many times the usual residual before the adjustment comes from coarse stations."""
 MOST_SETS = 5
 """Mistakes in the control as a whole that are put right one upon the other, at the most."""
 
@@ -63,7 +69,6 @@ class Manner:
     intersect_only: str = ""
 
 
-@singledispatch
 def check(network: object, *, threads: int | None = None) -> Check:
     """Look for mistakes and gross errors in a network: units, axes, signs, names, images, control, stations.
 
@@ -99,12 +104,19 @@ def check(network: object, *, threads: int | None = None) -> Check:
     >>> [finding.kind for finding in check(block.replace(point_positions=feet)).grave]
     ['control-set']
     """
+    core_threads(threads)
+    return check_of(network, threads)
+
+
+@singledispatch
+def check_of(network: object, threads: int | None) -> Check:
+    """Check a network; defined for each class of networks in the files above it."""
     del threads
     raise InputError(f"a check is of a block, a project or a collection, not of {shown(network)}")
 
 
-@check.register
-def _(network: Block, *, threads: int | None = None) -> Check:
+@check_of.register
+def _(network: Block, threads: int | None) -> Check:
     return Check(network.title, *check_block(network, Manner({"threads": threads})))
 
 
@@ -139,14 +151,16 @@ def _started(block: Block) -> tuple[Block | None, Section]:
 
 def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     words, adjusted = manner.words, Adjuster(manner.options)
-    sets, view, exact = conventions(View.of(block))
+    lens: list[Finding] = []
+    sets, view, exact = conventions(View.of(lenses_put_right(block, lens, adjusted)))
+    sets.findings[:0] = lens
     upright, seen = orientation(view.seen, words, view.unit)
     oriented = view.of_seen(seen)
     if oriented is view and not sets.findings:
         further(sets, view)
     errors, suspects = gross(oriented.seen, oriented.unit)
     if not manner.intersect_only:
-        oriented, changed = _control_set(sets, oriented, suspects, adjusted)
+        oriented, changed = _sets(sets, oriented, suspects, adjusted)
         if changed:
             errors, suspects = gross(oriented.seen, oriented.unit)
     if suspects.photos.any():
@@ -163,6 +177,8 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
             misleading = {block.photo_ids[photo] for photo in on.tolist()}
             errors.findings = without(block, errors.findings, cleared)
             edited = _edited(oriented, suspects, manner, adjusted)
+    if edited.last is not None and edited.last.converged and edited.spread < HOPELESS:
+        errors.findings = _fitting(errors.findings, edited.last.block)
     # What the adjustment has explained or disproved.
     settled = {name for pair in edited.exchanged for name in pair} | set(edited.cleared)
     errors.findings = [
@@ -170,6 +186,8 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     ]
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
     sections += _after_adjustment(oriented, edited, misleading, words)
+    if edited.last is not None and edited.last.converged:
+        sets.findings += half_pixel(edited.last, adjusted)
     if not exact:
         for section in sections:
             if section is not sets:
@@ -177,27 +195,55 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     return sections, edited.last
 
 
-def _control_set(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) -> tuple[View, bool]:
-    """Put right what is wrong with the control as a whole; returns the view, and whether it has changed."""
+def _fitting(findings: list[Finding], adjusted: Block) -> list[Finding]:
+    """Return findings, photos that are hardly bad and fit when adjusted being no more than looked at."""
+    return [
+        replace(each, level="look")
+        if each.kind == "bad-photo"
+        and each.values.get("times_usual", math.inf) < HARDLY
+        and {*each.photos} <= {*adjusted.photo_ids}
+        else each
+        for each in findings
+    ]
+
+
+def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) -> tuple[View, bool]:
+    """Put right what is wrong with control, or with observed positions of photos, as a whole.
+
+    Returns the view, and whether it has changed.
+    """
     changed = False
     for _ in range(MOST_SETS):
         block = view.block
-        if not np.isfinite(block.point_sd).any():
-            break
         good = without_photos(kept_images(block, ~view.images(suspects.images)), suspects.photos)
-        if not doubtful(adjusted.tried(good)):
-            break
-        model = free_model(good, adjusted)
-        found = None if model is None else explain(model)
+        kind, found = _set_of(good, adjusted)
         if found is None:
             break
         values = {"likelihood_ratio": found.judged.likelihood, "times_smaller": found.judged.fall}
-        level: Level = "grave" if found.judged.accepted else "look"
-        section.findings.append(Finding("control-set", level, found.text, values=values))
+        level: Level = "grave" if found.judged.explained else "look"
+        section.findings.append(Finding(kind, level, found.text, values=values))
         if level == "look":
             break
         view, changed = view.changed(found.change), True
     return view, changed
+
+
+def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | Wrong | None]:
+    """Return the kind of finding and the mistake of a whole set, if there is one."""
+    control = np.isfinite(block.point_sd).any()
+    if control and doubtful(adjusted.tried(block), "control"):
+        model = free_model(block, adjusted)
+        explained = None if model is None else explain(model)
+        if explained is not None:
+            return "control-set", explained
+    kinds = ("control", "station", f"{BESIDE}{Position.KIND}")
+    weighted = ((block.photo_position_sd > 0) & np.isfinite(block.photo_position_sd)).any()
+    observed = weighted or any(isinstance(each, Position) for each in block.observations)
+    if observed and doubtful(adjusted.tried(block), *kinds):
+        wrong = wrong_positions(block, adjusted)
+        if wrong is not None:
+            return "observed-positions", wrong
+    return "", None
 
 
 def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) -> Edited:

@@ -72,4 +72,5 @@ def _misfit(
     test = max(finding.values["test_value"] for finding in findings)
     grave = any(finding.level == "grave" for finding in findings) and not common
     level: Level = "grave" if grave else "look"
-    return Finding("control-misfit", level, text, [], [name], {"test_value": test, **words.values(kept)})
+    rivals = list(dict.fromkeys(point for finding in findings for point in finding.points))
+    return Finding("control-misfit", level, text, [], rivals, {"test_value": test, **words.values(kept)})

@@ -94,6 +94,9 @@ SETS = (
 """Hypotheses about all control; in geographic space only those on heights, and the exchange."""
 
 
+SAME_BUT_SCALE = {"metres in heights", "feet in X and Y"}
+
+
 @dataclass(frozen=True, eq=False)
 class FreeModel:
     """Control points in the model that is free of them.
@@ -134,21 +137,26 @@ class FreeModel:
 
     def omega(self, change: Change | None = None) -> float:
         """Return what is left of the control under a hypothesis; infinite where it cannot be fitted."""
-        return self._omega(self._target(change))
+        return self._best(self._target(change))[0]
 
-    def _omega(self, target: Floats) -> float:
+    def scale(self, change: Change) -> float:
+        """Return the scale of the similarity under a hypothesis: 1 where the stations are right."""
+        return self._best(self._target(change))[1].scale
+
+    def _best(self, target: Floats) -> tuple[float, _Similarity]:
         if not np.isfinite(target).all():
-            return math.inf
+            return math.inf, _Similarity.start(self.model, self.model)
         starts = [_Similarity.start(self.model, target)]
         full = self.held.all(axis=1)
         if full.sum() >= FEWEST:
             starts.append(_closest(self.model[full], target[full]).about(self.model[full], self.model))
         rows = np.flatnonzero(self.held.ravel())
-        return min(self._fitted(each, target, rows)[0] for each in starts)
+        return min((self._fitted(each, target, rows) for each in starts), key=lambda each: each[0])
 
     def two_exchanged(self) -> float:
         """Return what is left of the control when the best two points are exchanged."""
-        target, (_, similarity) = self._target(None), self._nearest()
+        target = self._target(None)
+        _, similarity = self._nearest(target)
         placed = similarity.of(self.model)
         pairs = [
             pair
@@ -165,21 +173,21 @@ class FreeModel:
         for pair in sorted(pairs, key=apart)[:PAIRS]:
             swapped = target.copy()
             swapped[list(pair)] = target[list(pair[::-1])]
-            left = min(left, self._omega(swapped))
+            left = min(left, self._best(swapped)[0])
         return left
 
-    def some_wrong(self) -> float:
-        """Return what explaining the misfit by wrong points costs.
+    def some_wrong(self, change: Change | None = None) -> float:
+        """Return what explaining the misfit, under a hypothesis, by wrong points costs.
 
         That is Omega of the others and, for each wrong one, 2 ln(3 k) for its being one of k, and for each of
         its errors, which may be anything, 2 ln(error / standard deviation). The points that are right are
         those of the similarity of three points to which most others are nearest.
         """
-        target, full = self._target(None), np.flatnonzero(self.held.all(axis=1))
+        target, full = self._target(change), np.flatnonzero(self.held.all(axis=1))
         deviations = self._deviations
-        if len(full) < FEWEST:
+        if len(full) < FEWEST or not np.isfinite(target).all():
             return math.inf
-        nearest, _ = self._nearest()
+        nearest, _ = self._nearest(target)
         sizes = np.abs(nearest).max(axis=1)
         right = sizes <= np.sort(sizes[full])[max(len(full) // 2, FEWEST - 1)]
         for _ in range(GROWTHS):
@@ -203,9 +211,9 @@ class FreeModel:
         own = np.sqrt(np.maximum(np.diag(self.covariance), 0)).reshape(-1, 3)
         return np.asarray(np.hypot(own, self.per_unit * self.block.point_sd[self.points]))
 
-    def _nearest(self) -> tuple[Floats, _Similarity]:
+    def _nearest(self, target: Floats) -> tuple[Floats, _Similarity]:
         """Return (k, 3) misses of the similarity of three points to which most are nearest, and this one."""
-        target, deviations = self._target(None), self._deviations
+        deviations = self._deviations
         best, nearest = math.inf, (np.zeros(target.shape), _Similarity.start(self.model, target))
         for three in _triples(np.flatnonzero(self.held.all(axis=1))):
             similarity = _closest(self.model[three], target[three]).about(self.model[three], self.model)
@@ -325,17 +333,16 @@ def _rotation(vector: Floats) -> Floats:
     return turned
 
 
-def doubtful(first: Result | None) -> bool:
-    """Whether control as a whole may be wrong: it does not converge with the images, or much does not fit."""
+def doubtful(first: Result | None, *kinds: str) -> bool:
+    """Whether all observations of some kinds may be wrong: an adjustment fails, or several do not fit."""
     if first is None or not first.converged:
         return True
     values = tests(first)
     size = max(mad_sd(first.standardized), np.finfo(np.float64).tiny)
     limit = critical(sum(int((each > 0).sum()) for each in values.values())) * size
-    held = np.isfinite(first.block.point_sd)
-    fixed = held & (first.block.point_sd == 0)
-    beyond = (values["control"] > limit).any(axis=1)
-    return bool(beyond.sum() >= MANY or (fixed.any() and size > MANY))
+    beyond = sum(int((values[kind] > limit).any(axis=1).sum()) for kind in kinds if kind in values)
+    fixed = "control" in kinds and bool((first.block.point_sd == 0).any())
+    return beyond >= MANY or (fixed and size > MANY)
 
 
 def free_model(block: Block, adjusted: Adjuster) -> FreeModel | None:
@@ -420,13 +427,24 @@ def explain(model: FreeModel) -> Explained | None:
         if model.block.spheroid is None or "heights" in each.kind or each.kind == EXCHANGED
     ]
     changed = [model.omega(each.change) for each in sets]
+    single = min(model.some_wrong(), model.two_exchanged())
     verdict = judged(model.omega(), changed, model.degrees_of_freedom)
-    if verdict is None or min(changed) + CLEARLY > min(model.some_wrong(), model.two_exchanged()):
-        return None
+    if verdict is None or min(changed) + CLEARLY > single:
+        # Points that are wrong besides hide a mistake in all: both with what wrong points cost.
+        changed = [
+            min(omega, model.some_wrong(each.change)) for omega, each in zip(changed, sets, strict=True)
+        ]
+        verdict = judged(single, changed, model.degrees_of_freedom)
+        if verdict is None:
+            return None
     best = [sets[place] for place in verdict.best]
+    if {each.kind for each in best} == SAME_BUT_SCALE:
+        # Only the scale differs, which the stations tell.
+        best = [min(best, key=lambda each: abs(math.log(model.scale(each.change))))]
+        verdict = replace(verdict, best=verdict.best[:1])
     if model.held.all(axis=1).sum() < FEWEST:
         # Nothing tells a mistake in all from one in some.
-        verdict = replace(verdict, accepted=False)
+        verdict = replace(verdict, explained=False)
     word = "probably" if verdict.accepted else "it cannot be told which" if len(best) > 1 else "possibly"
     text = f"{word}{':' if len(best) > 1 else ''} {'; or '.join(each.text for each in best)}"
     text += f": the control would miss the model of the photos by {verdict.fall:.3g} times less"

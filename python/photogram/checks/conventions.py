@@ -5,7 +5,7 @@ One such mistake makes every observation look wrong. So it is named once and put
 
 from __future__ import annotations
 
-from photogram.adjustment.hints import hints, verdicts
+from photogram.adjustment.hints import distances_in_millimetres, hints, verdicts
 from photogram.adjustment.hypotheses import TURNS
 from photogram.checks.findings import Finding, Section
 from photogram.checks.views import View
@@ -36,6 +36,10 @@ def conventions(view: View) -> tuple[Section, View, bool]:
         best = whole[0]
         section.findings.append(Finding("convention", "grave", best.text))
         view, exact = view.changed(best.change), exact and best.exact
+    bars = distances_in_millimetres(view.seen)
+    if bars is not None:
+        section.findings.append(Finding("convention", "grave", bars.text))
+        view = view.changed(bars.change)
     if section.findings:
         section.lines.append("the sections below hold with this put right")
     if not exact:

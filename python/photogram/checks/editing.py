@@ -6,13 +6,14 @@ before the block is adjusted anew, and the others are judged again.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.checks.adjusting import Adjuster
-from photogram.checks.findings import Finding, Level, Section
+from photogram.checks.findings import Finding, Section
 from photogram.checks.gross import Suspects
 from photogram.checks.predictions import (
     exchange,
@@ -21,9 +22,9 @@ from photogram.checks.predictions import (
     freed,
     tests_of_predictions,
 )
-from photogram.checks.rivals import rival_images
+from photogram.checks.rivals import ODDS, rival_images
 from photogram.checks.robust import critical, mad_sd
-from photogram.checks.views import kept_images
+from photogram.checks.views import View, kept_images
 from photogram.checks.words import small_unit
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
@@ -32,14 +33,15 @@ from photogram.results.kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC
 
-__all__ = ["Edited", "edit"]
+__all__ = ["BESIDE", "Edited", "edit"]
 
 ROUNDS = 20
 """Adjustments at the most."""
 TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
 """Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
 
-Precise control at the edge of a block has a redundancy of a thousandth; its test value still means something.
+Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth; its test
+value still means something.
 """
 COMPARABLE = 0.4
 """Of the largest test value of a round: what is smaller may be its consequence and is judged again."""
@@ -52,9 +54,12 @@ EXCHANGES = 5
 LOOSE = 0.01
 """Standard deviation of control that strains no block, as a part of the flying height."""
 BLUNDER = 3.0
+TWENTIETH = 1.96
 SURE = 1e-4
 """Chance that the largest test value of a good block is beyond what is grave."""
 SHOWN = 20
+RETURNS = 10
+"""Images that are tried anew when all blunders are out, at the most."""
 BESIDE = "beside images: "
 """Before the names of further kinds of observations."""
 
@@ -102,7 +107,6 @@ class _Suspect:
     row: int
     axis: int
     test: float
-    grave: bool
 
 
 def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
@@ -171,7 +175,12 @@ def _edited(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
             cleared = [block.point_ids[point] for point in left if block.point_ids[point] not in control]
     except AdjustmentError as error:
         return Edited(None, None, str(error), float("nan"), section)
+    if last.converged:
+        last = _returned(last, current, section, spread, adjusted)
     _list(last, spread, section)
+    limit = _grave(last, spread)
+    section.findings = _graded(section.findings, limit)
+    control = {name: _graded(findings, limit) for name, findings in control.items()}
     return Edited(first, last, "", spread, section, control, exchanged, cleared)
 
 
@@ -185,9 +194,9 @@ def _gross_control(block: Block, adjusted: Adjuster) -> Indices:
     With standard deviations of a hundredth of the flying height, control strains no block, and what is wrong
     by many times that shows.
     """
-    rays = Rays.of(block)
+    rays = Rays.of(View.of(block).seen)
     away = np.linalg.norm(
-        rays.intersect().positions[block.image_points] - rays.centres[block.image_photos], axis=1
+        rays.intersect().positions[rays.block.image_points] - rays.centres[rays.block.image_photos], axis=1
     )
     if not np.isfinite(away).any():
         return np.empty(0, dtype=np.int64)
@@ -228,15 +237,11 @@ def _judged(
 ) -> tuple[Result, float]:
     """Hold what agrees with its prediction of the control that was left out, and report the rest."""
     errors, tests = tests_of_predictions(result, given, points, spread)
-    count = int(np.isfinite(given.point_sd).sum())
-    limit, sure = critical(count), critical(count, SURE)
+    limit = critical(int(np.isfinite(given.point_sd).sum()))
     point_sd = result.block.point_sd.copy()
     for row, error, test in zip(points.tolist(), errors, np.abs(tests), strict=True):
         for axis in np.flatnonzero(test > limit).tolist():
-            value = float(test[axis])
-            finding = _control_finding(
-                given, row, axis, float(error[axis]), value * spread, grave=value > sure
-            )
+            finding = _control_finding(given, row, axis, float(error[axis]), float(test[axis]) * spread)
             control.setdefault(given.point_ids[row], []).append(finding)
         fits = test <= limit
         point_sd[row, fits] = given.point_sd[row, fits]
@@ -318,7 +323,9 @@ def _snoop(
         for suspect in suspects:
             finding = _finding(result, suspect, spread)
             if suspect.kind == "control":
-                control.setdefault(finding.points[0], []).append(finding)
+                control.setdefault(finding.points[0], []).append(
+                    _with_rivals(finding, result, suspect, spread)
+                )
             else:
                 section.findings.append(finding)
         block = _without(result, suspects)
@@ -335,7 +342,7 @@ def tests(result: Result) -> dict[str, Floats]:
     block = result.block
     images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
     others = {
-        name: np.where(kind.redundancy > TESTABLE, np.nan_to_num(np.abs(kind.standardized)), 0.0)
+        name: np.where(kind.redundancy > TESTABLE_PRIOR, np.nan_to_num(np.abs(kind.standardized)), 0.0)
         for name, kind in result.kinds.items()
     }
     return {
@@ -358,9 +365,9 @@ def _largest(result: Result, spread: float) -> list[_Suspect]:
     """Return the observations beyond the critical value that are the largest of their neighbourhood."""
     values = tests(result)
     count = sum(int((each > 0).sum()) for each in values.values())
-    limit, sure = critical(count) * spread, critical(count, SURE) * spread
+    limit = critical(count) * spread
     beyond = [
-        _Suspect(kind, int(row), int(axis), float(each[row, axis]), bool(each[row, axis] > sure))
+        _Suspect(kind, int(row), int(axis), float(each[row, axis]))
         for kind, each in values.items()
         for row, axis in np.argwhere(each > limit)
     ]
@@ -418,17 +425,29 @@ def _finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     if suspect.kind == "control":
         row, axis = suspect.row, suspect.axis
         error = -float(result.point_differences[row, axis] / result.point_redundancy[row, axis])
-        return _control_finding(result.block, row, axis, error, suspect.test, grave=suspect.grave)
-    level: Level = "grave" if suspect.grave else "look"
+        return _control_finding(result.block, row, axis, error, suspect.test)
     if suspect.kind != "station":
-        return _other_finding(result, suspect, level)
+        return _other_finding(result, suspect)
     name = result.block.photo_ids[suspect.row]
     what = ("first", "second", "third")[suspect.axis % 3] + (" coordinate" if suspect.axis < 3 else " angle")
     text = f"the {what} of station {name} contradicts its standard deviation (test value {suspect.test:.1f})"
-    return Finding("station-misfit", level, text, [name], [], {"test_value": suspect.test})
+    return Finding("station-misfit", "look", text, [name], [], {"test_value": suspect.test})
 
 
-def _other_finding(result: Result, suspect: _Suspect, level: Level) -> Finding:
+def _with_rivals(finding: Finding, result: Result, suspect: _Suspect, spread: float) -> Finding:
+    """Name the control whose error would leave nearly the same residuals: odds below 20."""
+    values = tests(result)["control"].max(axis=1) / spread
+    near = (suspect.test / spread) ** 2 - values**2 < 2 * math.log(ODDS)
+    near &= values > critical(int((values > 0).sum()))
+    near[suspect.row] = False
+    names = [result.block.point_ids[row] for row in np.flatnonzero(near).tolist()]
+    if not names:
+        return finding
+    text = f"{finding.text}; it may as well be control point {' or '.join(names)}"
+    return replace(finding, text=text, points=[*finding.points, *names])
+
+
+def _other_finding(result: Result, suspect: _Suspect) -> Finding:
     """Say that an observation beside images does not fit."""
     kind = _kind(result, suspect)
     observation = result.block.observations[int(kind.rows[suspect.row])]
@@ -442,10 +461,10 @@ def _other_finding(result: Result, suspect: _Suspect, level: Level) -> Finding:
     )
     values = {"test_value": suspect.test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
     photos, points = list(observation.photos), list(observation.points)
-    return Finding("observation-misfit", level, text, photos, points, values)
+    return Finding("observation-misfit", "look", text, photos, points, values)
 
 
-def _control_finding(block: Block, row: int, axis: int, error: float, test: float, *, grave: bool) -> Finding:
+def _control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
     """Say that a component of control does not fit; `error` is that of the given value."""
     angle = block.geographic and axis < 2
     unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
@@ -456,7 +475,7 @@ def _control_finding(block: Block, row: int, axis: int, error: float, test: floa
         f" its error is about {error:.3f} {unit}"
     )
     values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
-    return Finding("control-misfit", "grave" if grave else "look", text, [], [name], values)
+    return Finding("control-misfit", "look", text, [], [name], values)
 
 
 def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
@@ -478,7 +497,7 @@ def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
     )
     return Finding(
         "blunder",
-        "grave" if suspect.grave else "look",
+        "look",
         text,
         [block.photo_ids[photo], *others],
         [block.point_ids[point]],
@@ -489,6 +508,56 @@ def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
             "axis": float(axis),
         },
     )
+
+
+def _returned(result: Result, whole: Block, section: Section, spread: float, adjusted: Adjuster) -> Result:
+    """Take back images that fit once all others are out: a blunder beside them made them look wrong.
+
+    They are tried one by one, the smallest test value first; the largest of all is the blunder itself.
+    """
+    blunders = sorted(
+        (each for each in section.findings if each.kind == "blunder"),
+        key=lambda each: each.values["test_value"],
+    )
+    for finding in blunders[:-1][:RETURNS]:
+        photo, point = whole.photo_ids.index(finding.photos[0]), whole.point_ids.index(finding.points[0])
+        row = int(np.flatnonzero((whole.image_photos == photo) & (whole.image_points == point))[0])
+        block = result.block
+        back = block.replace(
+            image_photos=np.append(block.image_photos, block.photo_ids.index(finding.photos[0])),
+            image_points=np.append(block.image_points, point),
+            image_xy=np.vstack([block.image_xy, whole.image_xy[[row]]]),
+            image_sd=np.vstack([block.image_sd, whole.image_sd[[row]]]),
+        )
+        tried = adjusted.tried(back)
+        if tried is None or not tried.converged or not tried.used_images[-1]:
+            continue
+        values = tests(tried)
+        limit = critical(sum(int((each > 0).sum()) for each in values.values())) * spread
+        others = values["image"][block.image_points.size :]
+        on_point = values["image"][tried.block.image_points == point]
+        if others.any() and on_point.max() < limit:
+            section.findings.remove(finding)
+            result = tried
+    return result
+
+
+def _grave(result: Result, spread: float) -> float:
+    """Return the test value from which a finding is grave.
+
+    Where errors have heavier tails than normal ones, the tail tells the spread: one in twenty is beyond 1.96.
+    """
+    values = tests(result)
+    images = values["image"][values["image"] > 0]
+    tail = float(np.quantile(images, 0.95)) / TWENTIETH if images.size else spread
+    return critical(sum(int((each > 0).sum()) for each in values.values()), SURE) * max(spread, tail)
+
+
+def _graded(findings: list[Finding], limit: float) -> list[Finding]:
+    """Return findings, grave where their test value is beyond a limit."""
+    return [
+        replace(each, level="grave" if each.values["test_value"] > limit else "look") for each in findings
+    ]
 
 
 def _list(result: Result, spread: float, section: Section) -> None:

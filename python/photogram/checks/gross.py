@@ -40,8 +40,12 @@ FEWEST_ERRORS, ERRORS_OF_PHOTO = 5, 0.3
 """So many gross errors, and such a part of its images, condemn a photo as a whole."""
 CANDIDATES = 5
 """Photos with the largest residuals that are left out on trial."""
-IMAGE_KINDS = ("gross-error", "exchanged-points")
+IMAGE_KINDS = ("gross-error", "exchanged-points", "name-used-twice")
 """Findings on images, which the adjusted stations may disprove."""
+PARTED, FEWEST_OF_TWO = 0.1, 2
+"""One name is of two points when so much is left of its residuals in two groups of so many rays or more."""
+AS_WELL = 3.0
+"""And so many times less than leaving out one ray leaves."""
 MOST_PHOTOS = 20
 MOST_ON_PHOTO = 30
 
@@ -170,7 +174,7 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
             f" {usual:.3f} {rays.unit} without it; look at its station (position, angles), the preprocessing"
             " of its plate, and whether the points under its name are its own"
         )
-        values = {f"median_residual_{rays.unit}": size}
+        values = {f"median_residual_{rays.unit}": size, "times_usual": size / usual}
         section.findings.append(Finding("bad-photo", "grave", text, [name], [], values))
     return rays, bad
 
@@ -237,6 +241,18 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
     left = [solver.without(point, rows, row) for row in rows.tolist()] if len(rows) > 2 else []
     unit = solver.rays.unit
     name, values = block.point_ids[point], {f"residual_{unit}": before, "departure_sd": departure}
+    parted = _parted(solver, point, rows, before) if len(rows) >= 2 * FEWEST_OF_TWO else None
+    if parted is not None and min(left) > AS_WELL * parted[2]:
+        one, other = (
+            " and ".join(block.photo_ids[photo] for photo in block.image_photos[each].tolist())
+            for each in parted[:2]
+        )
+        photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
+        text = (
+            f"the name {name} stands for two points: its rays of the photos {one} meet, and those of"
+            f" the photos {other}, but not with each other (they miss by {before:.3f} {unit})"
+        )
+        return Finding("name-used-twice", "grave", text, photos, [name], values), rows
     if left and min(left) < EXPLAINED * before:
         row = rows[[int(np.argmin(left))]]
         photo = block.photo_ids[int(block.image_photos[row[0]])]
@@ -255,6 +271,27 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
     )
     level: Level = "grave" if departure > FLAGRANT else "look"
     return Finding("gross-error", level, text, photos, [name], values), rows
+
+
+def _parted(
+    solver: _Solver, point: int, rows: Indices, before: float
+) -> tuple[Indices, Indices, float] | None:
+    """Return the images of a point in two groups that meet well by themselves, and how far they miss then."""
+    best, found = PARTED * before, None
+    for pair in combinations(rows.tolist(), 2):
+        position = solver.changed(point, rows[~np.isin(rows, pair)].tolist(), [])
+        residuals, in_front = solver.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
+        near = in_front & (np.linalg.norm(residuals, axis=1) < PARTED * before)
+        one, other = rows[near], rows[~near]
+        if min(len(one), len(other)) < FEWEST_OF_TWO:
+            continue
+        left = max(
+            solver.largest(one, solver.changed(point, other.tolist(), [])),
+            solver.largest(other, solver.changed(point, one.tolist(), [])),
+        )
+        if left < best:
+            best, found = left, (one, other, left)
+    return found
 
 
 def _departures(rays: Rays, residuals: Floats) -> Floats:

@@ -7,6 +7,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.checks.findings import Finding, Section
 from photogram.checks.robust import MAD_TO_SD
+from photogram.checks.stations import flown
 from photogram.network.rays import local_axes
 from photogram.results.result import Result
 
@@ -28,6 +29,9 @@ def two_ray_heights(result: Result) -> Section:
         "With two rays an error along the flight line becomes an error of height and leaves no residual.",
     )
     block = result.block
+    if not flown(block):
+        section.lines.append("the photos do not look down: there is no ground that heights are above")
+        return section
     known = np.flatnonzero(result.used_points)
     positions = local_axes(block).positions(result.point_positions[known])
     heights = result.point_positions[known, 2]

@@ -13,6 +13,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.checks.robust import normal_of_chi_square
+from photogram.checks.views import View
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.results.result import Result
@@ -99,7 +100,7 @@ def exchanged_where_rays_meet(block: Block) -> tuple[int, int] | None:
     must bring control and intersections together 25 times better, and far better than exchanging any other
     two; a common shift is allowed for.
     """
-    rays = Rays.of(block)
+    rays = Rays.of(View.of(block).seen)
     met = rays.intersect().positions
     plan = np.isfinite(block.point_sd[:, :2]).all(axis=1) & np.isfinite(met).all(axis=1)
     points = np.flatnonzero(plan)

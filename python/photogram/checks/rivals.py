@@ -18,10 +18,12 @@ from photogram.network.directions import without_lenses
 from photogram.network.rays import Rays
 from photogram.results.result import Result
 
-__all__ = ["rival_images"]
+__all__ = ["ODDS", "rival_images"]
 
 ODDS = 20.0
 """An image that is less likely by this factor is no rival."""
+ALIKE = 0.98
+"""Nor can tests be told apart that differ by less: photos are not known quite."""
 INVISIBLE = 1e-6
 """Eigenvalue of a block of R along which an error leaves no residual."""
 
@@ -59,7 +61,7 @@ def rival_images(result: Result, row: int, spread: float) -> Indices:
     residuals = (result.residuals[rows] / block.image_sd[rows]).ravel() / spread
     tests = [_test(visible[i : i + 2, i : i + 2], residuals[i : i + 2]) for i in range(0, len(residuals), 2)]
     value, rank = tests[int(np.flatnonzero(rows == row)[0])]
-    near = [(value - other) / 2 - (rank - m) < math.log(ODDS) for other, m in tests]
+    near = [(value - other) / 2 - (rank - m) < math.log(ODDS) or other > ALIKE * value for other, m in tests]
     return np.asarray(rows[np.array(near) & (rows != row)])
 
 

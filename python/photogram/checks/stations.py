@@ -16,7 +16,7 @@ from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.results.result import Result
 
-__all__ = ["stations"]
+__all__ = ["flown", "stations"]
 
 
 LOOK, GRAVE = 8.0, 20.0
@@ -27,6 +27,8 @@ MOVED = 10.0
 """The same for the change from the initial to the adjusted station."""
 TINY = 1e-9
 """A spread below this is rounding: radians, or the linear unit."""
+UPRIGHT = 0.8
+"""Vertical component of the z axis of a photo that looks down, at least."""
 FEWEST = 5
 """Photos of a strip whose path can be judged."""
 CURVED = 15
@@ -63,6 +65,9 @@ def stations(block: Block, result: Result | None, misleading: Collection[str] = 
         which = "adjusted"
     axes = local_axes(block)
     positions, cameras = axes.positions(block.photo_positions), axes.cameras()
+    if not flown(block):
+        section.lines.append("the photos do not look down, as those of an aircraft do: no paths")
+        return section
     strips = strips_of(positions)
     heights = block.photo_positions[:, 2]
     paths = [
@@ -74,6 +79,11 @@ def stations(block: Block, result: Result | None, misleading: Collection[str] = 
     if paths:
         _compare(block, [strip for strip in strips if len(strip) >= FEWEST], paths, which, section)
     return section
+
+
+def flown(block: Block) -> bool:
+    """Whether most photos look down, as from an aircraft: only then is there a path, and ground."""
+    return float(np.median(local_axes(block).cameras()[:, 2, 2])) > UPRIGHT
 
 
 @dataclass(frozen=True)
@@ -142,23 +152,25 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
 def _moved(result: Result, misleading: Collection[str], section: Section) -> None:
     """Name the stations that the adjustment moved far more than the others."""
     block = result.block
-    if len(block.photo_ids) < FEWEST:
+    if len(block.photo_ids) - len(block.mounts) < FEWEST:
         return
     axes, base = local_axes(block), _base(block)
     shifts = axes.positions(result.photo_positions) - axes.positions(block.photo_positions)
     turns = result.photo_attitudes - block.photo_attitudes
     turns = np.angle(np.exp(1j * turns))
     unit = block.linear_unit
+    # Photos on frames have no poses of their own.
+    mounted = np.isin(block.photo_ids, [each.photo for each in block.mounts])
     for what, changes, shown, factor in (
         ("position", shifts, unit, 1.0),
         ("attitude", turns, "deg", float(np.degrees(1.0))),
     ):
-        spread = MAD_TO_SD * np.median(np.abs(changes), axis=0)
+        spread = MAD_TO_SD * np.median(np.abs(changes[~mounted]), axis=0)
         sizes = np.abs(changes) / np.maximum(spread, TINY)
         listed = ", ".join(f"{each * factor:.4f}" for each in spread)
         section.lines.append(f"{f'usual change of {what} by the adjustment':<50}{listed} {shown}")
         small = np.abs(changes).max(axis=1) < (SMOOTH_ANGLE if what == "attitude" else SMOOTH_POSITION * base)
-        for photo in np.flatnonzero((sizes.max(axis=1) > MOVED) & ~small).tolist():
+        for photo in np.flatnonzero((sizes.max(axis=1) > MOVED) & ~small & ~mounted).tolist():
             k = int(sizes[photo].argmax())
             name = block.photo_ids[photo]
             wrong = name in misleading

@@ -19,6 +19,7 @@ _SHARED = (
     "photo_attitudes",
     "photo_position_sd",
     "photo_positions_observed",
+    "observations",
     "photo_to_ground",
     "point_positions",
     "point_sd",

@@ -42,6 +42,7 @@ from photogram.cli.projects import (
 if TYPE_CHECKING:
     from photogram import Block, Result
     from photogram.formats import Project
+    from photogram.results.snooped import Snooped
 
 __all__ = ["adjust"]
 
@@ -116,6 +117,10 @@ def adjust(
             show_default=False,
         ),
     ] = None,
+    snoop: Annotated[
+        bool,
+        typer.Option("--snoop", help="Take gross errors out, one after the other; removed.csv lists them."),
+    ] = False,
     ordering: Ordering = OrderingName.AUTO,
     threads: Threads = None,
     strict: Strict = False,
@@ -132,6 +137,7 @@ def adjust(
     assert path is not None
     target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
     with job:
+        from photogram import Result
         from photogram.formats.additions import self_calibrated
 
         added = Additions(
@@ -147,12 +153,24 @@ def adjust(
         for remark in remarks:
             if not quiet:
                 print_remark(remark)
-        result = _adjusted(job, project, block, datum, loss, ordering, threads)
+        removed = None
+        if snoop:
+            if datum is not None or loss is not None or project.options.datum in ("inner", "minimum"):
+                raise typer.BadParameter("goes without --datum and --loss", param_hint="--snoop")
+            removed = _snooped(job, project, block, threads)
+            result = removed.result
+            assert isinstance(result, Result)
+        else:
+            result = _adjusted(job, project, block, datum, loss, ordering, threads)
         files = _files(project, result, sections)
+        if removed is not None:
+            files["removed.csv"] = removed.table().to_csv(index=False).encode()
+            files["report.txt"] += removed.report().encode()
+        taken = [] if removed is None else removed.sections()
         job.finish(
             {target / name: content for name, content in files.items()},
             {} if json is None else {json: result.to_json()},
-            summary=lambda: print_sections(_summary(result), "report.txt"),
+            summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )
 
@@ -166,6 +184,18 @@ def _started(project: Project) -> tuple[Block, list[str]]:
         return block, []
     found = first_values(block)
     return found.usable(), [str(each) for each in found.messages]
+
+
+def _snooped(job: Job, project: Project, block: Block, threads: int | None) -> Snooped:
+    from photogram import snoop
+
+    with job.status("adjusting and testing") as status:
+        return snoop(
+            block,
+            unit_variance=project.options.unit_variance,
+            threads=threads,
+            progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
+        )
 
 
 def _adjusted(

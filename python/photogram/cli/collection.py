@@ -4,13 +4,26 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from photogram.cli.components import COMPONENTS, Components, estimated, with_components
 from photogram.cli.console import print_sections
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Ordering, OrderingName, Quiet, Strict, Threads, out_option
+from photogram.cli.options import (
+    JsonFile,
+    Ordering,
+    OrderingName,
+    Quiet,
+    Snoop,
+    SnoopLevel,
+    SnoopRate,
+    Strict,
+    Threads,
+    UnitWeight,
+    out_option,
+)
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -86,8 +99,16 @@ def collection(
     covariance: Annotated[
         bool, typer.Option("--covariance/--no-covariance", help="Compute covariances and redundancy numbers.")
     ] = True,
+    components: Components = None,
     ordering: Ordering = OrderingName.AUTO,
     threads: Threads = None,
+    snoop: Snoop = False,
+    level: SnoopLevel = 0.05,
+    fdr: SnoopRate = None,
+    unit_weight: Annotated[
+        UnitWeight,
+        typer.Option(help="With --snoop: whether --sd is right, or but for a common factor."),
+    ] = UnitWeight.UNKNOWN,
     strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
@@ -95,7 +116,8 @@ def collection(
     if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
         raise typer.BadParameter("names a directory; adjusted.txt goes there", param_hint="--out")
     with job:
-        from photogram.collection import adjust, to_bytes
+        import photogram
+        from photogram.collection import AdjustedCollection, adjust, to_bytes
         from photogram.collection.formats import recognised
         from photogram.collection.report import summary
 
@@ -105,32 +127,48 @@ def collection(
         packing = problem.suffix if problem.suffix in PACKED else ""
         photos, found = recognised(problem)
         names = [] if out is None else [out / "report.txt", out / f"adjusted{found.suffix}{packing}"]
+        if components and out is not None:
+            names.append(out / COMPONENTS)
         job.writes(*names)
         photos = photos.replace(image_sd=sd)
+        if snoop and (loss is not Loss.SQUARES or components):
+            raise typer.BadParameter("not with a robust loss, nor with --components", param_hint="--snoop")
+        log = None
         with job.status("adjusting") as status:
-            result = adjust(
-                photos,
-                tolerance=tolerance,
-                max_iterations=max_iterations,
-                loss=_LOSSES[loss],
-                scale=scale,
-                covariance=covariance,
-                ordering=ordering.value,
-                threads=threads,
-                progress=shown(status, "cost", 0.5) if status is not None else None,
-            )
+            options: dict[str, Any] = {
+                "tolerance": tolerance,
+                "max_iterations": max_iterations,
+                "ordering": ordering.value,
+                "threads": threads,
+                "progress": shown(status, "cost", 0.5) if status is not None else None,
+            }
+            if snoop:
+                log = photogram.snoop(photos, level=level, fdr=fdr, unit_weight=unit_weight.value, **options)
+                if not isinstance(log.result, AdjustedCollection):
+                    raise TypeError("a collection gives the result of a collection")
+                result = log.result
+            else:
+                result = adjust(photos, loss=_LOSSES[loss], scale=scale, covariance=covariance, **options)
+        told = log or result
+        estimates = estimated(job, photos, components, threads)
         written = {}
         if names:
-            written[names[0]] = result.report().encode()
+            written[names[0]] = told.report().encode()
             written[names[1]] = to_bytes(result.adjusted(), packing, found.name)
+        if estimates is not None and out is not None:
+            written[out / COMPONENTS] = estimates.report().encode()
         if report is not None:
-            written[report] = result.report().encode()
+            written[report] = told.report().encode()
         if json is not None:
-            written[json] = result.to_json()
-        sections = [("File", [f"{problem}: {found.title}"]), *summary(result)]
+            written[json] = told.to_json()
+        sections = [
+            ("File", [f"{problem}: {found.title}"]),
+            *(log.sections() if log else []),
+            *with_components(summary(result), estimates)[1 if log else 0 :],
+        ]
         whole = (section for section in sections if section[1])
         job.finish(
             written,
             summary=lambda: print_sections(whole, "the report"),
-            code=result.verdict.exit_code(strict=strict),
+            code=(estimates or told).verdict.exit_code(strict=strict),
         )

@@ -15,6 +15,7 @@ from photogram.cli import (
     absolute_orientation,
     adjust,
     check,
+    check_project,
     collection,
     comparator,
     convert,
@@ -60,6 +61,7 @@ stellar_app = typer.Typer(
 stellar_app.command("plate")(stellar_camera.stellar_camera)
 stellar_app.command("exposures")(stellar_camera.exposures)
 app.command()(adjust.adjust)
+app.command("check")(check_project.check_project)
 app.command()(info.info)
 app.command()(convert.convert)
 app.command()(new.new)

@@ -28,8 +28,6 @@ from photogram.cli.projects import (
 
 __all__ = ["convert"]
 
-WRITABLE = "plain"
-
 
 @with_job
 def convert(
@@ -44,7 +42,7 @@ def convert(
         str,
         typer.Option(
             metavar="NAME",
-            help=f"The format to write: {WRITABLE} (docs/formats.md).",
+            help="The format to write, by its name: docs/formats.md lists them.",
         ),
     ] = "plain",
     file_format: FormatName = None,

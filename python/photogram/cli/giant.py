@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
 
+from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
@@ -16,8 +17,12 @@ from photogram.cli.options import (
     Ordering,
     OrderingName,
     Quiet,
+    Snoop,
+    SnoopLevel,
+    SnoopRate,
     Strict,
     Threads,
+    UnitWeight,
     default_out,
     out_option,
 )
@@ -25,7 +30,7 @@ from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
-    from photogram import Block, Result
+    from photogram import Block, Result, Snooped
     from photogram.giant import Project
     from photogram.giant.common import Common
 
@@ -79,6 +84,15 @@ def giant(
             help="Stop by the percent criterion and the limit of iterations of COMMON; list as in 1987.",
         ),
     ] = False,
+    unit_variance: Annotated[
+        UnitVarianceName | None,
+        typer.Option(
+            help="What the variance of unit weight is based on; `redundancy`: on redundancy numbers, whatever"
+            " the weights of the stations. Default: as COMMON says.",
+            show_default=False,
+        ),
+    ] = None,
+    components: Components = None,
     ordering: Ordering = OrderingName.AUTO,
     air_refraction: Annotated[
         AirModel | None,
@@ -101,6 +115,13 @@ def giant(
         typer.Option(min=1, help="Refractive index of the water. Default: 1.340.", show_default=False),
     ] = None,
     threads: Threads = None,
+    snoop: Snoop = False,
+    level: SnoopLevel = 0.05,
+    fdr: SnoopRate = None,
+    unit_weight: Annotated[
+        UnitWeight,
+        typer.Option(help="With --snoop: whether standard deviations are right, or but for a common factor."),
+    ] = UnitWeight.KNOWN,
     limits: Annotated[
         str | None,
         typer.Option(
@@ -131,23 +152,32 @@ def giant(
             job.reads(directory)
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
-        job.writes(*(out / name for name in RESULTS))
+        job.writes(*(out / name for name in RESULTS), *([out / COMPONENTS] if components else []))
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         block = _refracted(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
+        if snoop and (as_published or components or project.common.intersection_only):
+            refused = "not with --as-published, --components or an intersection"
+            raise typer.BadParameter(refused, param_hint="--snoop")
+        options = {"level": level, "fdr": fdr, "unit_weight": unit_weight.value} if snoop else None
         try:
-            result = _adjust(job, project, block, as_published, ordering, threads)
+            result, log = _adjust(
+                job, project, block, as_published, unit_variance, ordering, threads, options
+            )
         except AdjustmentError:
             # What was remarked on while reading is often the reason.
             for message in project.messages[:SHOWN]:
                 errors.print(escape(str(message)))
             raise
-        written = _result_files(project, block, result, out, as_published)
+        written = _result_files(project, block, result, log, out, as_published)
+        found = estimated(job, block, components, threads)
+        if found is not None:
+            written[out / COMPONENTS] = found.report().encode()
         documents = {}
         if json is not None:
-            documents[json] = result.to_json()
+            documents[json] = (log or result).to_json()
         if listing is not None:
             from photogram.giant import listing as printout
 
@@ -156,8 +186,14 @@ def giant(
         job.finish(
             written,
             documents,
-            summary=lambda: print_sections(summary(result), "report.txt"),
-            code=result.verdict.exit_code(strict=strict),
+            summary=lambda: print_sections(
+                [
+                    *(log.sections() if log else []),
+                    *with_components(summary(result), found)[1 if log else 0 :],
+                ],
+                "report.txt",
+            ),
+            code=(found or log or result).verdict.exit_code(strict=strict),
         )
 
 
@@ -200,30 +236,45 @@ def _adjust(
     project: Project,
     block: Block,
     as_published: bool,
+    unit_variance: UnitVarianceName | None,
     ordering: OrderingName,
     threads: int | None,
-) -> Result:
-    """Adjust the block as COMMON asks, with the progress on standard error."""
-    from photogram import AsPublished, adjust
+    snooping: dict[str, Any] | None,
+) -> tuple[Result, Snooped | None]:
+    """Adjust the block as COMMON asks, or snoop it, with the progress on standard error."""
+    from photogram import AsPublished, Result, adjust, snoop
 
     common = project.common
     with job.status("adjusting") as status:
+        progress = shown(status, "weighted sum of squares", 1.0) if status is not None else None
+        if snooping is not None:
+            snooping["unit_variance"] = unit_variance.value if unit_variance else common.unit_variance
+            log = snoop(block, threads=threads, progress=progress, **snooping)
+            if not isinstance(log.result, Result):
+                raise TypeError("a block gives the result of a block")
+            result = replace(log.result, messages=[*project.messages, *log.result.messages])
+            return result, replace(log, result=result)
         result = adjust(
             block,
-            unit_variance=common.unit_variance,
+            unit_variance=unit_variance.value if unit_variance else common.unit_variance,
             ordering=ordering.value,
             as_published=AsPublished(common.convergence_percent, common.max_iterations)
             if as_published
             else None,
             fix_photos=common.intersection_only,
-            progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
+            progress=progress,
             threads=threads,
         )
-    return replace(result, messages=[*project.messages, *result.messages])
+    return replace(result, messages=[*project.messages, *result.messages]), None
 
 
 def _result_files(
-    project: Project, block: Block, result: Result, out: Path, as_published: bool
+    project: Project,
+    block: Block,
+    result: Result,
+    log: Snooped | None,
+    out: Path,
+    as_published: bool,
 ) -> dict[Path, bytes]:
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.giant.export import adjusted_records
@@ -244,4 +295,4 @@ def _result_files(
             Message("RESTART is not written: the stations are beyond what its columns hold")
         )
     made = {out / name: to_bytes(lines) for name, lines in records.items()}
-    return {**made, out / "report.txt": result.report().encode()}
+    return {**made, out / "report.txt": (log or result).report().encode()}

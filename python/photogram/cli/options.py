@@ -20,8 +20,12 @@ __all__ = [
     "PlotFormat",
     "Plots",
     "Quiet",
+    "Snoop",
+    "SnoopLevel",
+    "SnoopRate",
     "Strict",
     "Threads",
+    "UnitWeight",
     "default_out",
     "out_option",
     "picture_places",
@@ -34,6 +38,37 @@ JsonFile = Annotated[
     typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
 ]
 Plots = Annotated[bool, typer.Option("--plots", help="Draw the pictures too, into --out (needs matplotlib).")]
+
+
+Snoop = Annotated[
+    bool,
+    typer.Option(
+        "--snoop", help="Take gross errors out one after the other, and write what was taken out and why."
+    ),
+]
+SnoopLevel = Annotated[
+    float,
+    typer.Option(
+        min=1e-9, max=0.5, help="With --snoop: chance that any good observation is taken out (Bonferroni)."
+    ),
+]
+SnoopRate = Annotated[
+    float | None,
+    typer.Option(
+        "--fdr",
+        min=1e-9,
+        max=0.5,
+        help="With --snoop: a false discovery rate in place of --level.",
+        show_default=False,
+    ),
+]
+
+
+class UnitWeight(StrEnum):
+    """What tests of observations rest on."""
+
+    KNOWN = "known"
+    UNKNOWN = "unknown"
 
 
 class PictureFormat(StrEnum):

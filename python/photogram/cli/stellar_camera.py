@@ -120,7 +120,7 @@ def exposures(
     strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate a digital camera by exposures of the sky: pinhole and Brown distortion (needs pyerfa)."""
+    """Calibrate a digital camera, also one of the whole sky, by exposures of the stars (needs pyerfa)."""
     with job:
         from photogram.stellar.night import calibrate_night
         from photogram.stellar.night_document import to_json
@@ -178,9 +178,19 @@ def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, by
 
 def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path, bytes]:
     """Make everything that is written for a night."""
+    from photogram.stellar.camera_yaml import WITH_YAML, to_yaml
     from photogram.stellar.night_report import report
+    from photogram.stellar.night_tables import exposure_table, image_table
 
-    made = {out / "report.txt": report(result).encode(), out / "camera.json": result.camera.to_json()}
+    made = {
+        out / "report.txt": report(result).encode(),
+        out / "camera.json": result.camera.to_json(),
+        out / "exposures.csv": exposure_table(result).to_csv(index=False).encode(),
+        out / "star-images.csv": image_table(result).to_csv(index=False).encode(),
+    }
+    if result.camera.lens in WITH_YAML:
+        made[out / "camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
+        made[out / "camera-ros.yaml"] = to_yaml(result.camera, result.night.frame, "ros")
     if pictures:
         from photogram.show.pictures import files as drawn
         from photogram.stellar.night_plots import figures

@@ -2,10 +2,12 @@
 
 from photogram.arguments.annotations import check_arguments
 from photogram.collection import (  # noqa: F401  (the ways to show a result, and what works on it)
+    checking,
     components,
     document,
     findings,
     report,
+    snooping,
     tables,
 )
 from photogram.collection.adjust import adjust

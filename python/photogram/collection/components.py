@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.components import Weighing, weighing
+from photogram.adjustment.components import Weighing, scaled, weighing
 from photogram.arguments.types import Floats
 from photogram.collection.adjust import adjusted
 from photogram.collection.adjusted import AdjustedCollection
@@ -59,6 +59,17 @@ def _(result: AdjustedCollection) -> _photocore.BlockCovariances:
     return network.covariances(result.state, threads=0, progress=None)
 
 
+@scaled.register
+def scaled_collection(collection: Collection, grouping: Grouping, factors: Floats) -> Collection:
+    """Return a collection with the variances of groups multiplied by factors."""
+    roots = np.sqrt(factors)
+    return collection.replace(
+        image_sd=collection.image_sd * grouping.factors(roots, grouping.images),
+        point_sd=collection.point_sd * grouping.factors(roots, grouping.points),
+        photo_sd=collection.photo_sd * grouping.factors(roots, grouping.photos),
+    )
+
+
 class _Collection(Weighing):
     result: AdjustedCollection
 
@@ -68,13 +79,7 @@ class _Collection(Weighing):
         self.result = self.first = adjusted(collection, _OPTIONS, threads=threads)
 
     def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedCollection:
-        roots = np.sqrt(factors)
-        given = self.given
-        self.network = given.replace(
-            image_sd=given.image_sd * grouping.factors(roots, grouping.images),
-            point_sd=given.point_sd * grouping.factors(roots, grouping.points),
-            photo_sd=given.photo_sd * grouping.factors(roots, grouping.photos),
-        )
+        self.network = scaled_collection(self.given, grouping, factors)
         self.result = adjusted(self.network, _OPTIONS, threads=self.threads, start=self.result.state)
         return self.result
 

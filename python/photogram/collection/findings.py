@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.results.findings import ROBUST, has_redundancy, unseen
 from photogram.results.observed import tested
+from photogram.results.patterns import CameraImages, patterns
 from photogram.show.ways import findings_of
-from photogram.statistics.findings import Findings, by_t
+from photogram.statistics.findings import Findings, Systematic, by_t
 from photogram.statistics.limits import global_test
 from photogram.statistics.outliers import Observations
 
@@ -27,7 +30,23 @@ def collection_findings(result: AdjustedCollection) -> Findings:
         global_test=None if result.loss else global_test(omega, freedom),
         untested=ROBUST if result.loss else "no degrees of freedom",
         computed=has_redundancy(result),
+        systematic=_patterns(result),
         remarks=unseen(result),
+        snoop="--snoop (photogram.snoop)",
+    )
+
+
+def _patterns(result: AdjustedCollection) -> list[Systematic]:
+    collection = result.collection
+    photos, _ = names(result)
+    return patterns(
+        result,
+        collection.image_photos,
+        collection.image_xy,
+        np.broadcast_to(collection.image_sd, collection.image_xy.shape),
+        [CameraImages("the cameras", np.ones(len(photos), dtype=bool), 0)],
+        photos,
+        ("px", 1.0),
     )
 
 

@@ -16,6 +16,7 @@ from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
 from photogram.messages import quoted
+from photogram.network.cameras import Camera
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
@@ -24,6 +25,10 @@ __all__ = ["Correction"]
 
 PARAMETERS = 21
 """Scale x, scale y, lack of orthogonality, nine coefficients of x, nine of y."""
+MODEL = ("mx", "my", "lean", *(f"{axis}{term}" for axis in "xy" for term in "ABCDEFGHJ"))
+"""What the model of cameras calls them; scales less 1, coefficients in mm."""
+MM = 1000.0
+"""In micrometres."""
 STEPS = 20
 ROUNDING = 1e-6
 """Of correlations that were written with all digits and read again, with room to spare."""
@@ -166,6 +171,51 @@ class Correction:
             by_parameters[:, 1, 12:] = functions
         return by_parameters, inner @ self.matrix
 
+    def as_camera(self, camera: Camera, *, weighted: bool = True) -> Camera:
+        """Return a camera whose plates are measured on this comparator and not corrected: `on_comparator`.
+
+        Its image coordinates are readings in mm from the zero of the comparator. The parameters of the
+        correction are observations of a block with their full covariance, and independent of those of the
+        camera. `xp`, `yp` count, corrected, from the reading `x0`, `y0`: the centre of the polynomials.
+
+        Parameters
+        ----------
+        camera
+            A camera of the model `brown` in mm, unbalanced (r0 = 0) and without affinity and shear, which the
+            comparator has itself.
+        weighted
+            Whether the correction is observed; otherwise it is known.
+
+        Raises
+        ------
+        InputError
+            Another camera.
+        """
+        kept = _beneath(camera)
+        frame = self.polynomial.frame if self.polynomial else Frame.metres()
+        x0, y0 = np.linalg.solve(self.matrix, frame.centre_um) / MM
+        half_x, half_y = frame.half_range_um
+        coefficients = np.zeros(18) if self.polynomial is None else self.polynomial.scaled_um.ravel() / MM
+        values = [self.scale_x - 1.0, self.scale_y - 1.0, self.nonorthogonality_rad, *coefficients.tolist()]
+        unit = np.array([1.0] * 3 + [MM] * 18)
+        known = np.flatnonzero(np.diag(self.covariance) > 0) if weighted else np.zeros(0, int)
+        names = [MODEL[row] for row in known]
+        blocks = [(self.covariance / np.outer(unit, unit))[np.ix_(known, known)]]
+        if camera.covariance is not None:
+            names += list(camera.covariance[0])
+            blocks.append(np.asarray(camera.covariance[1]))
+        constants = {"x0": float(x0), "y0": float(y0), "hx": half_x / MM, "hy": half_y / MM}
+        return Camera(
+            "on_comparator",
+            {name: camera.parameters[name] for name in kept}
+            | dict(zip(MODEL, values, strict=True))
+            | constants,
+            sd=kept,
+            covariance=(names, _diagonal(blocks)) if names else None,
+            name=camera.name,
+            weights=camera.weights,
+        )
+
     def document(self) -> dict[str, Any]:
         """Return the correction as the members of a JSON document, units in their names."""
         document: dict[str, Any] = {
@@ -234,6 +284,30 @@ class Correction:
             raise InputError(f"holds no correction of a comparator: {error} is missing", file=path) from None
         except (ValueError, TypeError, AttributeError) as error:
             raise InputError(f"holds no correction of a comparator: {error}", file=path) from None
+
+
+def _beneath(camera: Camera) -> dict[str, float]:
+    """Return the standard deviations of what a camera keeps that is measured on a comparator."""
+    deviations = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+    own = ("b1", "b2", "r0")
+    if camera.model != "brown" or camera.unit != "mm" or any(camera.parameters[name] for name in own):
+        raise InputError(
+            f"the camera {camera.title} on a comparator must be of the model brown, in mm, with b1, b2 and"
+            " r0 zero"
+        )
+    if deviations["b1"] or deviations["b2"]:
+        raise InputError(f"b1, b2 of the camera {camera.title} are those of the comparator: they are held")
+    return {name: deviations[name] for name in camera.names if name not in own}
+
+
+def _diagonal(blocks: list[Floats]) -> Floats:
+    """Return the matrix that has the blocks along its diagonal."""
+    whole = np.zeros((sum(map(len, blocks)),) * 2)
+    first = 0
+    for block in blocks:
+        whole[first : first + len(block), first : first + len(block)] = block
+        first += len(block)
+    return whole
 
 
 def _numbers(value: Any, shape: tuple[int, ...]) -> Floats:

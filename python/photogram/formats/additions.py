@@ -10,15 +10,17 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.control_lists import ControlList, read_control_list
 from photogram.formats.images import from_corner
 from photogram.formats.intersection import intersected
+from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
-from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.settings import bare_settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.plain.writing import attitude_matrices
-from photogram.formats.project import Frame, Options, Project
-from photogram.io.delimited import ColumnTable, read_columns
+from photogram.formats.project import Frame, Project
+from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 
@@ -26,21 +28,6 @@ __all__ = ["deviations", "self_calibrated", "with_control", "with_images", "with
 
 SIMILAR = 10.0
 """How much better control must fit a model after a similarity for the model to be carried over."""
-_PIXELS = {
-    "image": "photo",
-    "file": "photo",
-    "filename": "photo",
-    "name": "point",
-    "id": "point",
-    "target": "point",
-    "track": "point",
-    "marker": "point",
-    "x": "column",
-    "u": "column",
-    "col": "column",
-    "y": "row",
-    "v": "row",
-}
 
 
 def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
@@ -121,21 +108,6 @@ def _named(name: str, wanted: set[str]) -> str:
     return "f" if own in ("fx", "fy") and "f" in wanted else ""
 
 
-def pixel_table(path: Path) -> ColumnTable:
-    """Read a table of image measurements under all usual names of its columns."""
-    names = {"photo", "point", "column", "row"}
-    table = read_columns(
-        path,
-        known=names,
-        numbers={"column", "row", "sd", "sd_column", "sd_row"},
-        spelling=lambda name: _PIXELS.get(name, name),
-    )
-    if "photo" in table and "point" not in table and "column" in table:
-        raise table.head.error("the column point is missing")
-    table.require("photo", "point", "column", "row")
-    return table
-
-
 def with_images(project: Project, path: Path, pixel_origin: str | None) -> Project:
     """Return a project with further image measurements: columns and rows of points in photos, pixels.
 
@@ -148,6 +120,11 @@ def with_images(project: Project, path: Path, pixel_origin: str | None) -> Proje
     if block.image_unit != "px":
         raise InputError("further images are in pixels, and the cameras of the project in mm", file=path)
     table = pixel_table(path)
+    return _with_table(project, path, table, pixel_origin)
+
+
+def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: str | None) -> Project:
+    block = project.block
     assert block.photo_cameras is not None
     photos = indices_of(table, "photo", {name: row for row, name in enumerate(block.photo_ids)}, "photo")
     names = table.names("point")
@@ -155,11 +132,7 @@ def with_images(project: Project, path: Path, pixel_origin: str | None) -> Proje
     new = [name for name in names.names if name not in known]
     known |= {name: len(block.point_ids) + k for k, name in enumerate(new)}
     points = np.array([known[name] for name in names.names], dtype=np.int64)[names.rows]
-    corner = np.column_stack([table.numbers("column"), table.numbers("row")]) + (
-        0.5 if pixel_origin == "center" else 0.0
-    )
-    if np.isnan(corner).any():
-        raise table.error(int(np.argwhere(np.isnan(corner))[0][0]), "column or row is empty")
+    corner = corner_of(table, pixel_origin)
     xy = corner.copy()
     for row, camera in enumerate(block.cameras):
         own = block.photo_cameras[photos] == row
@@ -180,6 +153,28 @@ def with_images(project: Project, path: Path, pixel_origin: str | None) -> Proje
     except InputError as error:
         raise InputError(error.message, file=path) from None
     return project.replace(block=larger, starts=np.vstack([project.starts, fill]))
+
+
+def _known_photos(project: Project, given: ControlList) -> ColumnTable:
+    """Return the measurements on photos of the project; underscores stand for blanks there."""
+    exact = set(project.block.photo_ids)
+    plain: dict[str, list[str]] = {}
+    for name in project.block.photo_ids:
+        plain.setdefault("_".join(name.split()), []).append(name)
+    table = given.images
+    names = [
+        name if name in exact else plain[name][0] if len(plain.get(name, ())) == 1 else ""
+        for name in table.texts("photo")
+    ]
+    rows = [row for row, name in enumerate(names) if name]
+    if len(rows) < len(names):
+        lost = sorted({own for own, name in zip(table.texts("photo"), names, strict=True) if not name})
+        given.messages.append(
+            Message(f"measurements on other photos are left out: {listed(lost, 3)}", table.path)
+        )
+    cells = {column: [table.cells[column][row] for row in rows] for column in table.columns}
+    cells["photo"] = [names[row] for row in rows]
+    return replace(table, cells=cells, count=len(rows), records=[table.records[row] for row in rows])
 
 
 def with_control(
@@ -203,26 +198,19 @@ def with_control(
     InputError
         A table at fault; none of its points has an image.
     """
-    settings = Settings(
-        path=path,
-        name="",
-        frame=project.frame,
-        options=Options(),
-        length=project.block.linear_unit,
-        angle="deg",
-        image="px",
-        image_y="down",
-        pixel_origin="corner",
-        attitude="omega_phi_kappa",
-        rotation="object_to_photo",
-        photo="y_up",
-        sd=sd,
-        tables={"control": path},
-        crs={"control": crs} if crs else {},
+    settings = bare_settings(
+        path, {"control": path}, frame=project.frame, length=project.block.linear_unit, sd=sd, crs=crs
     )
     tables = Tables(settings, [])
-    table = tables.read("control")
-    assert table is not None
+    listed_control = read_control_list(path, project)
+    if listed_control is None:
+        table = tables.read("control")
+        assert table is not None
+    else:
+        table = listed_control.control
+        settings = replace(settings, crs={"control": crs or listed_control.crs})
+        tables = Tables(settings, listed_control.messages)
+        project = _with_table(project, path, _known_photos(project, listed_control), None)
     transform = Transform(settings, tables.messages)
     given = read_control(tables, table, transform)
     block = project.block

@@ -19,7 +19,7 @@ from photogram.formats.project import Frame
 if TYPE_CHECKING:
     import pyproj
 
-__all__ = ["amid", "east_north_up", "from_frame", "geocentric", "to_frame"]
+__all__ = ["amid", "east_north_up", "enu_origin", "from_frame", "geocentric", "to_frame", "turn_to_frame"]
 
 GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
 ROUND = 1e-4
@@ -50,7 +50,19 @@ def _transformer(source: str, target: str) -> Any:
             first, second, always_xy=True, only_best=True, allow_ballpark=False
         )
     except pyproj.exceptions.ProjError as error:
-        raise InputError(f"there is no transformation from {source} to {target}: {error}") from None
+        raise InputError(
+            f"there is no transformation from {source} to {target}: {error}{_hint(source, target)}"
+        ) from None
+
+
+def _hint(source: str, target: str) -> str:
+    if not (_system(source).is_compound or _system(target).is_compound):
+        return ""
+    return (
+        "; heights above sea level need the grid of a geoid: give ellipsoidal heights and the horizontal"
+        " system"
+        " alone, or install the grid (projsync)"
+    )
 
 
 def _transformed(source: str, target: str, xyz: Floats) -> Floats:
@@ -60,13 +72,9 @@ def _transformed(source: str, target: str, xyz: Floats) -> Floats:
     try:
         found = np.column_stack(transformer.transform(*xyz.T, errcheck=True))
     except pyproj.exceptions.ProjError as error:
-        hint = ""
-        if _system(source).is_compound or _system(target).is_compound:
-            hint = (
-                "; heights above sea level need the grid of a geoid: give ellipsoidal heights and the"
-                " horizontal system alone, or install the grid (projsync)"
-            )
-        raise InputError(f"cannot be transformed from {source} to {target}: {error}{hint}") from None
+        raise InputError(
+            f"cannot be transformed from {source} to {target}: {error}{_hint(source, target)}"
+        ) from None
     if not np.isfinite(found).all():
         row = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
         raise InputError(f"{xyz[row].tolist()} of {source} has no place in {target}")
@@ -231,8 +239,20 @@ def _remarks(crs: str) -> list[str]:
         remarks.append(f"{crs} says nothing of heights: they are taken as ellipsoidal")
     if system.datum is not None and "dynamic" in system.datum.type_name.lower():
         remarks.append(f"{crs} is of a datum that moves: the epoch is not regarded")
-    if system.axis_info and system.axis_info[0].direction == "north":
-        remarks.append(
-            f"{crs} has the northing or latitude first: x was read as easting or longitude all the same"
-        )
+    if system.is_projected and system.axis_info[0].direction == "north":
+        remarks.append(f"{crs} has the northing first: x was read as the easting all the same")
     return remarks
+
+
+def turn_to_frame(crs: str, xyz: Floats, frame: Frame) -> Floats:
+    """Return (n, 3, 3) what carries attitudes relative to the local axes of a system into a frame.
+
+    Raises
+    ------
+    InputError
+        A frame that is not topocentric, or as for :func:`geocentric`.
+    """
+    if frame.kind != "topocentric" or frame.origin is None:
+        raise InputError(f"attitudes of {crs} cannot be carried into a frame that is {frame}")
+    found: Floats = east_north_up(frame.origin) @ _axes(crs, xyz, geocentric(crs, xyz)).transpose(0, 2, 1)
+    return found

@@ -44,11 +44,14 @@ class Frame:
         Coordinate reference system of the origin, or of the coordinates; empty where none is said.
     origin
         Latitude and longitude in degrees and ellipsoidal height in metres of a topocentric frame.
+    ellipsoid
+        Semi-axes of the ellipsoid of geographic coordinates; WGS 84.
     """
 
     kind: str = "cartesian"
     crs: str = ""
     origin: tuple[float, float, float] | None = None
+    ellipsoid: tuple[float, float] = (6378137.0, 6356752.314245179)
 
     def __str__(self) -> str:
         at = (
@@ -160,6 +163,7 @@ def assembled(
     linear_unit: str = "m",
     name: str = "",
     spheroid: Spheroid | None = None,
+    photo_to_ground: bool = False,
 ) -> Project:
     """Put together what a reader has found.
 
@@ -175,7 +179,7 @@ def assembled(
         Of the project.
     cameras, photo_ids, photo_cameras, point_ids, image_photos, image_points, image_xy, observations, mounts
         As in :class:`photogram.Block`.
-    point_positions, point_sd, photo_position_sd, photo_attitude_sd, linear_unit, spheroid
+    point_positions, point_sd, photo_position_sd, photo_attitude_sd, linear_unit, spheroid, photo_to_ground
         As there.
 
     Raises
@@ -201,7 +205,9 @@ def assembled(
     angles = np.full((len(photo_ids), 3), np.nan)
     known = np.isfinite(matrices).all(axis=(1, 2))
     if known.any():
-        angles[known] = Attitudes(matrices[known]).values("omega_phi_kappa")
+        angles[known] = Attitudes(matrices[known]).values(
+            "omega_phi_kappa_photo_to_ground" if photo_to_ground else "omega_phi_kappa"
+        )
     try:
         block = Block(
             photo_ids=photo_ids,
@@ -223,6 +229,7 @@ def assembled(
             linear_unit=linear_unit,
             title=name,
             spheroid=spheroid,
+            photo_to_ground=photo_to_ground,
         )
     except InputError as error:
         raise InputError(error.message, file=path) from None

@@ -21,6 +21,15 @@ FORMATS: dict[str, Format] = {
         "plain",
         "colmap",
         "colmap_text",
+        "opensfm",
+        "blocks_exchange",
+        "agisoft",
+        "bundler",
+        "bal",
+        "pixels",
+        "patb",
+        "bingo",
+        "giant",
     )
 }
 """By name, in the order in which help lists them."""
@@ -69,6 +78,9 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     with turned(f"reading {path}"):
         try:
             return chosen.read(path, wishes or Wishes())
+        except InputError as error:
+            # What refuses arrays or systems of coordinates does not know where they came from.
+            raise (error if error.file else InputError(error.message, file=path)) from None
         except PhotogramError:
             raise
         except (ArithmeticError, LookupError, ValueError) as error:

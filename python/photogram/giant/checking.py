@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools
-from photogram.checks.checking import Manner, check_block
-from photogram.checks.checking import check as check_network
+from photogram.checks.checking import Manner, check_block, check_of
 from photogram.checks.findings import Check, Finding, Section
 from photogram.checks.words import Words
 from photogram.giant.diagnostics import error_warnings
@@ -72,8 +71,8 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     return Check(project.title, [_input(project, block, limits), *sections], result)
 
 
-@check_network.register
-def _(network: Project, *, threads: int | None = None) -> Check:
+@check_of.register
+def _(network: Project, threads: int | None) -> Check:
     return check(network, threads=threads)
 
 

@@ -18,6 +18,12 @@ from photogram.errors import InputError
 
 __all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "checked_cameras", "images_of", "photo_indices"]
 
+Weights = Literal["corrected", "measured"]
+"""Of a backward camera: what the standard deviations of images are those of."""
+
+_MEASURED = "_measured"
+"""What the core calls backward cameras whose residuals lie in the measured image."""
+
 ImageUnit = Literal["mm", "px"]
 """What image coordinates are measured in."""
 
@@ -25,7 +31,7 @@ CameraRow = tuple[str, list[float], list[float], list[float] | None]
 """Model, parameters, their standard deviations, and the covariance matrix of those that are weighted, row by
 row, where these are correlated: as the core takes a camera."""
 
-_GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta"})
+_GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta", "hx", "hy"})
 """Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras. Where w and h
 are given, cx and cy are counted from the middle of the picture, and may be missing."""
 
@@ -33,6 +39,12 @@ are given, cx and cy are counted from the middle of the picture, and may be miss
 @cache
 def _models() -> dict[str, tuple[str, list[tuple[str, int]], int, str, str]]:
     return dict(_photocore.camera_models())
+
+
+@cache
+def _names() -> tuple[str, ...]:
+    """Return the models; not those that are a model with weights of its own."""
+    return tuple(name for name in _photocore.CAMERAS if not name.endswith(_MEASURED))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +70,10 @@ class Camera:
     covariance
         Names of parameters that were observed together, as by a calibration of its own, and their (w, w)
         covariance matrix; they need not stand in `sd`.
+    weights
+        Of a backward model. `corrected`: standard deviations of images are those of the corrected position,
+        where residuals are. `measured`: they are those of what was measured, and residuals are what was
+        measured less the image of the point. Forward models are `measured` by nature, and take the default.
 
     Raises
     ------
@@ -73,14 +89,20 @@ class Camera:
     name: str = ""
     unit: ImageUnit | None = None
     covariance: tuple[Sequence[str], ArrayLike] | None = None
+    weights: Weights = "corrected"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.model, str) or self.model not in _photocore.CAMERAS:
-            raise InputError(f"a camera is one of {', '.join(_photocore.CAMERAS)}, not {shown(self.model)}")
+        if not isinstance(self.model, str) or self.model not in _names():
+            raise InputError(f"a camera is one of {', '.join(_names())}, not {shown(self.model)}")
         text("name", self.name)
         if self.unit is None:
             self._set("unit", "mm" if "c" in self.names else "px")
         one_of("unit", self.unit, get_args(ImageUnit))
+        one_of("weights", self.weights, get_args(Weights))
+        if self.weights == "measured" and self.direction == "forward":
+            raise InputError(
+                f"the camera {self.title}: residuals of {self.model} lie in the measured image anyway"
+            )
         self._set("parameters", self._checked_parameters())
         self._set("covariance", self._checked_covariance())
         self._set("sd", self._checked_sd())
@@ -92,6 +114,11 @@ class Camera:
     def names(self) -> tuple[str, ...]:
         """The k parameters of the model, in their order."""
         return tuple(name for name, _ in self._facts[1])
+
+    @property
+    def powers(self) -> dict[str, int]:
+        """Which power of the unit of image coordinates each parameter has."""
+        return dict(self._facts[1])
 
     @property
     def constants(self) -> frozenset[str]:
@@ -370,7 +397,7 @@ def camera_rows(cameras: Sequence[Camera]) -> list[CameraRow]:
     """Return cameras as the core takes them."""
     return [
         (
-            each.model,
+            each.model + (_MEASURED if each.weights == "measured" else ""),
             each.values.tolist(),
             each.deviations.tolist(),
             None if each.prior_covariance is None else each.prior_covariance.ravel().tolist(),

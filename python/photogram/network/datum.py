@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from photogram.arguments.arrays import names, shown, text, truth_value
+from photogram.arguments.arrays import names, number, shown, text, truth_value
 from photogram.errors import InputError
 from photogram.network.block import Block, position_columns
 
 __all__ = ["DatumRow", "InnerConstraints", "MinimumConstraints", "datum_row", "minimum_row"]
 
-DatumRow = tuple[str, list[int], list[int], bool]
-"""`inner` or `relative`, points, photos, whether scale counts."""
+DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
+"""`inner` or `relative`, points, photos, whether scale counts, photos whose attitudes count, the radius."""
 
 
 @dataclass(frozen=True)
@@ -30,23 +31,33 @@ class InnerConstraints:
         Names of photos, whose positions count; None for all.
     scale
         Whether scale is taken from them, too, where nothing else gives one. Otherwise it stays as it is held.
+    attitudes
+        Names of photos whose attitudes count: a turn about an axis of the photo, times `radius`; None for
+        all.
+    radius
+        What makes turns in radians comparable with shifts, in the linear unit. None: the root mean square
+        distance of all points and photos from their middle.
 
     Raises
     ------
     InputError
-        Names that are none.
+        Names that are none, a radius that is not positive.
     """
 
     points: Sequence[str] | None = None
     photos: Sequence[str] | None = ()
     scale: bool = True
+    attitudes: Sequence[str] | None = ()
+    radius: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("points", "photos"):
+        for name in ("points", "photos", "attitudes"):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, tuple(names(name, value)))
         truth_value("scale", self.scale)
+        if self.radius is not None and not 0 < number("radius", self.radius) < math.inf:
+            raise InputError(f"radius is a positive length, not {self.radius}")
 
 
 @dataclass(frozen=True)
@@ -90,9 +101,13 @@ def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
     InputError
         Points or photos that are not in the block.
     """
-    points = range(len(block.point_ids)) if datum.points is None else _indices(block, "point", datum.points)
-    photos = range(len(block.photo_ids)) if datum.photos is None else _indices(block, "photo", datum.photos)
-    return "inner", list(points), list(photos), datum.scale
+
+    def rows(kind: str, wanted: Sequence[str] | None) -> list[int]:
+        ids = block.photo_ids if kind == "photo" else block.point_ids
+        return list(range(len(ids))) if wanted is None else _indices(block, kind, wanted)
+
+    points, photos = rows("point", datum.points), rows("photo", datum.photos)
+    return "inner", points, photos, datum.scale, rows("photo", datum.attitudes), datum.radius
 
 
 def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int, int] | None] | None:

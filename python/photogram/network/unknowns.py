@@ -7,8 +7,8 @@ adjustment starts from and, where its standard deviations are neither 0 (known) 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import ClassVar, Self
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,6 +74,8 @@ class Unknown:
 
     KIND: ClassVar[str] = ""
     """The name under which results know the type."""
+    GIVEN: ClassVar[tuple[str, ...]] = ()
+    """Fields that say where it is, and may be None, all of them, where nothing is known of it."""
 
     position: Floats = field(init=False, repr=False)
     attitude: Floats = field(init=False, repr=False)
@@ -88,6 +90,17 @@ class Unknown:
         if not (deviations >= 0).all():
             raise InputError(f"sd of {self.title} is no standard deviation: {deviations.tolist()}")
         self._set("deviations", deviations)
+        if self.is_open and not np.isinf(deviations).all():
+            raise InputError(f"{self.title} is weighted or held: {' and '.join(self.GIVEN)} must be given")
+
+    @property
+    def is_open(self) -> bool:
+        """Whether nobody has said where it is: an adjustment begins where points and photos have it."""
+        return all(getattr(self, name) is None for name in self.GIVEN) and bool(self.GIVEN)
+
+    def replace(self, **changes: Any) -> Self:
+        """Return it with some fields replaced, checked anew."""
+        return replace(self, **changes)
 
     def _set(self, name: str, value: Floats) -> None:
         if not np.isfinite(value).all() and name != "deviations":
@@ -194,21 +207,27 @@ class Boresight(Unknown):
     name
         For reports.
     value
-        (3, 3) body to the axes of the photo; the transposed mounting where nothing better is known.
+        (3, 3) body to the axes of the photo: the transposed mounting, or what is known of it. None: where it
+        is free, the mean of what photos and observed attitudes make of it; otherwise the identity.
     sd
         (3,) standard deviations of rotations about the axes of the body in radians, or one for all.
     """
 
     KIND = "boresight"
 
-    value: ArrayLike = field(default_factory=lambda: np.eye(3))
+    value: ArrayLike | None = None
     sd: ArrayLike = np.inf
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it is free, and nobody has said what it is about."""
+        return self.value is None and bool(np.isinf(self.deviations).all())
 
     def _position(self) -> Floats:
         return np.zeros(3)
 
     def _attitude(self) -> Floats:
-        return rotation(f"value of {self.title}", self.value)
+        return np.eye(3) if self.value is None else rotation(f"value of {self.title}", self.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,18 +264,21 @@ class Level(Unknown):
     name
         For reports.
     height
-        Z, or the height above the ellipsoid in geographic space, in the linear unit.
+        Z, or the height above the ellipsoid in geographic space, in the linear unit. None: the mean of its
+        points.
     sd
         Its standard deviation.
     """
 
     KIND = "level"
+    GIVEN = ("height",)
 
-    height: float
+    height: float | None = None
     sd: ArrayLike = np.inf
 
     def _position(self) -> Floats:
-        return np.array([0.0, 0.0, number(f"height of {self.title}", self.height)])
+        height = 0.0 if self.height is None else number(f"height of {self.title}", self.height)
+        return np.array([0.0, 0.0, height])
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,19 +290,21 @@ class PlumbLine(Unknown):
     name
         For reports.
     through
-        (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height.
+        (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height. None: the middle of its
+        points.
     sd
         (2,) standard deviations of its offset from there along X and Y or, in geographic space, east and
         north.
     """
 
     KIND = "plumb line"
+    GIVEN = ("through",)
 
-    through: ArrayLike
+    through: ArrayLike | None = None
     sd: ArrayLike = np.inf
 
     def _position(self) -> Floats:
-        return shaped(f"through of {self.title}", self.through, (3,))
+        return _place(self, self.through)
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +316,8 @@ class Line(Unknown):
     name
         For reports.
     direction
-        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`.
+        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`. None, with
+        `through`: a principal axis of its points.
     through
         (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height.
     sd
@@ -301,16 +326,17 @@ class Line(Unknown):
     """
 
     KIND = "line"
+    GIVEN = ("direction", "through")
 
-    direction: ArrayLike
-    through: ArrayLike
+    direction: ArrayLike | None = None
+    through: ArrayLike | None = None
     sd: ArrayLike = np.inf
 
     def _position(self) -> Floats:
-        return shaped(f"through of {self.title}", self.through, (3,))
+        return _place(self, self.through)
 
     def _attitude(self) -> Floats:
-        return _across(f"direction of {self.title}", self.direction)
+        return np.eye(3) if self.is_open else _across(f"direction of {self.title}", self.direction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,7 +348,8 @@ class Plane(Unknown):
     name
         For reports.
     normal
-        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`.
+        (3,) of any length, in X, Y, Z or, in geographic space, east, north and up at `through`. None, with
+        `through`: a principal axis of its points.
     through
         (3,) a place near it: X, Y, Z; or longitude (rad), latitude (rad), height.
     sd
@@ -331,16 +358,17 @@ class Plane(Unknown):
     """
 
     KIND = "plane"
+    GIVEN = ("normal", "through")
 
-    normal: ArrayLike
-    through: ArrayLike
+    normal: ArrayLike | None = None
+    through: ArrayLike | None = None
     sd: ArrayLike = np.inf
 
     def _position(self) -> Floats:
-        return shaped(f"through of {self.title}", self.through, (3,))
+        return _place(self, self.through)
 
     def _attitude(self) -> Floats:
-        return _across(f"normal of {self.title}", self.normal)
+        return np.eye(3) if self.is_open else _across(f"normal of {self.title}", self.normal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,21 +380,26 @@ class Sensor(Unknown):
     name
         For reports.
     value
-        (3,) c, its position in the axes of the frame (x right, y up, z back), in the linear unit.
+        (3,) c, its position in the axes of the frame (x right, y up, z back), in the linear unit. None, with
+        `matrix`: the middle of what the first poses of frames and photos make of it.
     matrix
-        (3, 3) its axes in those of the frame, as columns.
+        (3, 3) its axes in those of the frame, as columns. None with a given position: the identity.
     sd
         (6,) standard deviations of c, then of rotations about the sensor's own axes in radians.
     """
 
     KIND = "sensor"
+    GIVEN = ("value", "matrix")
 
-    value: ArrayLike
-    matrix: ArrayLike = field(default_factory=lambda: np.eye(3))
+    value: ArrayLike | None = None
+    matrix: ArrayLike | None = None
     sd: ArrayLike = np.inf
 
+    def _position(self) -> Floats:
+        return _place(self, self.value, "value")
+
     def _attitude(self) -> Floats:
-        return rotation(f"matrix of {self.title}", self.matrix)
+        return np.eye(3) if self.matrix is None else rotation(f"matrix of {self.title}", self.matrix)
 
     @classmethod
     def from_colmap(
@@ -382,8 +415,19 @@ class Sensor(Unknown):
         return cls(name, value, flip @ turned @ flip, sd)
 
 
-def _across(name: str, value: ArrayLike) -> Floats:
+def _place(own: Unknown, value: ArrayLike | None, what: str = "through") -> Floats:
+    """Return (3,) where it is; zero of what is open."""
+    if own.is_open:
+        return np.zeros(3)
+    if value is None:
+        raise InputError(f"{what} of {own.title} must be given, or neither of {' and '.join(own.GIVEN)}")
+    return shaped(f"{what} of {own.title}", value, (3,))
+
+
+def _across(name: str, value: ArrayLike | None) -> Floats:
     """Return axes of which the third has a direction."""
+    if value is None:
+        raise InputError(f"{name} must be given where the place is")
     third = shaped(name, value, (3,))
     length = float(np.linalg.norm(third))
     if not (length > 0 and np.isfinite(length)):

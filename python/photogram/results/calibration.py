@@ -21,6 +21,7 @@ from photogram.network.block import ATTITUDE_COLUMNS, position_columns
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances
 from photogram.results.distortion import INTERIOR
+from photogram.results.model_tests import TermsTest, groups_of_terms, terms_test
 from photogram.results.result import Result
 
 __all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
@@ -175,6 +176,8 @@ class Calibration:
         Pairs of its parameters that are correlated by more than 0.95, largest first.
     poses
         Correlations above 0.95 with positions and attitudes of photos, by parameter and component.
+    terms
+        Terms as they are kept or left out together, tested at 1 percent, with what they do to images.
     removable
         The term that may be left out: the least significant one that stands alone; None where all are needed.
         Never several at once: without one of them the others have other tests.
@@ -185,6 +188,7 @@ class Calibration:
     groups: tuple[GroupTest, ...]
     correlations: tuple[Correlation, ...]
     poses: tuple[PoseCorrelation, ...]
+    terms: tuple[TermsTest, ...]
     removable: str | None
 
     def remarks(self) -> list[str]:
@@ -206,11 +210,23 @@ class Calibration:
                     f"{each.name} has moved by {abs(each.change) / each.given_sd:.1f} standard deviations of"
                     " its prior: value or weight is wrong"
                 )
+        said += self._worth()
         if self.removable is not None:
             said.append(
                 f"{self.removable} may be left out: the least significant term; adjust again before the next"
             )
         return said
+
+    def _worth(self) -> list[str]:
+        """Say which terms are worth keeping."""
+        kept = [", ".join(each.names) for each in self.terms if each.worth_keeping]
+        others = [
+            f"{', '.join(each.names)} (probability {each.probability:.2g}, up to {each.effect:.2g} sd)"
+            for each in self.terms
+            if not each.worth_keeping
+        ]
+        parts = (("worth keeping by their tests at 1 percent", kept), ("not worth keeping", others))
+        return [f"terms of the lens {what}: {'; '.join(names)}" for what, names in parts if names]
 
 
 def calibrations(result: Result) -> list[Calibration]:
@@ -231,7 +247,9 @@ def _calibration(result: Result, camera: AdjustedCamera, covariances: Covariance
     parameters = tuple(_parameter(result, camera, k) for k in camera.estimated)
     groups = tuple(_group(result, camera, names) for names in _families(camera))
     poses = () if covariances is None else _poses(result, camera, covariances)
-    return Calibration(camera, parameters, groups, _correlations(camera), poses, _removable(parameters))
+    terms = tuple(terms_test(result, names, camera=camera.name) for names in groups_of_terms(camera))
+    correlations = _correlations(camera)
+    return Calibration(camera, parameters, groups, correlations, poses, terms, _removable(parameters))
 
 
 def _a_posteriori(result: Result) -> bool:

@@ -198,6 +198,16 @@ def _member(result: Result, found: Calibration) -> dict[str, Any]:
             }
             for each in found.poses
         ],
+        "terms": [
+            {
+                "names": list(each.names),
+                "statistic": each.statistic,
+                "probability": each.probability,
+                "largest_effect_sd": each.effect,
+                "worth_keeping": each.worth_keeping,
+            }
+            for each in found.terms
+        ],
         "removable": found.removable,
         "remarks": found.remarks(),
         "distortion": None if curve is None else _curve_member(curve),

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from photogram import _photocore
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
 from photogram.show.sections import Section, composed, headline
-from photogram.show.ways import Shown, columns_of, document_of, report_of
+from photogram.show.ways import Shown, columns_of, document_of, findings_of, report_of
 from photogram.statistics.components import Component, Estimate
+from photogram.statistics.findings import Findings, GroupFactor
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["VarianceComponents"]
+__all__ = ["VarianceComponents", "component_lines", "statement"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,27 @@ class VarianceComponents(Shown):
         return self._table("component")
 
 
+@findings_of.register(VarianceComponents)
+def _findings(found: VarianceComponents) -> Findings:
+    """Return what the verdict on the given weights rests on: components and, with their weights, the tests.
+
+    Too optimistic weights would make gross errors of good observations. The global test is that of the given
+    weights.
+    """
+    estimated = [
+        GroupFactor(
+            group=each.name,
+            factor=each.factor_of_sd,
+            interval=(math.sqrt(each.interval[0]), math.sqrt(each.interval[1])),
+            significant=each.worth_changing,
+        )
+        for each in found.components
+        if not each.held
+    ]
+    given = findings_of(found.first)
+    return replace(findings_of(found.result), global_test=given.global_test, components=estimated)
+
+
 @columns_of.register(VarianceComponents)
 def _columns(found: VarianceComponents, what: str) -> dict[str, Any]:
     """`group`, its sums, `factor` of the variance with its deviation and interval, `held` where it is."""
@@ -96,6 +118,7 @@ def _document(found: VarianceComponents) -> bytes:
     return json.to_json(
         {
             "program": f"photogram {_photocore.__version__}",
+            "verdict": found.verdict.document(),
             "converged": estimate.converged,
             "level": estimate.level,
             "components": [dict(zip(names, row, strict=True)) for row in zip(*columns.values(), strict=True)],
@@ -120,14 +143,15 @@ def _document(found: VarianceComponents) -> bytes:
 def _report(found: VarianceComponents) -> str:
     """Return the components as text: what to do first."""
     sections: list[Section] = [
-        ("Verdict", _verdict(found)),
+        ("Verdict", [f"{found.verdict.headline}.", *statement(found)]),
         ("Variance components", component_lines(found)),
         ("Groups that were merged or held", list(found.estimate.messages)),
     ]
     return composed(headline("variance components"), sections)
 
 
-def _verdict(found: VarianceComponents) -> list[str]:
+def statement(found: VarianceComponents) -> list[str]:
+    """Return what to do, in sentences."""
     estimate = found.estimate
     if not estimate.converged:
         return ["the components have not converged: do not use them"]

@@ -181,6 +181,29 @@ class Covariances:
             return Propagated(float(value), float(sd), covariance, partials, scalar)
         return Propagated(value, sd, covariance, partials, found)
 
+    def influences(
+        self, trial: _photocore.NetworkTrial, selection: Selection, function: Callable[..., Any] | None
+    ) -> tuple[list[tuple[str, str, str]], Floats]:
+        """Return what errors of one standard deviation in every observation do to unknowns or a function.
+
+        Parameters
+        ----------
+        trial
+            The same network, as it stands.
+        selection, function
+            Unknowns, and what they go into; None for themselves.
+
+        Returns
+        -------
+        What the unknowns are, and (k, M) the effect of each row on each of the k.
+        """
+        selected = self._adjusted.selected(selection)
+        if function is None:
+            partials = np.eye(len(selected.values))
+        else:
+            partials = _partials(function, selected, _evaluated(function, selected, selected.values))
+        return selected.labels, self._asked(lambda: trial.influences(self._core, partials, selected.rows))
+
     def _asked(self, ask: Callable[[], Floats]) -> Floats:
         try:
             return ask()

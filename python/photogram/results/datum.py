@@ -30,13 +30,15 @@ class ResultDatum:
     Attributes
     ----------
     kind
-        `observations` (control, weights and observations give it), `minimum constraints`, `inner
-        constraints` or `relative`.
+        `observations` (control, weights and observations give it), `minimal control` (control and weights are
+        just what a datum takes, and check nothing), `minimum constraints`, `inner constraints` or `relative`.
     held
         Photos with the names of their unknowns that are held; of other kinds than minimum constraints those
         from which the network was taken to its datum.
     points, photos
         What carries inner constraints, or what cofactors are relative to.
+    attitudes
+        Photos whose attitudes carry inner constraints.
     scale
         Whether inner constraints take the scale from them, too.
     lost
@@ -49,13 +51,18 @@ class ResultDatum:
     photos: tuple[str, ...] = ()
     scale: bool = False
     lost: float = 0.0
+    attitudes: tuple[str, ...] = ()
     row: DatumRow | None = field(default=None, repr=False)
     """As the core knows it."""
 
     def __str__(self) -> str:
         counts = [
             f"{len(names)} {kind}{'s' if len(names) != 1 else ''}"
-            for kind, names in (("point", self.points), ("photo", self.photos))
+            for kind, names in (
+                ("point", self.points),
+                ("photo", self.photos),
+                ("attitude", self.attitudes),
+            )
             if names
         ]
         if self.kind == "minimum constraints":
@@ -65,12 +72,14 @@ class ResultDatum:
             return f"inner constraints over {' and '.join(counts)}{scale}"
         if self.kind == "relative":
             return f"relative to {listed([*self.photos, *self.points])}"
+        if self.kind == "minimal control":
+            return "given by control that is exactly minimal"
         return "given by the observations"
 
     @property
     def is_chosen(self) -> bool:
         """Whether standard deviations would be others in another datum."""
-        return self.kind != "observations"
+        return self.kind not in ("observations", "minimal control")
 
     def document(self) -> dict[str, Any]:
         """Return what the JSON document says of it."""
@@ -80,6 +89,7 @@ class ResultDatum:
             "held": held,
             "points": list(self.points),
             "photos": list(self.photos),
+            "attitudes": list(self.attitudes),
             "scale": self.scale,
         }
 
@@ -97,8 +107,9 @@ def datum_of(block: Block, solution: BlockSolution, row: DatumRow | None = None)
     names = [name.removesuffix("_deg") for name in (*position_columns(block), *ATTITUDE_COLUMNS)]
     held = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
     if row is None:
-        return ResultDatum("minimum constraints" if held else "observations", held)
-    name, points, photos, scale = row
+        given = "minimal control" if solution.minimal_control else "observations"
+        return ResultDatum("minimum constraints" if held else given, held)
+    name, points, photos, scale, attitudes, _ = row
     used = solution.point_rays > 0
     return ResultDatum(
         kind="inner constraints" if name == "inner" else name,
@@ -107,6 +118,7 @@ def datum_of(block: Block, solution: BlockSolution, row: DatumRow | None = None)
         photos=tuple(block.photo_ids[photo] for photo in photos),
         scale=scale,
         lost=solution.lost_digits,
+        attitudes=tuple(block.photo_ids[photo] for photo in attitudes),
         row=row,
     )
 
@@ -136,6 +148,13 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
             Message(
                 "there is no control, and nothing else gives a datum: held at their initial values are"
                 f" {held_lines(datum.held)}; coordinates and standard deviations refer to these"
+            )
+        ]
+    if datum.kind == "minimal control":
+        return [
+            Message(
+                "control and weights of photos are exactly minimal: they give a datum and check nothing"
+                " (their redundancy numbers are zero); in_datum takes the result to another one"
             )
         ]
     held = np.isfinite(block.point_sd) & (point_rays > 0)[:, np.newaxis]
@@ -170,12 +189,12 @@ def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None
     if photo is not None:
         if photo not in block.photo_ids:
             raise InputError(f"there is no photo {photo!r}")
-        return "relative", [], [block.photo_ids.index(photo)], False
+        return "relative", [], [block.photo_ids.index(photo)], False, [], None
     index = {name: i for i, name in enumerate(block.point_ids)}
     wanted = list(points or [])
     if missing := [name for name in wanted if name not in index]:
         raise InputError(f"there is no point {missing[0]!r}")
-    return "relative", [index[name] for name in wanted], [], False
+    return "relative", [index[name] for name in wanted], [], False, [], None
 
 
 def refused(

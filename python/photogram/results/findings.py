@@ -7,9 +7,10 @@ import numpy as np
 from photogram.results.kinds import tested_kind
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observed import tested
+from photogram.results.patterns import CameraImages, patterns
 from photogram.results.result import Result
 from photogram.show.ways import findings_of
-from photogram.statistics.findings import Findings, by_w
+from photogram.statistics.findings import Findings, Systematic, by_w
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
@@ -29,7 +30,29 @@ def block_findings(result: Result) -> Findings:
         global_test=None if result.loss else result.global_test,
         untested=ROBUST if result.loss else "no degrees of freedom",
         computed=has_redundancy(result),
+        systematic=_patterns(result),
         remarks=unseen(result),
+        snoop="--snoop (photogram.snoop)",
+    )
+
+
+def _patterns(result: Result) -> list[Systematic]:
+    block, photos = result.block, len(result.block.photo_ids)
+    cameras = [CameraImages("the camera", np.ones(photos, dtype=bool), 0)]
+    if block.photo_cameras is not None:
+        cameras = [
+            CameraImages(each.name, block.photo_cameras == row, int(np.count_nonzero(each.information)))
+            for row, each in enumerate(result.cameras)
+        ]
+    return patterns(
+        result,
+        block.image_photos,
+        block.image_xy,
+        block.image_sd,
+        cameras,
+        block.photo_ids,
+        ("um", 1000.0) if block.image_unit == "mm" else ("px", 1.0),
+        axes(result),
     )
 
 

@@ -15,7 +15,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.results.iteration import Iteration
 from photogram.show.ways import Shown
-from photogram.statistics.reliability import ROUNDING
+from photogram.statistics.reliability import standardized
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -168,12 +168,12 @@ class AdjustedNetwork(Shown, ABC):
     @property
     def photo_standardized(self) -> Floats:
         """(P, k) `photo_residuals` / (sd x root of redundancy number); NaN unless weighted."""
-        return _standardized(self.photo_residuals, self.photo_given_sd, self.photo_redundancy)
+        return standardized(self.photo_residuals, self.photo_given_sd, self.photo_redundancy)
 
     @property
     def point_standardized(self) -> Floats:
         """(n, 3) `point_residuals` / (sd x root of redundancy number); NaN unless weighted."""
-        return _standardized(self.point_residuals, self.point_given_sd, self.point_redundancy)
+        return standardized(self.point_residuals, self.point_given_sd, self.point_redundancy)
 
     @property
     def stations(self) -> Observed:
@@ -251,11 +251,3 @@ class AdjustedNetwork(Shown, ABC):
     def station_table(self) -> pd.DataFrame:
         """Return weighted and fixed photos as a data frame: residuals, redundancy numbers, test values."""
         return self._table("station")
-
-
-def _standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:
-    """Return Baarda's w; NaN for what is no observation, and where rounding is all there is of redundancy."""
-    tested = np.isfinite(sd) & (sd > 0) & (redundancy > ROUNDING)
-    values = np.full(residuals.shape, np.nan)
-    values[tested] = residuals[tested] / (sd[tested] * np.sqrt(redundancy[tested]))
-    return values

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -28,7 +29,9 @@ from photogram.results.datum import (
 )
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
+from photogram.results.reliability import Reliability
 from photogram.results.selection import Adjusted, Selection, photo_components, point_components
+from photogram.results.suspects import network_trial
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
 
@@ -196,6 +199,33 @@ class Result(AdjustedNetwork):
     ) -> Propagated:
         """Return a function of adjusted unknowns with its covariance; see `Covariances.propagate`."""
         return self.covariances().propagate(function, unknowns, bias=bias)
+
+    def reliability(
+        self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
+    ) -> Reliability:
+        """Return which gross errors of every observation are found, and what others do (docs/blunders.md).
+
+        It takes a factorisation and a selected inverse at the adjusted values.
+
+        Parameters
+        ----------
+        level, power
+            Of the test of an observation: alpha0, beta0.
+        unit_weight
+            `known`, or `unknown`: estimated by the adjustment, which makes errors harder to find.
+
+        Raises
+        ------
+        InputError
+            Options that cannot be.
+        OutOfMemoryError, KeyboardInterrupt
+            As :meth:`covariances`.
+        """
+        one_of("unit_weight", unit_weight, ("known", "unknown"))
+        core = block_network(self.block, self.options).trial(self.state, threads=0)
+        trial = network_trial(self.block, core)
+        known = unit_weight == "known"
+        return Reliability(trial, self.covariances, level=level, power=power, known=known)
 
     def in_datum(self, datum: InnerConstraints) -> Self:
         """Return the result in another datum, without adjusting again (S-transformation, docs/datum.md).

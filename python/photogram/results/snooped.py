@@ -10,7 +10,8 @@ import orjson
 
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
-from photogram.show.sections import Section, composed, headline
+from photogram.show.sections import Section, composed, headline, verdict_section
+from photogram.show.ways import Judged
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome, Settings
@@ -23,7 +24,7 @@ __all__ = ["Snooped"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Snooped:
+class Snooped(Judged):
     """A network after data snooping.
 
     Attributes
@@ -102,12 +103,17 @@ class Snooped:
         }
 
     def to_json(self) -> bytes:
-        """Return the whole result with the log under `snooping` as one JSON document (UTF-8)."""
-        return json.to_json({**orjson.loads(self.result.to_json()), "snooping": self.document()})
+        """Return the whole result with its verdict and the log, `snooping`, as one JSON document (UTF-8)."""
+        own = {"verdict": self.verdict.document(), "snooping": self.document()}
+        return json.to_json({**orjson.loads(self.result.to_json()), **own})
 
     def sections(self) -> list[Section]:
         """Return the log as titled sections of a report."""
-        return [("Data snooping", self._head()), ("Taken out, in order", self._log())]
+        return [
+            verdict_section(self.verdict),
+            ("Data snooping", self._head()),
+            ("Taken out, in order", self._log()),
+        ]
 
     def report(self) -> str:
         """Return the report: what was taken out, then the report of the network without it."""
@@ -258,7 +264,8 @@ def _lines(entry: Removal) -> list[str]:
             f" {entry.dimension}, F {entry.fisher:.2f}, log10 p {entry.log_probability / _LN10:.1f}"
             f" (limit {math.log10(entry.limit):.1f})"
         )
-    lines.append(f"    estimated error {errors}; redundancy {entry.redundancy:.3f}")
+    if errors:
+        lines.append(f"    estimated error {errors}; redundancy {entry.redundancy:.3f}")
     lines += [
         f"    or {rival.name}: T {rival.statistic:.2f}, odds {rival.odds:.2g} : 1" for rival in entry.rivals
     ]

@@ -14,7 +14,7 @@ from photogram.statistics.distributions import (
     log_fisher,
 )
 from photogram.statistics.evidence import Test
-from photogram.statistics.findings import Findings, Snooped, Tested
+from photogram.statistics.findings import Findings, Removed, Tested
 from photogram.statistics.groups import GroupTests, group_tests, parts_tests
 from photogram.statistics.limits import (
     NOTABLE_FACTOR,
@@ -31,7 +31,7 @@ __all__ = [
     "Findings",
     "GlobalTest",
     "GroupTests",
-    "Snooped",
+    "Removed",
     "Test",
     "Tested",
     "Verdict",

@@ -183,6 +183,12 @@ class Estimate:
     level: float
 
     @property
+    def limit(self) -> float:
+        """What the size of a test value of a component exceeds where it is significant."""
+        free = sum(not each.held for each in self.components)
+        return critical_normal(bonferroni(self.level, free))
+
+    @property
     def reference(self) -> float:
         """The component of all image coordinates together; 1 where there are none."""
         own = [each for each in self.components if each.images and each.redundancy > 0]
@@ -289,9 +295,11 @@ class _Run:
         self.steps: list[tuple[Floats, Floats, Floats]] = []
         self.matrix: Floats = np.zeros((0, 0))
         self.converged = False
+        self.least = LEAST_REDUNDANCY
 
     def judge(self, least: float) -> None:
         """Merge groups whose component cannot be estimated, and hold what still cannot be."""
+        self.least = least
         parents = self.groups.parents or ("",) * len(self.groups.names)
         pools: dict[int, tuple[str, list[int]]] = {}
         for parent in dict.fromkeys(filter(None, parents)):
@@ -300,7 +308,7 @@ class _Run:
                 names = [self.groups.names[g] for g in pool]
                 name = parent if len(pool) == len(siblings) or "other" in parent else f"others of {parent}"
                 self.messages.append(
-                    f"{listed(names)}: merged, each has too little redundancy for itself: {name}"
+                    f"{listed(names)}: merged into {name}, each has too little redundancy for itself"
                 )
                 pools |= dict.fromkeys(pool, (name, pool))
         units: list[tuple[str, list[int]]] = []
@@ -398,16 +406,26 @@ class _Run:
         matrix, by_helmert = self._helmert()
         free = self.free
         deviations = np.sqrt(2 * np.diag(np.linalg.inv(matrix[np.ix_(free, free)])))
+        said = {}
         for unit in low:
             place, (name, members) = free.index(unit), self.units[unit]
             factor = self.factors[members[0]]
-            text = (
+            component, deviation = factor * by_helmert[place], factor * deviations[place]
+            said[unit] = (
                 f"the residuals of {name} are smaller than any positive variance explains (component"
-                f" {factor * by_helmert[place]:.2g} +- {factor * deviations[place]:.2g})"
+                f" {component:.2g} +- {deviation:.2g}): held at the lower bound of {LOWER_BOUND:g} of the"
+                " given variance"
             )
-            self.messages.append(f"{text}: held at the lower bound of {LOWER_BOUND:g} of the given variance")
-            self.held[unit] = f"at the lower bound of {LOWER_BOUND:g}"
-            self.factors[members] = LOWER_BOUND
+            self.factors[members] = 1.0
+        # With its own variance, and the weights that the others have by now, it may hardly be checked at all.
+        self.state = self.adjust(self.factors)
+        for unit in low:
+            members = self.units[unit][1]
+            self.held[unit] = self._why(members, self.least)
+            if not self.held[unit]:
+                self.messages.append(said[unit])
+                self.held[unit] = f"at the lower bound of {LOWER_BOUND:g}"
+                self.factors[members] = LOWER_BOUND
         self.state = self.adjust(self.factors)
         return True
 
@@ -432,7 +450,8 @@ class _Run:
         """Test whether all free components are equal.
 
         The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2: twice its
-        difference between the equal components and the estimated ones is the integral of q_g - r_g along the line.
+        difference between the equal components and the estimated ones is the integral of q_g - r_g along
+        the line.
         """
         free = self.free
         if len(free) < 2 or not self.converged:

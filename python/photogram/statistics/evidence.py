@@ -109,6 +109,11 @@ class Evidence:
         return bonferroni(self.found.level, self.number)
 
     @cached_property
+    def rejected(self) -> bool:
+        """Whether the global test rejects because residuals are too large."""
+        return self.test is not None and self.test.rejected_high
+
+    @cached_property
     def high(self) -> bool:
         """Whether residuals are too large by a factor that matters."""
         return self.test is not None and self.test.problem() is not None
@@ -148,7 +153,7 @@ class Evidence:
 
         Of few observations the factor is that of the others: the externally studentized test.
         """
-        if not self.high or not self.single:
+        if not self.rejected or not self.single:
             return self.single
         if self.robust is not None:
             return self.beyond(max(self.robust, 1.0))
@@ -190,9 +195,12 @@ class Evidence:
         if self.test is None:
             return "not-tested", f"Not tested as a whole ({self.found.untested}); no single test rejects"
         low, high = self.test.limits
+        how = "agree with the given standard deviations"
+        if self.test.rejected_high or self.test.rejected_low:
+            how = f"are {self.factor:.3g} times as large as expected: the test shows it, but it harms nobody"
         return (
             "accepted",
-            "Accepted: the residuals agree with the given standard deviations"
+            f"Accepted: the residuals {how}"
             f" (unit variance {self.test.variance:.4g}, expected {low:.3g} to {high:.3g})",
         )
 
@@ -200,10 +208,12 @@ class Evidence:
         """Return what is said of every adjustment: size of the factor, few degrees of freedom, no test."""
         lines = self._by_what()
         test = self.test
-        if test is not None and not (self.high or self.low) and (test.rejected_high or test.rejected_low):
+        rejected = test is not None and (test.rejected_low or (test.rejected_high and not self.gross))
+        if rejected and not (self.high or self.low):
             lines.append(
                 f"the global test rejects, but residuals are only {self.factor:.3g} times as expected"
             )
+        lines += [each.sentence for each in self.found.systematic if each.significant and not each.large]
         f = self.found.degrees_of_freedom
         if 0 < f < FEW:
             lines.append(f"with {f:g} degrees of freedom only gross disagreement can be seen")

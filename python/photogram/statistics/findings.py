@@ -19,7 +19,7 @@ from photogram.statistics.groups import GroupTests
 from photogram.statistics.limits import GlobalTest, externally_studentized
 from photogram.statistics.outliers import Observations
 
-__all__ = ["Component", "Findings", "Snooped", "Systematic", "Tested", "by_t", "by_w", "of_groups"]
+__all__ = ["Findings", "GroupFactor", "Removed", "Systematic", "Tested", "by_t", "by_w", "of_groups"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ class Systematic:
 
 
 @dataclass(frozen=True)
-class Component:
+class GroupFactor:
     """The estimated variance component of a group of observations.
 
     Attributes
@@ -180,7 +180,7 @@ class Component:
 
 
 @dataclass(frozen=True)
-class Snooped:
+class Removed:
     """What data snooping has taken out.
 
     Attributes
@@ -245,8 +245,8 @@ class Findings:
     spoiled: str = ""
     doubtful: Sequence[str] = ()
     systematic: Sequence[Systematic] = ()
-    components: Sequence[Component] = ()
-    snooped: Snooped | None = None
+    components: Sequence[GroupFactor] = ()
+    snooped: Removed | None = None
     computed: bool = True
     remarks: Sequence[str] = ()
     snoop: str = ""

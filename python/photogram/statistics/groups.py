@@ -88,8 +88,8 @@ class GroupTests:
 def group_tests(
     blocks: ArrayLike,
     residuals: ArrayLike,
-    weighted_sum_of_squares: float = math.nan,
-    degrees_of_freedom: float = math.inf,
+    weighted_sum_of_squares: ArrayLike = math.nan,
+    degrees_of_freedom: ArrayLike = math.inf,
     *,
     known: bool = True,
 ) -> GroupTests:
@@ -102,7 +102,8 @@ def group_tests(
     residuals
         (n, m) observed minus computed over standard deviation; NaN where a group has no such row.
     weighted_sum_of_squares, degrees_of_freedom
-        Omega and f of the adjustment; not needed where the unit weight is known.
+        Omega and f of the adjustment, of all or of each group (n,); not needed where the unit weight is
+        known.
     known
         Whether the unit weight is known: chi-square decides, else F.
     """
@@ -158,17 +159,22 @@ def parts_tests(
 
 
 def _probabilities(
-    statistic: Floats, dimension: NDArray[np.int64], omega: float, freedom: float, known: bool
+    statistic: Floats,
+    dimension: NDArray[np.int64],
+    omega: ArrayLike,
+    freedom: ArrayLike,
+    known: bool,
 ) -> tuple[Floats, Floats]:
     fisher = np.full(statistic.shape, math.nan)
     tested = dimension > 0
     if known:
         return np.where(tested, log_chi_square(statistic, np.maximum(dimension, 1)), math.nan), fisher
-    second = freedom - dimension
+    second = np.asarray(freedom) - dimension
+    omega = np.broadcast_to(np.asarray(omega, dtype=np.float64), statistic.shape)
     tested &= second > 0
     first, others = dimension[tested], second[tested]
     # Zero but for rounding where a group makes up all of Omega.
-    left = np.maximum(omega - statistic[tested], 1e-12 * omega)
+    left = np.maximum(omega[tested] - statistic[tested], 1e-12 * omega[tested])
     with np.errstate(divide="ignore", invalid="ignore"):
         fisher[tested] = (statistic[tested] / first) / (left / others)
     log_p = np.full(statistic.shape, math.nan)

@@ -6,12 +6,14 @@ degrees of freedom. With an unknown unit weight the logarithm of the likelihood 
     Lambda = f ln(Omega_0 / Omega_h)
 
 A mistake is made out by trying it and improving much: Omega_h passes its global test or is 25 times smaller
-than Omega_0, Lambda exceeds 2 ln(n / 1e-4) for n hypotheses tried, and the next best is behind by 10.
+than Omega_0, Lambda exceeds 2 ln(n / 1e-4) for n hypotheses tried, and the next best is behind by 10. A
+parameter that is fitted besides costs ln f.
 """
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -25,6 +27,8 @@ CHANCE = 1e-4
 """Probability that any of the hypotheses tried is accepted by chance, about."""
 RIVAL = 10.0
 """And all others must be less likely by this difference of Lambda."""
+PASSES = 0.01
+"""Level of the global test that a hypothesis passes, on both sides."""
 TESTED = 4.0
 """Degrees of freedom from which a hypothesis can be accepted and not only be possible."""
 
@@ -41,23 +45,34 @@ class Judged:
         Lambda of the first.
     fall
         How many times smaller residuals would be.
-    accepted
-        Whether it can be taken for sure; else it is possible.
+    explained
+        Whether it is sure that one of them is so; else it is possible.
     """
 
     best: tuple[int, ...]
     likelihood: float
     fall: float
-    accepted: bool
+    explained: bool
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the first can be taken for sure: it explains the residuals, and none of the others does."""
+        return self.explained and len(self.best) == 1
 
 
 def likelihood(given: float, changed: float, degrees_of_freedom: float) -> float:
     """Return Lambda of a hypothesis that leaves `changed` in place of `given`."""
-    return degrees_of_freedom * math.log(given / changed)
+    least = sys.float_info.min
+    return degrees_of_freedom * (math.log(max(given, least)) - math.log(max(changed, least)))
 
 
 def judged(
-    given: float, changed: Sequence[float], degrees_of_freedom: float, *, known_weight: bool = False
+    given: float,
+    changed: Sequence[float],
+    degrees_of_freedom: float,
+    *,
+    parameters: Sequence[int] | None = None,
+    known_weight: bool = False,
 ) -> Judged | None:
     """Judge hypotheses by the sums of squares that they leave.
 
@@ -69,6 +84,8 @@ def judged(
         Omega of each hypothesis, positive; infinite where it cannot be fitted.
     degrees_of_freedom
         f.
+    parameters
+        How many parameters each fits besides; one more must gain ln f. None where they fit none.
     known_weight
         Whether Omega has the unit weight of given standard deviations, so that it can pass its global test.
 
@@ -76,16 +93,22 @@ def judged(
     -------
     None where no hypothesis improves as much as a mistake would.
     """
-    order = sorted(range(len(changed)), key=lambda each: changed[each])
+    f = degrees_of_freedom
+    counts = [0] * len(changed) if parameters is None else parameters
+    ratios = [
+        likelihood(given, omega, f) - count * math.log(max(f, 1.0)) if math.isfinite(omega) else -math.inf
+        for omega, count in zip(changed, counts, strict=True)
+    ]
+    order = sorted(range(len(changed)), key=lambda each: -ratios[each])
     if not order or not changed[order[0]] < given:
         return None
-    least = changed[order[0]]
-    test = global_test(least, degrees_of_freedom) if known_weight else None
-    passes = test is not None and not test.rejected_high
+    first = order[0]
+    least = changed[first]
+    test = global_test(least, f, PASSES) if known_weight else None
     bound = 2 * math.log(len(changed) / CHANCE)
-    ratio = likelihood(given, least, degrees_of_freedom)
-    if not (given > IMPROVEMENT * least or (passes and given - least > bound)):
+    passes = test is not None and not test.rejected_high and given - least > bound
+    if not (given > IMPROVEMENT * least or passes):
         return None
-    equal = [each for each in order if likelihood(changed[each], least, degrees_of_freedom) <= RIVAL]
-    sure = degrees_of_freedom >= TESTED and ratio > bound and len(equal) == 1
-    return Judged(tuple(equal), ratio, math.sqrt(given / least), sure)
+    equal = tuple(each for each in order if ratios[first] - ratios[each] <= RIVAL)
+    fall = math.sqrt(given / max(least, sys.float_info.min))
+    return Judged(equal, ratios[first], fall, f >= TESTED and ratios[first] > bound)

@@ -25,7 +25,14 @@ from numpy.typing import ArrayLike
 from photogram.arguments.types import Floats
 from photogram.statistics.distributions import lambda0
 
-__all__ = ["ROUNDING", "TESTABLE", "largest_effect", "minimal_detectable_error", "noncentrality"]
+__all__ = [
+    "ROUNDING",
+    "TESTABLE",
+    "largest_effect",
+    "minimal_detectable_error",
+    "noncentrality",
+    "standardized",
+]
 
 
 TESTABLE = 0.01
@@ -34,6 +41,17 @@ observation."""
 
 ROUNDING = 1e-10
 """Redundancy numbers below this are rounding errors of zero."""
+
+
+def standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:
+    """Return residuals over their own standard deviations, unit weight a priori (Baarda's w).
+
+    NaN for what is no observation (sd infinite or zero), and where rounding is all there is of redundancy.
+    """
+    tested = np.isfinite(sd) & (sd > 0) & (redundancy > ROUNDING)
+    values = np.full(residuals.shape, np.nan)
+    values[tested] = residuals[tested] / (sd[tested] * np.sqrt(redundancy[tested]))
+    return values
 
 
 def noncentrality(significance: float = 0.001, power: float = 0.80) -> float:

@@ -21,6 +21,10 @@ __all__ = ["EXIT_NOT_CONVERGED", "EXIT_NOT_USABLE", "Test", "Verdict", "verdict"
 EXIT_NOT_CONVERGED, EXIT_NOT_USABLE = 3, 4
 """How a command ends: figures that are no results; results that must not be used as they are."""
 
+WRONG_ALIKE = 1.5
+"""Where the median is larger than expected by more, and the mean square by no more than this beside it, all
+residuals are too large, not a few."""
+
 _GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)
 """Exit codes, the worst last."""
 
@@ -138,9 +142,10 @@ def _identification(e: Evidence) -> _Line | None:
 def _gross_errors(e: Evidence) -> _Line | None:
     if e.found.spoiled:
         return _Line("gross-errors", f"Gross errors: {e.found.spoiled}", EXIT_NOT_USABLE)
-    if not e.high or e.found.snooped or not e.gross:
+    if not e.rejected or e.found.snooped or not e.gross:
         return None
-    if e.pattern and e.robust is not None and e.robust > 1.5:
+    # A few gross errors make s larger than the median says; a wrong model spoils all residuals alike.
+    if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
         return None
     text = f"Gross errors likely: {e.named(e.gross)}"
     if e.found.snoop:
@@ -222,7 +227,7 @@ def _unexplained(e: Evidence) -> _Line | None:
 
 
 def _look_at(e: Evidence) -> _Line | None:
-    if e.high or not e.single:
+    if e.high or not e.single or _gross_errors(e) is not None:
         return None
     whole = "Accepted" if e.test is not None else f"Not tested as a whole ({e.found.untested})"
     return _Line("look-at", f"{whole}, but look at: {e.named(e.single)}", warning=True)

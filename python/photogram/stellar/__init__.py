@@ -3,21 +3,23 @@
 from photogram.arguments.annotations import check_arguments
 from photogram.stellar import findings  # noqa: F401  (what a verdict rests on)
 from photogram.stellar.adjustment import calibrate
-from photogram.stellar.cameras import BrownCamera, PlateCamera
+from photogram.stellar.cameras import BrownCamera, PlateCamera, SkyCamera
 from photogram.stellar.options import Options
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.result import Result
-from photogram.stellar.sky import Air, Site, refraction
+from photogram.stellar.sky import Air, Effects, Site, refraction
 
 __all__ = [
     "Air",
     "Axis",
     "BrownCamera",
+    "Effects",
     "Options",
     "PlateCamera",
     "Problem",
     "Result",
     "Site",
+    "SkyCamera",
     "calibrate",
     "default_parameters",
     "refraction",

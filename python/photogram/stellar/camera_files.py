@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
 
-__all__ = ["read_camera", "read_document", "weight_of"]
+__all__ = ["read_any", "read_camera", "read_document", "weight_of"]
 
 
 def weight_of(covariance: Floats) -> Floats:
@@ -33,6 +33,25 @@ def weight_of(covariance: Floats) -> Floats:
     return np.asarray(root.T @ root, float)
 
 
+def read_any(path: Path) -> dict[str, Any]:
+    """Read a JSON document.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or holds something else.
+    """
+    try:
+        document = orjson.loads(read_bytes(path))
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"is not a camera: {error}", file=path) from None
+    if not isinstance(document, dict):
+        raise InputError("is not a camera: no JSON object", file=path)
+    return document
+
+
 def read_document(path: Path, kinds: Sequence[str]) -> dict[str, Any]:
     """Read a JSON document of one of some kinds.
 
@@ -41,16 +60,12 @@ def read_document(path: Path, kinds: Sequence[str]) -> dict[str, Any]:
     InputError
         The file cannot be read, or is another document.
     """
-    try:
-        document = orjson.loads(read_bytes(path))
-        found = document["kind"]
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"is not a camera: {error}", file=path) from None
-    if found not in kinds:
-        raise InputError(f"is a {found}, not a {' or a '.join(kinds)}", file=path)
-    return dict(document)
+    document = read_any(path)
+    if "kind" not in document:
+        raise InputError("is not a camera: 'kind'", file=path)
+    if document["kind"] not in kinds:
+        raise InputError(f"is a {document['kind']}, not a {' or a '.join(kinds)}", file=path)
+    return document
 
 
 def read_camera(path: Path, document: dict[str, Any], names: Sequence[str]) -> tuple[Floats, Floats]:

@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
-from photogram.stellar.camera_files import read_camera, read_document, weight_of
+from photogram.network.cameras import Camera
+from photogram.stellar.camera_files import read_any, read_camera, read_document, weight_of
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.plate_model import plate_camera
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 from photogram.stellar.transformation import transformed_angles
 
@@ -22,7 +25,7 @@ if TYPE_CHECKING:
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
 
-__all__ = ["BrownCamera", "PlateCamera", "SkyCamera", "camera_document"]
+__all__ = ["BrownCamera", "PlateCamera", "SkyCamera", "camera_document", "camera_from"]
 
 
 _INTERIOR = NAMES[9:22]
@@ -117,6 +120,28 @@ class PlateCamera:
         """Return the camera as a JSON document."""
         return json.to_json(self.document())
 
+    def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
+        """Return the camera as blocks take it: the model `plate`, in mm, with the parameters of this one.
+
+        Image coordinates are those of the plate: x, y and the axis towards what is seen are right-handed.
+
+        Parameters
+        ----------
+        name
+            For reports.
+        weighted
+            Whether its parameters are observations with their full covariance; otherwise they are known. What
+            was held here is held there.
+        """
+        return plate_camera(
+            self.values,
+            self.covariance,
+            name,
+            weighted=weighted,
+            common_scale=self.common_scale,
+            distortion_first=self.distortion_first,
+        )
+
     def as_prior(self, problem: Problem, unit: float | None = None) -> Problem:
         """Return a calibration that begins with this camera and gives it the weight of its covariance.
 
@@ -149,6 +174,39 @@ class PlateCamera:
         initial[9:22] = self.values
         fixed[9:22] |= ~known & (np.arange(13) != INDEX["cy"] - 9 if self.common_scale else True)
         return replace(problem, parameter_weights=weights, initial=initial, fixed=fixed)
+
+
+def camera_from(path: Path | str, name: str = "", *, weighted: bool = True) -> Camera:
+    """Return the camera of a file that `photogram stellar-camera` has written, as blocks take it.
+
+    Parameters
+    ----------
+    path
+        `camera.json`, of plates or of digital exposures.
+    name
+        For reports.
+    weighted
+        Whether what was calibrated is observed, with its full covariance; otherwise it is known.
+
+    Returns
+    -------
+    `plate` (mm), or the model of a lens in pixels: columns and rows.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no camera.
+    """
+    file = Path(path)
+    document = read_any(file)
+    if {"nonorthogonality_rad", "correction"} & document.keys():
+        raise InputError(
+            "holds the correction of a comparator: comparator.Correction.read(path).as_camera(camera) lays a"
+            " camera on it",
+            file=file,
+        )
+    reader = PlateCamera if document.get("kind") == "stellar camera" else SkyCamera
+    return reader.read(file).as_camera(name, weighted=weighted)
 
 
 def camera_document(result: Result) -> bytes:
@@ -190,3 +248,6 @@ def camera_document(result: Result) -> bytes:
         },
     }
     return json.to_json(document)
+
+
+check_arguments(globals(), ["camera_from"])

@@ -11,7 +11,7 @@ from photogram.show.ways import findings_of
 from photogram.statistics.findings import Findings, Tested, by_t
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
-from photogram.stellar.night import CalibratedNight
+from photogram.stellar.nights import CalibratedNight
 from photogram.stellar.outliers import studentized
 from photogram.stellar.result import Result
 
@@ -76,5 +76,8 @@ def night_findings(result: CalibratedNight) -> Findings:
         degrees_of_freedom=freedom,
         global_test=result.test,
         untested="no degrees of freedom",
-        doubtful=["more exposures are left out than take part"] if result.mostly_left_out else [],
+        doubtful=[
+            *(f"exposure {name} (by chance {odds:.1g})" for name, odds in result.doubtful.items()),
+            *(["more exposures are left out than take part"] if result.mostly_left_out else []),
+        ],
     )

@@ -12,7 +12,7 @@ from photogram.stellar.places import Earth, sidereal_time, to_date
 from photogram.stellar.sky import Site
 from photogram.stellar.transformation import pole_matrix, terrestrial
 
-__all__ = ["InertialAttitude", "inertial_attitude"]
+__all__ = ["InertialAttitude", "equatorial_axes", "inertial_attitude"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def inertial_attitude(
     seen = matrix.T
     if earth.pole != (0.0, 0.0):
         seen = terrestrial(place).T @ pole_matrix(earth.pole).T @ terrestrial(site) @ seen
-    equatorial = _equatorial(place.latitude, sidereal_time(place, utc, earth.dut1))
+    equatorial = equatorial_axes(place.latitude, sidereal_time(place, utc, earth.dut1))
     turned = to_date(utc).T @ equatorial @ seen
     # The pole's small rotation is not quite orthogonal.
     left, _, right = np.linalg.svd(turned.T)
@@ -107,7 +107,7 @@ def _local_axes(m: Floats) -> Floats:
     return np.column_stack([alpha, omega, [0.0, 0.0, 1.0]])
 
 
-def _equatorial(latitude: float, time: float) -> Floats:
+def equatorial_axes(latitude: float, time: float) -> Floats:
     """Return the matrix from north, east, zenith to the true equator and equinox of date."""
     (sp, cp), (sl, cl) = (np.sin(latitude), np.cos(latitude)), (np.sin(time), np.cos(time))
     # cos(dec) cos H, cos(dec) sin H, sin(dec); then the hour angle becomes right ascension.

@@ -13,11 +13,13 @@ import numpy as np
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.show.angles import ARCSEC
+from photogram.statistics.verdict import LARGEST_FACTOR
+from photogram.stellar.blind import ATTITUDE, FIELD, locate
 from photogram.stellar.lens_choice import LensFit, as_lens, compared_lenses
 from photogram.stellar.lens_tests import LensTest, test_scale, test_terms
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.night_run import Run, adjusted
-from photogram.stellar.nights import FACTOR, SIGNIFICANT, CalibratedNight, Night
+from photogram.stellar.nights import SIGNIFICANT, CalibratedNight, Night
 from photogram.stellar.places import Earth
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.stellar.still import stood_still
@@ -42,6 +44,8 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
     # The pole turns all attitudes alike: it waits for the last adjustment.
     still = replace(night, earth=Earth(night.earth.dut1))
     lenses: list[LensFit] = []
+    if night.blind is not None:
+        still = _located(still, night.blind)
     if night.lenses:
         lenses, still = _with_best_lens(still, threads)
     run = _run(still, threads)
@@ -68,6 +72,33 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
         standstill=stood_still(found) if night.tripod else None,
     )
     return replace(result, messages=(*_failed(result), *run.messages(), *_remarks(result)))
+
+
+def _located(night: Night, fields: tuple[float, float]) -> Night:
+    """Return the night with the attitudes and the field of view that are found in the whole sky."""
+    unknown = [index for index, exposure in enumerate(night.exposures) if exposure.stars is None]
+    found = locate(
+        [night.exposures[index] for index in unknown], night.site, night.frame, fields, night.earth
+    )
+    seen = [located.field for located in found if located.found]
+    if not seen:
+        reasons = sorted({located.reason() for located in found})
+        raise InputError(f"no exposure is found in the sky: {listed(reasons)}")
+    exposures, reasons_of = list(night.exposures), dict(night.nowhere)
+    for index, located in zip(unknown, found, strict=True):
+        exposures[index] = replace(exposures[index], attitude=located.attitude)
+        if not located.found:
+            reasons_of[index] = located.reason()
+    camera = SkyCamera.of_field(*night.frame, float(np.median(seen)))
+    return replace(
+        night,
+        exposures=exposures,
+        camera=camera,
+        attitude_error=ATTITUDE,
+        field_error=FIELD,
+        roll_known=True,
+        nowhere=reasons_of,
+    )
 
 
 def _run(night: Night, threads: int | None) -> Run:
@@ -142,7 +173,7 @@ def _failed(result: CalibratedNight) -> list[Message]:
     test = result.test
     failed = test.problem() if test else None
     if test and failed:
-        texts.append(f"{failed}: do not use this camera" if test.factor > FACTOR else failed)
+        texts.append(f"{failed}: do not use this camera" if test.factor > LARGEST_FACTOR else failed)
         texts.append(
             f"the stars are found beyond doubt: sd_px is too small, or the lens {lens} does not"
             f" describe this camera (others are {listed([name for name in LENSES if name != lens])})"

@@ -13,6 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.show.angles import ARCSEC
+from photogram.stellar.camera_yaml import read_yaml
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.matching import STRETCH
@@ -56,6 +57,7 @@ _TABLES = {
         "roll_known",
         "field_of_view_error",
         "confirmed",
+        "blind_field_deg",
     ),
     "exposures": ("name", "utc", "azimuth_deg", "elevation_deg", "roll_deg", "alpha", "omega", "kappa"),
 }
@@ -100,6 +102,7 @@ def inputs(path: Path) -> list[Path]:
 
 def _night(document: Document) -> Night:
     camera, images = document.table("camera"), document.table("images")
+    blind = _blind(document.optional("matching"), camera)
     earth, matching = document.optional("earth"), document.optional("matching")
     stars = document.optional("catalogue")
     frame = (
@@ -107,13 +110,13 @@ def _night(document: Document) -> Night:
         camera.number("height_px", low=1, high=_LARGEST_FRAME),
     )
     prior = SkyCamera.read(camera.path("prior")) if "prior" in camera else None
-    exposures = _Exposures(document.tables("exposures"), images.path("file"))
+    exposures = _Exposures(document.tables("exposures"), images.path("file"), blind is not None)
     catalogue = _catalogue(stars, exposures.named)
     return Night(
         site=replace(site(document.table("station")), effects=effects(document.optional("places"))),
         catalogue=catalogue,
         frame=frame,
-        camera=_start(camera, frame, prior),
+        camera=_start(camera, frame, prior) if blind is None else SkyCamera.of_field(*frame, max(blind)),
         lenses=tuple(LENSES) if camera.word("lens", "brown") == AUTO else (),
         common_scale=camera.switch("common_scale", prior is not None and prior.common_scale),
         tripod=camera.switch("tripod", False),
@@ -126,6 +129,7 @@ def _night(document: Document) -> Night:
         roll_known=matching.switch("roll_known", True),
         field_error=matching.number("field_of_view_error", STRETCH, low=1e-4, high=0.5),
         confirmed=matching.words("confirmed", ()),
+        blind=blind,
         fixed=camera.words("fixed", ()),
         prior=prior,
         weigh_stars=stars.switch("weigh_stars", False),
@@ -137,10 +141,27 @@ def _night(document: Document) -> Night:
     )
 
 
+def _blind(table: Table, camera: Table) -> tuple[float, float] | None:
+    """Return the fields of view, radians, among which exposures are looked for in the whole sky."""
+    if "blind_field_deg" not in table:
+        return None
+    known = [key for key in ("start", "prior") if key in camera]
+    if known or camera.word("lens", "brown") not in ("brown", AUTO):
+        raise table.error(
+            "blind_field_deg",
+            "is for cameras that are not known, of central perspective: no start, prior or lens",
+        )
+    low, high = table.numbers("blind_field_deg", 2)
+    if not 0 < low <= high < 180:
+        raise table.error("blind_field_deg", "is no smallest and largest field of view in degrees")
+    return math.radians(low), math.radians(high)
+
+
 def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) -> SkyCamera:
     """Return the camera to begin with: a file, the prior, or an ideal one of the field of view."""
     if "start" in table:
-        return SkyCamera.read(table.path("start"))
+        file = table.path("start")
+        return read_yaml(file)[0] if file.suffix.lower() in (".yaml", ".yml") else SkyCamera.read(file)
     if prior is not None:
         return prior
     field = table.number("field_of_view_deg")
@@ -169,8 +190,8 @@ def _catalogue(table: Table, named: Set[str]) -> Catalogue:
 class _Exposures:
     """The tables of the exposures, and the records of their images."""
 
-    def __init__(self, tables: list[Table], file: Path) -> None:
-        self.tables = tables
+    def __init__(self, tables: list[Table], file: Path, blind: bool) -> None:
+        self.tables, self.blind = tables, blind
         self.names = tuple(table.word("name") for table in tables)
         self.rows: dict[str, list[Row]] = {name: [] for name in self.names}
         for table, name in zip(tables, self.names, strict=True):
@@ -191,10 +212,12 @@ class _Exposures:
         """Return the exposures."""
         index = {name: i for i, name in enumerate(catalogue.ids)}
         pairs = zip(self.tables, self.names, strict=True)
-        return [_exposure(table, self.rows[name], index, frame) for table, name in pairs]
+        return [_exposure(table, self.rows[name], index, frame, self.blind) for table, name in pairs]
 
 
-def _exposure(table: Table, rows: list[Row], index: dict[str, int], frame: tuple[float, float]) -> Exposure:
+def _exposure(
+    table: Table, rows: list[Row], index: dict[str, int], frame: tuple[float, float], blind: bool
+) -> Exposure:
     """Take the images of an exposure, by magnitude where there is one, else in their order."""
     magnitudes = [row.number("magnitude") for row in rows]
     faint = [math.inf if magnitude is None else magnitude for magnitude in magnitudes]
@@ -210,7 +233,7 @@ def _exposure(table: Table, rows: list[Row], index: dict[str, int], frame: tuple
     return Exposure(
         utc=utc,
         xy=np.array([_image(row, frame) for row in rows]).reshape(-1, 2),
-        attitude=_attitude(table),
+        attitude=np.zeros(3) if blind else _attitude(table),
         stars=stars,
     )
 

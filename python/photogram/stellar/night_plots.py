@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,6 +78,31 @@ def _histogram(result: CalibratedNight) -> Figure:
 
 
 def _distortion(result: CalibratedNight) -> Figure:
+    """Draw what the terms of the lens do."""
+    return _of_brown(result) if result.camera.lens == "brown" else _of_angle(result)
+
+
+def _of_angle(result: CalibratedNight) -> Figure:
+    """Draw the distance from the principal point over the angle, and what the terms change in it."""
+    camera, frame = result.camera, result.night.frame
+    theta = np.linspace(0, min(camera.largest_angle(frame), np.radians(110)), 200)
+    along = np.column_stack([np.sin(theta), np.zeros(len(theta)), np.cos(theta)])
+    free = replace(camera, values=np.where(np.arange(len(camera.values)) < 4, camera.values, 0.0))
+    seen, straight = (each.images(along)[:, 0] - camera.values[2] for each in (camera, free))
+    partials = camera.partials(along)[:, 0, 4:]
+    variance = np.einsum("ni,ij,nj->n", partials, camera.covariance[4:, 4:], partials)
+    figure, (axes, errors) = panels(11.0, 4.4, 2)
+    axes.plot(np.degrees(theta), seen, color=COLOURS[0], label=camera.lens)
+    band(errors, np.degrees(theta), seen - straight, np.sqrt(np.maximum(variance, 0)), COLOURS[0], "terms")
+    axes.set(ylabel="distance from the principal point (px)")
+    errors.set(ylabel="change by the terms of the lens (px)")
+    for panel in (axes, errors):
+        panel.set_xlabel("angle from the axis (degrees)")
+        panel.legend()
+    return figure
+
+
+def _of_brown(result: CalibratedNight) -> Figure:
     """Draw radial distortion and the profile of the decentering one, to the corners of the frame."""
     camera = result.camera
     f = float(np.mean(camera.values[:2]))

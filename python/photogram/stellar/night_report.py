@@ -230,14 +230,19 @@ def _largest(result: CalibratedNight) -> list[str]:
     size = np.nanmax(np.abs(np.nan_to_num(found.standardized)), axis=1)
     lines = [
         f"{'exposure':<10}{'star':>10}{'x px':>11}{'y px':>11}{'vx px':>9}{'vy px':>9}{'w x':>8}{'w y':>8}"
+        f"{'probability':>14}"
     ]
     for k in np.argsort(-size, kind="stable")[:_LARGEST]:
         (x, y), (vx, vy), (wx, wy) = found.xy[k], found.residuals[k], found.standardized[k]
         lines.append(
             f"{result.names[found.exposures[k]]:<10}{ids[found.stars[k]]:>10}{x:11.3f}{y:11.3f}"
-            f"{vx:9.3f}{vy:9.3f}{wx:8.2f}{wy:8.2f}"
+            f"{vx:9.3f}{vy:9.3f}{wx:8.2f}{wy:8.2f}{_star(result.star_probabilities[k]):>14}"
         )
     return lines
+
+
+def _star(probability: float) -> str:
+    return "named" if math.isnan(probability) else _probability(probability)
 
 
 def _stars(result: CalibratedNight) -> list[str]:

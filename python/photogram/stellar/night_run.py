@@ -93,11 +93,13 @@ class Run:
         self.found: SkyCalibration
         self.unsettled = False
         for index, exposure in enumerate(night.exposures):
-            if exposure.stars is None:
+            if index in night.nowhere:
+                self.left_out[index] = night.nowhere[index]
+            elif exposure.stars is None:
                 self._sight(index, night.camera, night.tolerance, night.field_error)
             else:
                 self._take(Seen(index, exposure.stars, exposure.stars >= 0, exposure.attitude))
-        unknown = [index for index in self.left_out if night.exposures[index].stars is None]
+        unknown = self._unidentified()
         hint = find_hint(
             [night.exposures[index] for index in unknown],
             [night.names[i] for i in unknown],
@@ -139,6 +141,11 @@ class Run:
             return
         stars = sighting.found
         self._take(Seen(index, stars, stars >= 0, sighting.attitude, first=made.expected, scale=made.scale))
+
+    def _unidentified(self) -> list[int]:
+        """Return the exposures that are left out and may be found otherwise."""
+        night = self.night
+        return [i for i in self.left_out if night.exposures[i].stars is None and i not in night.nowhere]
 
     def _take(self, seen: Seen) -> None:
         """Let an exposure take part if it has stars enough."""
@@ -205,7 +212,12 @@ class Run:
             return by_chance.index, (
                 f"under the calibrated camera {count} of its {images} images have a star, which chance may do"
             )
-        unnamed = [each for each in self.seen if self.night.exposures[each.index].stars is None]
+        unnamed = [
+            each
+            for each in self.seen
+            if self.night.exposures[each.index].stars is None
+            and self.night.names[each.index] not in self.night.confirmed
+        ]
         poor = fewer_stars(
             np.array([len(each.kept) for each in unnamed]), np.array([each.kept.sum() for each in unnamed])
         )
@@ -235,7 +247,7 @@ class Run:
         """Try exposures that are left out once more, with the calibrated camera; say whether any is found."""
         night, before = self.night, len(self.first)
         tolerance = min(night.tolerance, max(2 * night.rejection * _noise(night, self.found), _REACH))
-        for index in [i for i in self.left_out if night.exposures[i].stars is None]:
+        for index in self._unidentified():
             self._sight(index, self.found.camera, tolerance, STRETCH)
         self.first.sort(key=lambda each: each.index)
         if len(self.first) == before:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -25,15 +25,13 @@ from photogram.stellar.sky import Site
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.stellar.still import Standstill
 
-__all__ = ["FACTOR", "SIGNIFICANT", "CalibratedNight", "Night"]
+__all__ = ["SIGNIFICANT", "CalibratedNight", "Night"]
 
 
 CORRELATED = 0.95
 """Correlations above this are named."""
 SIGNIFICANT = 1.96
 """Distortion terms below this multiple of their mean error are named (5 % of error)."""
-FACTOR = 5.0
-"""Residuals that are larger than assumed by more than this make no camera."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +70,15 @@ class Night:
         Whether the roll of the approximate attitudes is known as well as their direction; else it may be any.
     field_error
         Share by which the principal distance of `camera` may be wrong.
+    blind
+        Smallest and largest horizontal field of view, radians, when neither attitudes nor the field of view
+        are known (`photogram.stellar.blind`); None where they are.
     tripod
         Whether the camera stood still on a tripod: its attitudes are tested to be one.
     confirmed
         Names of exposures that take part though their identification is doubtful.
+    nowhere
+        Exposures without an attitude, by their index, and why they have none: they are left out.
     title
         For the report.
     """
@@ -99,8 +102,10 @@ class Night:
     lenses: tuple[str, ...] = ()
     roll_known: bool = True
     field_error: float = STRETCH
+    blind: tuple[float, float] | None = None
     tripod: bool = False
     confirmed: tuple[str, ...] = ()
+    nowhere: Mapping[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.exposures or len(self.names) != len(self.exposures):
@@ -192,15 +197,12 @@ class CalibratedNight(Judged):
 
     @property
     def usable(self) -> bool:
-        """Whether the camera may be used.
+        """Whether the camera may be used: `verdict` says why not.
 
-        Not so when the adjustment has not converged, residuals are larger than assumed by a factor of
-        `FACTOR`, more exposures are left out than take part, or the
-        identification of an exposure is doubtful.
+        Not so when the adjustment has not converged, residuals are much larger than assumed, more exposures
+        are left out than take part, or the identification of an exposure is doubtful.
         """
-        test = self.test
-        beyond = test is not None and test.rejected_high and test.factor > FACTOR
-        return self.converged and not beyond and not self.mostly_left_out and not self.doubtful
+        return self.verdict.usable
 
     @property
     def probabilities(self) -> Floats:

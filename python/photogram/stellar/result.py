@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.messages import Message
+from photogram.network.cameras import Camera
 from photogram.show.ways import Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.counts import Counts
 from photogram.stellar.moved import Movement
 from photogram.stellar.parameters import INDEX, NAMES
+from photogram.stellar.plate_model import plate_camera
 from photogram.stellar.problem import Problem
 from photogram.stellar.state import Level, Solved
 
@@ -217,6 +219,28 @@ class Result(Judged):
     def parameters(self) -> dict[str, float]:
         """Adjusted parameters by name; radians, metres, seconds of arc."""
         return dict(zip(NAMES, self.solved.parameters.tolist(), strict=True))
+
+    def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
+        """Return the camera as blocks take it, of the combined solution where there is one: `plate`, in mm.
+
+        Parameters
+        ----------
+        name
+            For reports.
+        weighted
+            Whether its parameters are observations with their full covariance; otherwise they are known.
+        """
+        own = self.combined or self
+        options = own.problem.options
+        interior = slice(INDEX["epsilon"], INDEX["phi_T"] + 1)
+        return plate_camera(
+            own.solved.parameters[interior],
+            own.covariance[interior, interior],
+            name,
+            weighted=weighted,
+            common_scale=options.common_scale,
+            distortion_first=options.distortion_first,
+        )
 
     @property
     def estimated(self) -> list[str]:

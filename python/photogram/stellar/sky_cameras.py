@@ -123,6 +123,11 @@ class SkyCamera:
         rays = _photocore.camera_rays(self.facts.model, self.model_values, np.asarray(xy, float))
         return np.asarray(rays * (1.0, -1.0, -1.0), float)
 
+    def images(self, rays: Floats) -> Floats:
+        """Return images (n, 2), pixels, of directions as of `rays`."""
+        turned = np.ascontiguousarray(np.asarray(rays, float) * (1.0, -1.0, -1.0))
+        return _photocore.camera_images(self.facts.model, self.model_values, turned)
+
     def partials(self, rays: Floats) -> Floats:
         """Return partials (n, 2, k), pixels, of images of directions, as of `rays`, by the parameters."""
         turned = np.ascontiguousarray(np.asarray(rays, float) * (1.0, -1.0, -1.0))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.stellar.skies import SkyCalibration
 
 __all__ = ["LEVEL", "Standstill", "stood_still"]
@@ -32,9 +32,13 @@ class Standstill:
     statistic, dimension, probability
         Of all attitudes about their mean: chi-squared.
     own
-        (E,) probability of the difference of each exposure from the others.
+        (E,) probability of the difference of each exposure from the others; of those that moved, when they
+        were found, of the rest without them.
     turns
         (E,) the turn of each against the mean of the others, radians.
+    moved
+        Exposures that differ from the others (Bonferroni over all), the worst first, each found without those
+        before it.
     """
 
     statistic: float
@@ -42,12 +46,7 @@ class Standstill:
     probability: float
     own: Floats
     turns: Floats
-
-    @property
-    def moved(self) -> list[int]:
-        """Exposures that differ from the others (Bonferroni over all), the worst first."""
-        beyond = np.flatnonzero(self.own < LEVEL / max(1, len(self.own)))
-        return [int(k) for k in beyond[np.argsort(self.own[beyond], kind="stable")]]
+    moved: tuple[int, ...]
 
 
 def stood_still(found: SkyCalibration) -> Standstill | None:
@@ -55,28 +54,37 @@ def stood_still(found: SkyCalibration) -> Standstill | None:
     count = len(found.attitudes)
     if count < 2 or found.degrees_of_freedom < 1:
         return None
-    known = np.flatnonzero(found.camera.known)
-    covariance = _covariance(found, known)
+    covariance = _covariance(found, np.flatnonzero(found.camera.known))
     # Angles near each other in spite of full turns.
     first = found.attitudes[0]
     angles = first + np.remainder(found.attitudes - first + np.pi, 2 * np.pi) - np.pi
-    design = np.tile(np.eye(3), (count, 1))
-    statistic, _ = _about_mean(angles.ravel(), covariance, design)
+    statistic = _about_mean(angles, covariance, list(range(count)))
     own, turns = np.ones(count), np.zeros(count)
-    for number in range(count):
-        mine = np.arange(3 * number, 3 * number + 3)
-        rest = np.setdiff1d(np.arange(3 * count), mine)
-        left, _ = _about_mean(angles.ravel()[rest], covariance[np.ix_(rest, rest)], design[rest])
-        own[number] = _photocore.chi_square(max(statistic - left, 0.0), 3.0, upper=True)
-        others = np.delete(angles, number, axis=0).mean(axis=0)
-        matrix = _photocore.pointing_matrix(angles[number]) @ _photocore.pointing_matrix(others).T
-        turns[number] = np.linalg.norm(_photocore.rotation_vectors(matrix[None])[0])
+    left, moved = list(range(count)), []
+    while len(left) > 1:
+        whole = _about_mean(angles, covariance, left)
+        for number in left:
+            others = [k for k in left if k != number]
+            rest = _about_mean(angles, covariance, others)
+            own[number] = _photocore.chi_square(max(whole - rest, 0.0), 3.0, upper=True)
+            turns[number] = _turn(angles[number], angles[others].mean(axis=0))
+        worst = min(left, key=lambda number: own[number])
+        if own[worst] >= LEVEL / count:
+            break
+        moved.append(worst)
+        left.remove(worst)
     dimension = 3 * (count - 1)
     probability = _photocore.chi_square(statistic, float(dimension), upper=True)
-    return Standstill(statistic, dimension, probability, own, turns)
+    return Standstill(statistic, dimension, probability, own, turns, tuple(moved))
 
 
-def _covariance(found: SkyCalibration, known: np.ndarray) -> Floats:
+def _turn(angles: Floats, others: Floats) -> float:
+    """Return the turn between two attitudes, radians."""
+    matrix = _photocore.pointing_matrix(angles) @ _photocore.pointing_matrix(others).T
+    return float(np.linalg.norm(_photocore.rotation_vectors(matrix[None])[0]))
+
+
+def _covariance(found: SkyCalibration, known: Indices) -> Floats:
     """Return (3 E, 3 E) of all attitudes."""
     count = len(found.attitudes)
     camera = found.camera.covariance[np.ix_(known, known)]
@@ -91,9 +99,11 @@ def _covariance(found: SkyCalibration, known: np.ndarray) -> Floats:
     return np.asarray(whole, float)
 
 
-def _about_mean(values: Floats, covariance: Floats, design: Floats) -> tuple[float, Floats]:
-    """Return the sum of squares of values about their weighted mean, and the mean."""
-    weight = np.linalg.inv(covariance)
+def _about_mean(angles: Floats, covariance: Floats, chosen: list[int]) -> float:
+    """Return the weighted sum of squares of some attitudes about their mean."""
+    places = (3 * np.array(chosen)[:, None] + np.arange(3)).ravel()
+    weight = np.linalg.inv(covariance[np.ix_(places, places)])
+    design, values = np.tile(np.eye(3), (len(chosen), 1)), angles[chosen].ravel()
     mean = np.linalg.solve(design.T @ weight @ design, design.T @ weight @ values)
     off = values - design @ mean
-    return float(off @ weight @ off), np.asarray(mean, float)
+    return float(off @ weight @ off)

@@ -205,8 +205,9 @@ fn moved<M: Model>(
         } else {
             problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?
         };
+        let apart = problem.model.step_between(&unknowns, reference);
         let Carried { basis, amounts, length } =
-            carried(&open, datum, &unknowns, reference).ok_or(DatumError::NotCarried)?;
+            carried(&open, datum, &apart).ok_or(DatumError::NotCarried)?;
         stalls += usize::from(length >= 0.5 * before);
         if length == 0.0 || stalls == STALLS {
             return Ok((unknowns, basis));
@@ -237,9 +238,9 @@ fn motions_of<M: Model>(
     Some((Motions { vectors, preferred }, (kept, all)))
 }
 
-/// The basis at some values, and by how much the open combinations still bring the carriers nearer to their references: with F G = Q R,
-/// F the factors, B^T G = R^T R, so that in the columns of G R^-1 it is I. None where the carriers do not carry all null vectors.
-fn carried(open: &Open, datum: &Datum, unknowns: &[f64], reference: &[f64]) -> Option<Carried> {
+/// The basis at some values, and by how much the open combinations still bring the carriers nearer to their references, which are the step
+/// `apart` away: with F G = Q R, F the factors, B^T G = R^T R, so that in the columns of G R^-1 it is I. None where the carriers do not carry all null vectors.
+fn carried(open: &Open, datum: &Datum, apart: &[f64]) -> Option<Carried> {
     let g = &open.vectors;
     let d = g.ncols();
     let scaled_row = |row: usize, k: usize| datum.carriers[row].1 * g[(datum.carriers[row].0, k)];
@@ -267,7 +268,7 @@ fn carried(open: &Open, datum: &Datum, unknowns: &[f64], reference: &[f64]) -> O
     }
     let apart = |row: usize| {
         let (carrier, factor) = datum.carriers[row];
-        factor * (reference[carrier] - unknowns[carrier])
+        factor * apart[carrier]
     };
     let mut amounts: Vec<f64> =
         (0..d).map(|k| (0..q.nrows()).map(|row| q[(row, k)] * apart(row)).sum()).collect();

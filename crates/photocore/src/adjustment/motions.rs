@@ -183,7 +183,25 @@ fn add_square(sum: &mut [f64], weight: f64, b: &[[f64; LANES]]) {
 impl<M: Model> Problem<M> {
     /// Which of some motions observations and weights leave open at given values; None where it is none.
     pub(super) fn open(&self, values: &[f64], motions: &Motions, pool: &ThreadPool) -> Option<Open> {
-        let sums = self.sums(values, motions, pool);
+        self.open_without(values, motions, &[], pool)
+    }
+
+    /// How many motions would be open at given values if what is known of some unknowns themselves (ascending) were not: with as many
+    /// of these, and a network that is determined, they give a datum and nothing more.
+    pub fn open_if_free(&self, values: &[f64], released: &[usize], pool: &ThreadPool) -> usize {
+        let motions = pool.install(|| self.model.all_motions(values));
+        let open = motions.and_then(|motions| self.open_without(values, &motions, released, pool));
+        open.map_or(0, |open| open.combinations.ncols())
+    }
+
+    fn open_without(
+        &self,
+        values: &[f64],
+        motions: &Motions,
+        released: &[usize],
+        pool: &ThreadPool,
+    ) -> Option<Open> {
+        let sums = self.sums(values, motions, released, pool);
         let count = motions.vectors.len();
         let stride = sums.apart.len() * LANES;
         let scale: Vec<f64> = sums.apart.as_flattened()[..count]
@@ -218,10 +236,11 @@ impl<M: Model> Problem<M> {
         open.map_or(vec![], |open| open.hold)
     }
 
-    fn sums(&self, values: &[f64], motions: &Motions, pool: &ThreadPool) -> Sums {
+    fn sums(&self, values: &[f64], motions: &Motions, released: &[usize], pool: &ThreadPool) -> Sums {
         let layout = self.layout();
         let by_unknown = Candidates::by_unknown(motions, values.len());
-        let fixed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
+        let stays = |unknown: &usize| released.binary_search(unknown).is_err();
+        let fixed: Vec<bool> = (0..values.len()).map(|i| self.sd[i] == 0.0 && stays(&i)).collect();
         let candidates = Candidates::new(motions, &by_unknown, &fixed);
         let equations = pool.install(|| Linearized::of_all(self, values));
         let known = self.model.groups_leave_open() && !candidates.move_fixed();
@@ -246,7 +265,8 @@ impl<M: Model> Problem<M> {
                 candidates.add_row(&mut sums, layout.tie_columns(tie).zip(row.iter().copied()));
             }
         });
-        let together = self.weighted(values);
+        let mut together = self.weighted(values);
+        together.retain(|own| own.unknowns().all(|unknown| stays(&unknown)));
         for own in &together {
             for row in own.rows() {
                 candidates.add_row(&mut sums, own.unknowns().zip(row.iter().copied()));
@@ -256,7 +276,7 @@ impl<M: Model> Problem<M> {
             let before = together.partition_point(|own| own.unknowns().end <= *unknown);
             together.get(before).is_none_or(|own| own.first > *unknown)
         };
-        for unknown in (0..values.len()).filter(|&i| self.is_weighted(i)).filter(apart) {
+        for unknown in (0..values.len()).filter(|&i| self.is_weighted(i)).filter(stays).filter(apart) {
             let (weight, moved) = (self.sd[unknown].powi(2).recip(), candidates.of(unknown));
             add_square(&mut sums.together, weight, moved);
             let apart = moved.as_flattened().iter().zip(sums.apart.as_flattened_mut());

@@ -29,6 +29,11 @@ pub trait Model: Sync {
         unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
     }
 
+    /// The step that leads from some values of the unknowns to others: by default their differences (see [`Model::advance`]).
+    fn step_between(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
+        to.iter().zip(from).map(|(to, from)| to - from).collect()
+    }
+
     /// The equations of weighted unknowns to which steps are not added (see [`Model::advance`]), at the given values, in ascending order.
     /// `prior` and `sd` are those of the problem. All other weighted unknowns have equations of one unknown each.
     fn weighted(&self, _values: &[f64], _prior: &[f64], _sd: &[f64]) -> Vec<Weighted> {

@@ -27,6 +27,8 @@ pub struct State {
     pub ordering: Ordering,
     /// The datum that it was taken to since; None for that of what was held, or of the observations.
     pub datum: Option<NetworkDatum>,
+    /// Whether control and weights of poses, which were exactly what a datum takes, were given up for it.
+    pub released: bool,
 }
 
 /// What coordinates and their cofactors refer to.
@@ -93,6 +95,10 @@ impl Network {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Covariances, NetworkError> {
+        if state.released {
+            let free = State { released: false, ..state.clone() };
+            return self.without_control().covariances(options, &free, datum, pool, watch);
+        }
         let assembled = self.assembled_again(options, state, pool)?;
         let datum = datum.or(state.datum.as_ref());
         let factored = {
@@ -136,6 +142,9 @@ impl Network {
 
     /// Takes an adjusted network to another datum without adjusting again: values, cofactors, redundancy numbers.
     ///
+    /// Control and weights of poses that are exactly what a datum takes are given up for inner constraints: what they say is no
+    /// observation but the choice of a datum.
+    ///
     /// # Errors
     /// Those of [`Network::covariances`].
     pub fn in_datum(
@@ -147,6 +156,14 @@ impl Network {
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
         let assembled = self.assembled_again(options, state, pool)?;
+        let is_inner = matches!(datum, NetworkDatum::Inner(_));
+        if state.released || is_inner && assembled.is_minimal(&state.unknowns, pool) {
+            let free = self.without_control();
+            let state = free.released(options, state, pool)?;
+            let mut solution = free.in_datum(options, &state, datum, pool, watch)?;
+            solution.state.released = true;
+            return Ok(solution);
+        }
         let (carried, reference) = self.datum(&assembled, datum)?;
         let reference = reference.as_ref().unwrap_or(&state.unknowns);
         let (problem, adjusted) = (&assembled.problem, state.adjusted(options));
@@ -205,6 +222,28 @@ impl Network {
         Ok(notable.collect())
     }
 
+    /// The network without what is known of points and poses themselves.
+    fn without_control(&self) -> Self {
+        let mut free = self.clone();
+        let unused = |photo: usize| !self.images.iter().any(|image| image.photo == photo);
+        let held: Vec<bool> = (0..self.photos.len()).map(unused).collect();
+        free.points.iter_mut().for_each(|point| point.sd = [f64::INFINITY; 3]);
+        let photos = free.photos.iter_mut().zip(held).filter(|(_, held)| !held);
+        photos.for_each(|(photo, _)| photo.sd = [f64::INFINITY; 6]);
+        free
+    }
+
+    /// The state in which a network that was controlled goes on without control: unknowns are held in its place.
+    fn released(&self, options: &Options, state: &State, pool: &ThreadPool) -> Result<State, NetworkError> {
+        let state = State { released: false, ..state.clone() };
+        if !state.held.is_empty() {
+            return Ok(state);
+        }
+        let assembled = self.assembled_again(options, &state, pool)?;
+        let held = assembled.problem.to_hold(&state.unknowns, pool);
+        Ok(State { held, ..state })
+    }
+
     /// The problem whose solution a state is.
     pub(super) fn assembled_again(
         &self,
@@ -240,7 +279,7 @@ impl Network {
     ) -> Result<(Datum, Option<Vec<f64>>), NetworkError> {
         match datum {
             NetworkDatum::Inner(inner) => {
-                self.check_carriers(inner)?;
+                self.check_carriers(inner, assembled)?;
                 let (datum, reference) = assembled.datum(inner);
                 Ok((datum, Some(reference)))
             }
@@ -255,7 +294,7 @@ impl Network {
                 Ok((assembled.relative(carriers), None))
             }
             NetworkDatum::RelativeToPoints(points) => {
-                let inner = InnerConstraints { points: points.clone(), photos: vec![], scale: false };
+                let inner = InnerConstraints { points: points.clone(), ..Default::default() };
                 Ok((assembled.relative(assembled.datum(&inner).0.carriers), None))
             }
         }

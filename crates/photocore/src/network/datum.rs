@@ -3,6 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::Vector6;
+use rayon::ThreadPool;
 
 use super::commons::Motion;
 use super::model::{Bundle, Placed};
@@ -21,6 +22,10 @@ pub struct InnerConstraints {
     pub points: Vec<usize>,
     /// Indices of photos, whose positions count.
     pub photos: Vec<usize>,
+    /// Indices of photos, whose attitudes count: a turn of one about its own axes, times `radius`.
+    pub attitudes: Vec<usize>,
+    /// What makes turns comparable with shifts; None for the root mean square distance of all points and photos from their middle.
+    pub radius: Option<f64>,
     /// Whether scale is taken from them, too; otherwise it stays as it is held.
     pub scale: bool,
 }
@@ -285,9 +290,59 @@ impl Assembled {
             let partials = Point::new(model.space, at).partials();
             [0, 1, 2].map(|k| (first + k, partials.column(k).norm()))
         };
-        let carriers: Vec<(usize, f64)> = points.chain(photos).flat_map(lengths).collect();
+        let mut carriers: Vec<(usize, f64)> = points.chain(photos).flat_map(lengths).collect();
+        if !inner.attitudes.is_empty() {
+            let radius = inner.radius.unwrap_or_else(|| self.radius());
+            let turning = inner.attitudes.iter().filter(|&&photo| photo < model.cameras.len());
+            let frames: BTreeSet<usize> = turning.map(|&photo| model.carrier(photo)).collect();
+            let turns = frames.into_iter().map(|photo| model.of_block(photo).start + 3);
+            carriers.extend(turns.flat_map(|first| [0, 1, 2].map(|k| (first + k, radius))));
+        }
         let left = self.left(&carriers, !inner.scale);
         (Datum { carriers, left, relative: false }, reference)
+    }
+
+    /// Whether the attitude of a photo steps by a rotation about its own axes, as that of a carrier must.
+    pub(super) fn turns(&self, photo: usize) -> bool {
+        let model = &self.problem.model;
+        photo >= model.cameras.len() || model.turning_sense(model.carrier(photo)).is_some()
+    }
+
+    /// The root mean square distance of all points and photos from their middle, at their initial values.
+    fn radius(&self) -> f64 {
+        let (model, unknowns) = (&self.problem.model, &self.problem.initial);
+        let points = model.coordinates(unknowns).map(|&at| model.space.cartesian(at));
+        let photos = model.photos(&unknowns[model.of_stations()]);
+        let places: Vec<Vector3> =
+            points.chain(photos.iter().map(|station| station.orientation.centre())).collect();
+        let count = places.len().max(1) as f64;
+        let middle = places.iter().sum::<Vector3>() / count;
+        (places.iter().map(|place| (place - middle).norm_squared()).sum::<f64>() / count).sqrt()
+    }
+
+    /// The unknowns of points and poses that are weighted or fixed, ascending: what may give a datum besides observations.
+    pub(super) fn controlled(&self) -> Vec<usize> {
+        let model = &self.problem.model;
+        let photos = (0..model.cameras.len()).filter(|&photo| model.mount(photo).is_none());
+        let poses =
+            photos.filter(|&photo| model.images_on[photo] > 0).flat_map(|p| model.of_block(p).take(6));
+        let points = (0..model.points.len()).flat_map(|point| model.of_point(point));
+        let mut all: Vec<usize> =
+            poses.chain(points).filter(|&unknown| self.problem.sd[unknown].is_finite()).collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Whether control and weights of poses are exactly what a datum takes: without them as many motions of the whole would be open as
+    /// they are numbers. Their redundancy numbers are zero, and the network is free but for the choice that they are.
+    pub(super) fn is_minimal(&self, values: &[f64], pool: &ThreadPool) -> bool {
+        let (controlled, model) = (self.controlled(), &self.problem.model);
+        let some = !controlled.is_empty() && controlled.len() <= MOTIONS * MOST_PARTS;
+        // A point of one image is determined by control alone.
+        let seen =
+            |point: usize| model.points[point].held() == [false; 3] || model.images_of(point).len() > 1;
+        some && (0..model.points.len()).all(seen)
+            && self.problem.open_if_free(values, &controlled, pool) == controlled.len()
     }
 
     /// The datum in which cofactors are relative to some unknowns, scale staying as it is.

@@ -81,6 +81,11 @@ pub enum NetworkError {
     /// Poses in vectors in a space where they are not defined.
     #[error("poses in vectors need rectangular space and no refraction, and carry no datum")]
     Vectors,
+    /// Photos whose attitudes are to carry a datum but do not step by rotations: poses in vectors, fixed angles, full steps.
+    #[error(
+        "the attitude of photo {0} cannot carry a datum: an angle is fixed, or steps are those of a program of its time"
+    )]
+    Attitude(usize),
     /// Nothing to adjust.
     #[error("no point is left to adjust: none is on two photos")]
     Empty,

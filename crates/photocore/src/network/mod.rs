@@ -375,7 +375,9 @@ impl Network {
                         self.take_to(inner, &options.adjustment, &assembled, &mut adjusted, pool, watch)?;
                 }
                 let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
+                let minimal = datum.is_none() && assembled.is_minimal(&adjusted.unknowns, pool);
                 let mut solution = Solution::new(self, options, &assembled, adjusted, collapsed);
+                solution.minimal_control = minimal;
                 solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
                 solution.lost_digits = lost;
                 solution.dropped.extend(harmful);
@@ -392,10 +394,33 @@ impl Network {
         }
     }
 
+    /// The problem of the network as it is given.
+    fn assembled_first(
+        &self,
+        options: &Options,
+        pool: &ThreadPool,
+    ) -> Result<problem::Assembled, NetworkError> {
+        self.check()?;
+        let screened = self.screen(&vec![false; self.points.len()], &vec![false; self.photos.len()]);
+        if screened.points.is_empty() {
+            return Err(NetworkError::Empty);
+        }
+        let assembled = pool.install(|| self.assemble(options, screened, None))?;
+        assembled.check_memory(options)?;
+        Ok(assembled)
+    }
+
     /// Refuses photos that cannot carry a datum.
-    fn check_carriers(&self, inner: &InnerConstraints) -> Result<(), NetworkError> {
-        let vectors = self.poses == PoseNumbers::Vectors && !inner.photos.is_empty();
-        if vectors { Err(NetworkError::Vectors) } else { Ok(()) }
+    fn check_carriers(
+        &self,
+        inner: &InnerConstraints,
+        assembled: &problem::Assembled,
+    ) -> Result<(), NetworkError> {
+        if self.poses == PoseNumbers::Vectors && !(inner.photos.is_empty() && inner.attitudes.is_empty()) {
+            return Err(NetworkError::Vectors);
+        }
+        let bad = inner.attitudes.iter().find(|&&photo| !assembled.turns(photo));
+        bad.map_or(Ok(()), |&photo| Err(NetworkError::Attitude(photo)))
     }
 
     /// Takes an adjusted network to the datum of inner constraints; returns how large a part of its variances may be rounding.
@@ -408,7 +433,7 @@ impl Network {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<f64, NetworkError> {
-        self.check_carriers(inner)?;
+        self.check_carriers(inner, assembled)?;
         let (datum, reference) = assembled.datum(inner);
         let total = assembled.points.len();
         let mut between = |done| watch(Event::Progress { phase: adjustment::Phase::Invert, done, total });

@@ -11,6 +11,7 @@ use super::mounts::{Mount, Mounted, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::{Image, Minimum, Point};
 use crate::adjustment::{Model, Motions, Weighted};
+use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
     self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
@@ -558,6 +559,23 @@ impl Model for Bundle {
         let turned: Vec<(usize, [f64; 3])> = (0..self.cameras.len()).filter_map(turn).collect();
         unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
         turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
+    }
+
+    /// Attitudes that step by a rotation vector are that apart, A^T B = Exp(rho).
+    fn step_between(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
+        let mut step: Vec<f64> = to.iter().zip(from).map(|(to, from)| to - from).collect();
+        let start = self.of_stations().start + 3;
+        for photo in 0..self.cameras.len() {
+            let Some(sense) = self.turning_sense(photo) else { continue };
+            let first = start + self.first[photo];
+            let attitude = |values: &[f64]| {
+                let angles = std::array::from_fn(|k| values[first + k]);
+                AttitudeNumbers::OmegaPhiKappa(sense).attitude(angles)
+            };
+            let turn = rotation_angle_axis(&attitude(from).tr_mul(&attitude(to)));
+            step[first..first + 3].copy_from_slice(turn.as_slice());
+        }
+        step
     }
 
     fn weighted(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Weighted> {

@@ -149,6 +149,8 @@ pub struct Solution {
     pub state: State,
     /// About how large a part of the variances rounding may be, in a datum that they were taken to; zero otherwise.
     pub lost_digits: f64,
+    /// Whether control and weights of poses are exactly what a datum takes: they check nothing, and another datum may be chosen.
+    pub minimal_control: bool,
     /// Status, iterations, counts, operations and times.
     pub adjustment: Adjustment,
 }
@@ -210,8 +212,10 @@ impl Solution {
                 loose: assembled.loose.clone(),
                 ordering: adjustment.ordering,
                 datum: None,
+                released: false,
             },
             lost_digits: 0.0,
+            minimal_control: false,
             collapsed,
             sums_of_squares,
             redundancies,

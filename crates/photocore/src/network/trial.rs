@@ -15,7 +15,7 @@ use crate::adjustment::{
     self, AdjustError, GroupTest, Loss, Method, Status, Stop, TieCofactors, Tried, Watch, Weighted,
     canonical_correlation,
 };
-use crate::geometry::{AttitudeNumbers, Matrix3};
+use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::normals::{GroupCofactors, LocalCofactors};
 
 /// A network tried without some of its observations.
@@ -32,6 +32,8 @@ pub struct Trial {
     sd: Vec<f64>,
     /// The place in the model of each point that takes part.
     place: Vec<Option<usize>>,
+    /// What was held for a datum where the adjustment has ended.
+    held: Vec<usize>,
     found: Option<Tried>,
 }
 
@@ -109,15 +111,25 @@ pub struct OnPoint {
 }
 
 impl Network {
-    /// Prepares for trials of an adjusted network.
-    ///
-    /// `options` are those of the adjustment, and `state` is where it ended ([`super::Solution::state`]).
+    /// Prepares for trials of a network: from its initial values on, or from where an adjustment with these options has ended
+    /// ([`super::Solution::state`]).
     ///
     /// # Errors
-    /// Those of [`Network::covariances`].
-    pub fn trial(&self, options: &Options, state: &State, pool: &ThreadPool) -> Result<Trial, NetworkError> {
-        let mut assembled = self.assembled_again(options, state, pool)?;
-        assembled.problem.initial.clone_from(&state.unknowns);
+    /// Those of [`Network::adjust`] before its first iteration; a state that is not of this network.
+    pub fn trial(
+        &self,
+        options: &Options,
+        state: Option<&State>,
+        pool: &ThreadPool,
+    ) -> Result<Trial, NetworkError> {
+        let assembled = match state {
+            Some(state) => {
+                let mut assembled = self.assembled_again(options, state, pool)?;
+                assembled.problem.initial.clone_from(&state.unknowns);
+                assembled
+            }
+            None => self.assembled_first(options, pool)?,
+        };
         let suspects = self.suspects(&assembled);
         let (mut row_starts, mut block_starts) = (vec![0], vec![0]);
         for suspect in &suspects {
@@ -139,6 +151,7 @@ impl Network {
             row_starts,
             block_starts,
             place,
+            held: state.map_or(vec![], |state| state.held.clone()),
             found: None,
         })
     }
@@ -165,21 +178,14 @@ impl Trial {
         self.suspects.iter().flat_map(|suspect| suspect.rows.iter().map(|&row| self.deviation(suspect, row)))
     }
 
-    /// Takes the network as it stands at its values, with everything in it.
-    ///
-    /// `held`: what was held for a datum ([`State::held`]).
+    /// Takes the network as it stands where its adjustment has ended, with everything in it.
     ///
     /// # Errors
     /// Values that leave unknowns undetermined; an interruption, no memory.
-    pub fn stand(
-        &mut self,
-        held: &[usize],
-        pool: &ThreadPool,
-        watch: Watch<'_>,
-    ) -> Result<Standing, NetworkError> {
+    pub fn stand(&mut self, pool: &ThreadPool, watch: Watch<'_>) -> Result<Standing, NetworkError> {
         self.take_out(Out::default());
         let problem = &self.assembled.problem;
-        let found = Tried::at(problem, problem.initial.clone(), held.to_vec(), pool, watch);
+        let found = Tried::at(problem, problem.initial.clone(), self.held.clone(), pool, watch);
         self.keep(found)
     }
 
@@ -232,6 +238,18 @@ impl Trial {
         let weights = self.suspects.iter().map(|suspect| weight(suspect).unwrap_or(1.0)).collect();
         self.assembled.problem.initial = found.unknowns;
         Ok(weights)
+    }
+
+    /// The values of the unknowns of all photos as they are given: pose, and camera where it is the photo's own.
+    pub fn photos(&self) -> Vec<Vec<f64>> {
+        let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
+        let positions = if let PoseNumbers::Angles(_) = model.poses { 3 } else { 0 };
+        let photo = |photo: usize| {
+            let mut values = problem.initial[model.of_block(photo)].to_vec();
+            (0..positions).for_each(|k| values[k] += model.origin[k]);
+            values
+        };
+        (0..model.cameras.len()).map(photo).collect()
     }
 
     fn method(&self, tolerance: Option<f64>) -> Method {
@@ -396,6 +414,9 @@ impl Trial {
         groups: &GroupCofactors,
         weighted: &[Weighted],
     ) -> Option<Tested> {
+        if let Home::Group { group, .. } = suspect.home {
+            return self.image_test(group, found, groups);
+        }
         let size = suspect.rows.len();
         let taking: Vec<usize> = (0..size).filter(|&k| self.is_in(suspect.rows[k].0)).collect();
         if taking.is_empty() {
@@ -440,6 +461,29 @@ impl Trial {
         })
     }
 
+    /// The test of an image of a local point: nearly all are.
+    fn image_test(&self, group: usize, found: &Tried, groups: &GroupCofactors) -> Option<Tested> {
+        let rows = 2 * group..2 * group + 2;
+        if self.assembled.problem.observation_sd[rows.clone()].iter().any(|sd| sd.is_infinite()) {
+            return None;
+        }
+        let (sd, v) = (&self.observation_sd[rows.clone()], &found.residuals[rows]);
+        let residual = [v[0] / sd[0], v[1] / sd[1]];
+        let block = 4 * group..4 * group + 4;
+        let left = |shares: &[f64]| [1.0 - shares[0], -shares[1], -shares[2], 1.0 - shares[3]];
+        let cofactors = left(&groups.shares[block.clone()]);
+        let test = GroupTest::new(&residual, &cofactors, Some(&left(&groups.by_local[block])));
+        let of = |k: usize| (test.error[k] * sd[k], test.cofactors[3 * k].sqrt() * sd[k]);
+        let [first, second] = [of(0), of(1)];
+        Some(Tested {
+            residual: residual.to_vec(),
+            cofactors: cofactors.to_vec(),
+            error: vec![first.0, second.0],
+            error_sd: vec![first.1, second.1],
+            test,
+        })
+    }
+
     /// Residuals of unit weight of some rows of a suspect, a Q a^T of these, and the same with all known but the own point.
     fn shares(
         &self,
@@ -457,16 +501,11 @@ impl Trial {
         let residuals = taking.iter().map(residual).collect();
         let count = taking.len();
         let (shares, by_point) = match suspect.home {
-            Home::Group { group, .. } => {
-                let range = 4 * group..4 * group + 4;
-                let some = |block: &[f64]| sub(block, 2, taking);
-                (some(&groups.shares[range.clone()]), some(&groups.by_local[range]))
-            }
             Home::Tie(tie) => {
                 let block = &found.cofactors.ties[problem.layout().tie_block(tie)];
                 (sub(block, suspect.rows.len(), taking), vec![0.0; count * count])
             }
-            Home::Point(_) | Home::Block(_) => {
+            Home::Group { .. } | Home::Point(_) | Home::Block(_) => {
                 let rows = self.prior_rows(suspect, taking, &problem.sd, &found.values, weighted);
                 let q = self.cofactors_at(found, suspect.home);
                 let alone = match suspect.home {

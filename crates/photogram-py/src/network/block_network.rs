@@ -121,10 +121,16 @@ impl BlockNetwork {
     }
 
     #[pyo3(signature = (state, *, threads))]
-    fn trial(&self, py: Python<'_>, state: &BlockState, threads: usize) -> PyResult<NetworkTrial> {
+    fn trial(
+        &self,
+        py: Python<'_>,
+        state: Option<PyRef<'_, BlockState>>,
+        threads: usize,
+    ) -> PyResult<NetworkTrial> {
         let images = self.network.images.len();
+        let state = state.map(|state| state.state.clone());
         let found = watched(py, Workers::of(threads, images), None, |pool, _| {
-            self.network.trial(&self.options, &state.state, pool)
+            self.network.trial(&self.options, state.as_ref(), pool)
         })?;
         found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
     }

@@ -109,6 +109,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
+        | Failure::Attitude(_)
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
     };

@@ -230,6 +230,11 @@ solution_class! {
         }
 
         #[getter]
+        fn minimal_control(&self) -> bool {
+            self.solution.minimal_control
+        }
+
+        #[getter]
         fn photo_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
             let (iterations, photos) = (&self.solution.photo_corrections, &self.solution.photos);
             let mut values = Vec::with_capacity(6 * iterations.len() * photos.len());

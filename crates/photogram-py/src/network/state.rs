@@ -5,13 +5,13 @@ use pyo3::prelude::*;
 
 use crate::options::{named_ordering, unknown};
 
-/// What a datum is: its name, points, photos, and whether scale counts.
-pub type DatumRow = (String, Vec<usize>, Vec<usize>, bool);
+/// What a datum is: its name, points, photos, whether scale counts, photos whose attitudes count, and what makes these lengths.
+pub type DatumRow = (String, Vec<usize>, Vec<usize>, bool, Vec<usize>, Option<f64>);
 
 /// The datum of a row.
-pub fn datum_of((name, points, photos, scale): DatumRow) -> PyResult<NetworkDatum> {
+pub fn datum_of((name, points, photos, scale, attitudes, radius): DatumRow) -> PyResult<NetworkDatum> {
     Ok(match (name.as_str(), photos.first()) {
-        ("inner", _) => NetworkDatum::Inner(InnerConstraints { points, photos, scale }),
+        ("inner", _) => NetworkDatum::Inner(InnerConstraints { points, photos, attitudes, radius, scale }),
         ("relative", Some(&photo)) => NetworkDatum::RelativeToPhoto(photo),
         ("relative", None) => NetworkDatum::RelativeToPoints(points),
         (other, _) => return Err(unknown("datum", other)),
@@ -19,16 +19,21 @@ pub fn datum_of((name, points, photos, scale): DatumRow) -> PyResult<NetworkDatu
 }
 
 fn row_of(datum: &NetworkDatum) -> DatumRow {
-    let (name, points, photos, scale) = match datum {
-        NetworkDatum::Inner(inner) => ("inner", inner.points.clone(), inner.photos.clone(), inner.scale),
-        NetworkDatum::RelativeToPhoto(photo) => ("relative", vec![], vec![*photo], false),
-        NetworkDatum::RelativeToPoints(points) => ("relative", points.clone(), vec![], false),
+    let (name, inner) = match datum {
+        NetworkDatum::Inner(inner) => ("inner", inner.clone()),
+        NetworkDatum::RelativeToPhoto(photo) => {
+            ("relative", InnerConstraints { photos: vec![*photo], ..Default::default() })
+        }
+        NetworkDatum::RelativeToPoints(points) => {
+            ("relative", InnerConstraints { points: points.clone(), ..Default::default() })
+        }
     };
-    (name.to_owned(), points, photos, scale)
+    let InnerConstraints { points, photos, attitudes, radius, scale } = inner;
+    (name.to_owned(), points, photos, scale, attitudes, radius)
 }
 
-/// Adjusted unknowns, those held, points and photos left out, ordering, datum.
-type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, Vec<usize>, String, Option<DatumRow>);
+/// Adjusted unknowns, those held, points and photos left out, ordering, datum, whether control was given up for it.
+type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, Vec<usize>, String, Option<DatumRow>, bool);
 
 /// Where an adjustment has ended.
 #[pyclass(frozen, module = "photogram._photocore")]
@@ -46,14 +51,16 @@ impl BlockState {
         loose: Vec<usize>,
         ordering: &str,
         datum: Option<DatumRow>,
+        released: bool,
     ) -> PyResult<Self> {
         let (ordering, datum) = (named_ordering(ordering)?, datum.map(datum_of).transpose()?);
-        Ok(Self { state: State { unknowns, held, collapsed, loose, ordering, datum } })
+        Ok(Self { state: State { unknowns, held, collapsed, loose, ordering, datum, released } })
     }
 
     /// So that results are copied and sent to other processes.
     fn __getnewargs__(&self) -> StateRow {
-        let State { unknowns, held, collapsed, loose, ordering, datum } = self.state.clone();
-        (unknowns, held, collapsed, loose, ordering.name().to_owned(), datum.as_ref().map(row_of))
+        let State { unknowns, held, collapsed, loose, ordering, datum, released } = self.state.clone();
+        let datum = datum.as_ref().map(row_of);
+        (unknowns, held, collapsed, loose, ordering.name().to_owned(), datum, released)
     }
 }

@@ -84,9 +84,14 @@ impl NetworkTrial {
         PyArray1::from_vec(py, self.trial.deviations().collect())
     }
 
-    fn stand(&mut self, py: Python<'_>, held: Vec<usize>) -> PyResult<StandingRow> {
+    #[getter]
+    fn photos(&self) -> Vec<Vec<f64>> {
+        self.trial.photos()
+    }
+
+    fn stand(&mut self, py: Python<'_>) -> PyResult<StandingRow> {
         let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
-        let found = watched(py, workers, None, |pool, watch| trial.stand(&held, pool, watch))?;
+        let found = watched(py, workers, None, |pool, watch| trial.stand(pool, watch))?;
         found.map(standing_row).map_err(|error| refused(&error))
     }
 

@@ -87,8 +87,8 @@ def _camera(tables: Tables, table: ColumnTable, row: int, size: Size | None) -> 
     if size is None and "w" in own:
         raise table.error(row, f"columns width and height are needed by the model {model}")
     parameters = _spread(own, known)
-    if model == "perspective" and "c" in parameters:
-        # In files a principal distance is positive for the positive plane; the model has it negative there.
+    if "c" in parameters:
+        # In files a principal distance is positive for the positive plane; models have it negative there.
         parameters["c"] = -parameters["c"]
     deviations = _spread(
         own,

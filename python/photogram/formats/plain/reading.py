@@ -34,7 +34,6 @@ DIFFER = 1e-6
 """What the positions of a point in two tables may differ by."""
 _SD = tuple(f"sd_{axis}" for axis in AXES)
 _USES = ("control", "check", "off")
-WGS84 = Spheroid(6378137.0, 6356752.314245179)
 
 
 def read(path: Path, wishes: Wishes) -> Project:
@@ -96,7 +95,8 @@ def read(path: Path, wishes: Wishes) -> Project:
         options=settings.options,
         messages=tables.messages,
         linear_unit=settings.length,
-        spheroid=WGS84 if transform.frame.kind == "geographic" else None,
+        spheroid=Spheroid(*transform.frame.ellipsoid) if transform.frame.kind == "geographic" else None,
+        photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
         details={"settings": settings},
     )
 
@@ -200,11 +200,7 @@ def _attitude_weights(
     unknown = np.isfinite(sd).any(axis=1) & np.isnan(matrices).any(axis=(1, 2))
     if unknown.any():
         raise table.error(int(np.flatnonzero(unknown)[0]), "angles have standard deviations, but no values")
-    plain = (
-        settings.attitude == "omega_phi_kappa"
-        and settings.rotation == "object_to_photo"
-        and settings.photo == "y_up"
-    )
+    plain = settings.attitude == "omega_phi_kappa" and settings.photo == "y_up"
     if plain and columns is own:
         return sd, []
     observed: list[Observation] = []

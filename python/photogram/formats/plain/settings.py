@@ -16,7 +16,7 @@ from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
 
-__all__ = ["TABLES", "Settings", "read_settings"]
+__all__ = ["TABLES", "Settings", "bare_settings", "read_settings"]
 
 VERSION = 1
 TABLES = (
@@ -75,7 +75,7 @@ _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
 """Words that a key may have; the first is the default."""
 _KEYS: Mapping[str, tuple[str, ...]] = {
     "project": ("format", "name"),
-    "frame": ("kind", "crs", "origin"),
+    "frame": ("kind", "crs", "origin", "ellipsoid"),
     "units": ("length", "angle", "image"),
     "axes": ("image_y", "pixel_origin", "attitude", "rotation", "photo"),
     "sd": WITH_SD,
@@ -145,7 +145,7 @@ def read_settings(path: Path) -> Settings:
     return Settings(
         path=path,
         name=file.text("project", "name"),
-        frame=Frame(file.word("frame", "kind"), file.text("frame", "crs"), file.origin()),
+        frame=Frame(file.word("frame", "kind"), file.text("frame", "crs"), file.origin(), file.ellipsoid()),
         options=Options(
             cast("DatumName | None", file.word("adjust", "datum") if file.has("adjust", "datum") else None),
             cast("Any", {"none": None}.get(loss := file.word("adjust", "loss"), loss)),
@@ -164,6 +164,48 @@ def read_settings(path: Path) -> Settings:
         sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)},
         tables=_tables(file),
         crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
+    )
+
+
+def bare_settings(
+    path: Path,
+    tables: Mapping[str, Path],
+    *,
+    frame: Frame | None = None,
+    length: str = "m",
+    image: str = "px",
+    sd: Mapping[str, tuple[float, ...]] | None = None,
+    crs: str | None = None,
+) -> Settings:
+    """Return settings for tables that come without a file of them: all defaults, in pixels and degrees.
+
+    Parameters
+    ----------
+    path
+        What errors name.
+    tables
+        The tables.
+    frame, length, image, sd
+        As in :class:`Settings`.
+    crs
+        Of all these tables, where they are not in the frame.
+    """
+    return Settings(
+        path=path,
+        name="",
+        frame=frame or Frame(),
+        options=Options(),
+        length=length,
+        angle="deg",
+        image=image,
+        image_y="down" if image == "px" else "up",
+        pixel_origin="corner",
+        attitude="omega_phi_kappa",
+        rotation="object_to_photo",
+        photo="y_up",
+        sd=sd or {},
+        tables=tables,
+        crs=dict.fromkeys(tables, crs) if crs else {},
     )
 
 
@@ -246,6 +288,15 @@ class _File:
         if not (abs(latitude) <= 90 and abs(longitude) <= 360 and math.isfinite(height)):
             self.fail("origin", "origin is latitude and longitude in degrees, and the ellipsoidal height")
         return latitude, longitude, height
+
+    def ellipsoid(self) -> tuple[float, float]:
+        """Return the semi-axes."""
+        if not self.has("frame", "ellipsoid"):
+            return Frame().ellipsoid
+        a, b = self.numbers("frame", "ellipsoid", (2,))
+        if not (0 < b <= a < math.inf):
+            self.fail("ellipsoid", "ellipsoid is the semi-major and the semi-minor axis")
+        return a, b
 
     def deviations(self, table: str) -> tuple[float, ...]:
         """Return standard deviations of a table."""

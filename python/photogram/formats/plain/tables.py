@@ -118,6 +118,7 @@ REQUIRED: Mapping[str, tuple[str, ...]] = {
     "frames": ("frame", "rig", "photo"),
 }
 SYNONYMS: Mapping[str, str] = {
+    "label": "point",
     "easting": "x",
     "northing": "y",
     "longitude": "x",
@@ -126,7 +127,7 @@ SYNONYMS: Mapping[str, str] = {
     "altitude": "z",
     "elevation": "z",
 }
-"""Of coordinates; tables of cameras have a height of their own."""
+"""Of tables of coordinates; tables of cameras have a height of their own."""
 _TEXTS = frozenset(
     {
         "camera",
@@ -149,6 +150,17 @@ _TEXTS = frozenset(
 _DMS = re.compile(r"([+-]?)(\d+)[\s:°d-]+(\d+)(?:[\s:'m-]+(\d+(?:\.\d*)?))?[\s\"s]*")
 
 
+def _spelled(column: str) -> str:
+    """Return what a column of coordinates is called here: `X/Easting` is x, `Accuracy_X (m)` is sd_x."""
+    own = column.partition("(")[0].strip()
+    first = own.partition("/")[0]
+    if first.startswith("accuracy_") and own.endswith(("_x", "_y", "_z")):
+        return f"sd_{own[-1]}"
+    if first in AXES and first != own:
+        return first
+    return SYNONYMS.get(own, own)
+
+
 @dataclass(frozen=True)
 class Tables:
     """The tables of a project with its settings, read as they are asked for; collects remarks."""
@@ -167,12 +179,12 @@ class Tables:
         if name not in self.settings.tables:
             return None
         known = COLUMNS[name]
-        spelled = {} if name == "cameras" else SYNONYMS
+        spelled = _spelled if name != "cameras" else str
         table = read_columns(
             self.settings.tables[name],
             known=known,
             numbers=set(known) - _TEXTS,
-            spelling=lambda column: spelled.get(column, column),
+            spelling=spelled,
         )
         table.require(*REQUIRED[name])
         if others := [each for each in table.columns if each and each not in known]:

@@ -14,7 +14,7 @@ from photogram.formats.plain.settings import VERSION
 from photogram.formats.plain.tables import AXES
 from photogram.formats.project import Project
 from photogram.io.csv_text import csv_text
-from photogram.network.attitudes import Attitudes
+from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Control, Difference, Distance, Observation, Position
@@ -41,8 +41,6 @@ def cannot_hold(project: Project) -> list[str]:
         found.append("correlations between the parameters of cameras")
     if block.refraction is not None:
         found.append("refraction")
-    if block.photo_to_ground and np.isfinite(block.photo_attitude_sd).any():
-        found.append("standard deviations of attitudes given from photo to ground")
     return found
 
 
@@ -125,9 +123,14 @@ def _settings(project: Project, image_y: str) -> str:
         lines.append(f'crs = "{quoted}"')
     if frame.origin is not None:
         lines.append(f"origin = [{', '.join(map(repr, frame.origin))}]")
+    if block.spheroid is not None:
+        lines.append(f"ellipsoid = [{block.spheroid.a!r}, {block.spheroid.b!r}]")
     unit = block.linear_unit if block.linear_unit in ("m", "mm", "ft", "us-ft") else "m"
     lines += ["", "[units]", f'length = "{unit}"', 'angle = "deg"', f'image = "{block.image_unit}"']
-    lines += ["", "[axes]", f'image_y = "{image_y}"', "", "[adjust]"]
+    lines += ["", "[axes]", f'image_y = "{image_y}"']
+    if block.photo_to_ground:
+        lines.append('rotation = "photo_to_object"')
+    lines += ["", "[adjust]"]
     if options.datum is not None:
         lines.append(f'datum = "{options.datum}"')
     lines += [f'loss = "{options.loss or "none"}"', f'unit_variance = "{options.unit_variance}"', ""]
@@ -149,10 +152,9 @@ def _cameras(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
     names = dict.fromkeys(name for each in cameras for name in each.names if name not in constants)
     for name in names:
         values = [each.parameters.get(name) for each in cameras]
-        columns[name] = [
-            -value if value is not None and each.model == "perspective" else value
-            for each, value in zip(cameras, values, strict=True)
-        ]
+        # In files a principal distance is positive for the positive plane, in models negative.
+        sign = -1.0 if name == "c" else 1.0
+        columns[name] = [None if value is None else sign * value for value in values]
     for name in names:
         deviations = [
             dict(zip(each.names, each.deviations.tolist(), strict=True)).get(name, 0.0) for each in cameras
@@ -166,11 +168,7 @@ def _photos(block: Block, cameras: list[str]) -> dict[str, Any]:
     positions, sd = _given(block, "position")
     if block.geographic:
         positions = np.column_stack([np.degrees(positions[:, :2]), positions[:, 2]])
-    attitudes = block.photo_attitudes
-    if block.photo_to_ground:
-        attitudes, angle_sd = _angles(attitude_matrices(block)), np.full_like(attitudes, np.inf)
-    else:
-        attitudes, angle_sd = _given(block, "attitude")
+    attitudes, angle_sd = _given(block, "attitude")
     columns: dict[str, Any] = {"photo": block.photo_ids, "camera": cameras}
     columns |= zip(AXES, positions.T, strict=True)
     columns |= zip(_ANGLES, np.degrees(attitudes).T, strict=True)
@@ -183,11 +181,12 @@ def _photos(block: Block, cameras: list[str]) -> dict[str, Any]:
     return columns
 
 
-def _angles(matrices: Floats) -> Floats:
+def _angles(matrices: Floats, photo_to_ground: bool) -> Floats:
+    kind: Representation = "omega_phi_kappa_photo_to_ground" if photo_to_ground else "omega_phi_kappa"
     found = np.full((len(matrices), 3), np.nan)
     known = np.isfinite(matrices).all(axis=(1, 2))
     if known.any():
-        found[known] = Attitudes(matrices[known]).values("omega_phi_kappa")
+        found[known] = Attitudes(matrices[known]).values(kind)
     return found
 
 
@@ -275,7 +274,7 @@ def _observed(observations: Sequence[Observation], block: Block) -> dict[str, di
         found["gnss"], found["gnss_groups"] = _gnss(positions, block)
     attitudes = [each for each in observations if isinstance(each, Attitude)]
     if attitudes:
-        found["attitudes"], found["attitude_groups"] = _attitudes(attitudes)
+        found["attitudes"], found["attitude_groups"] = _attitudes(attitudes, block.photo_to_ground)
     distances = [each for each in observations if isinstance(each, Distance)]
     if distances:
         found["distances"] = {
@@ -335,11 +334,11 @@ def _lever(each: Position) -> Any:
     return tuple(np.broadcast_to(np.asarray(each.lever_arm, dtype=float), 3).tolist())
 
 
-def _attitudes(attitudes: Sequence[Attitude]) -> tuple[dict[str, Any], dict[str, Any]]:
+def _attitudes(attitudes: Sequence[Attitude], turned: bool) -> tuple[dict[str, Any], dict[str, Any]]:
     groups = {id(each.boresight): each.boresight for each in attitudes if each.boresight is not None}
     names = {key: str(row) for row, key in enumerate(groups, 1)}
     sd = np.degrees(np.sqrt(np.array([np.diag(each.precision) for each in attitudes])))
-    angles = np.degrees(_angles(np.array([np.asarray(each.attitude) for each in attitudes])))
+    angles = np.degrees(_angles(np.array([np.asarray(each.attitude) for each in attitudes]), turned))
     table: dict[str, Any] = {
         "photo": [each.photo for each in attitudes],
         **dict(zip(_ANGLES, angles.T, strict=True)),
@@ -354,7 +353,7 @@ def _attitudes(attitudes: Sequence[Attitude]) -> tuple[dict[str, Any], dict[str,
     ]
     own: dict[str, Any] = {"group": list(names.values())}
     # The boresight is body to photo; the tables have attitudes of the photo in the axes of what carries it.
-    own |= zip(_ANGLES, np.degrees(_angles(np.array(values).transpose(0, 2, 1))).T, strict=True)
+    own |= zip(_ANGLES, np.degrees(_angles(np.array(values).transpose(0, 2, 1), turned)).T, strict=True)
     deviations = [each.deviations if isinstance(each, Boresight) else np.zeros(3) for each in groups.values()]
     own |= {
         f"sd_rotation_{axis}": column
@@ -379,7 +378,9 @@ def _rigs(block: Block, cameras: Sequence[Camera], photo_cameras: Sequence[int])
     rows += [(rig, camera, sensor) for rig, sensors in rigs.items() for camera, sensor in sensors.items()]
     rows.sort(key=lambda row: list(rigs).index(row[0]))
     values = np.array([np.zeros(3) if sensor is None else sensor.position for _, _, sensor in rows])
-    angles = np.degrees(_angles(np.array([np.eye(3) if s is None else s.attitude for _, _, s in rows])))
+    angles = np.degrees(
+        _angles(np.array([np.eye(3) if s is None else s.attitude for _, _, s in rows]), block.photo_to_ground)
+    )
     sd = np.array([np.zeros(6) if sensor is None else sensor.deviations for _, _, sensor in rows])
     table: dict[str, Any] = {"rig": [row[0] for row in rows], "camera": [row[1] for row in rows]}
     table |= zip(AXES, values.T, strict=True)

@@ -12,17 +12,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.statistics.distributions import LEVEL, critical_chi_square, critical_fisher
 from photogram.statistics.snooping.conditioning import Chosen, Conditional, UnitWeight
 from photogram.statistics.snooping.suspects import Suspects, Tests, Trial
 
 __all__ = ["Choice", "Level", "choose", "hides"]
 
+ON_POINT = 2
+"""Groups that go from one point in a round, at the most, where R of all rows is too large."""
 AHEAD = 10
 """Groups that are taken out regardless, at the most, to see whether they hide each other."""
 
@@ -102,47 +105,67 @@ def choose(
     ahead
         Whether to look for groups that hide each other where none is significant.
     """
+    allowed = allowed & tests.active
     if trial.whole:
         residuals, response = trial.response()
         suspects = trial.suspects
         rows = [suspects.rows(group) for group in range(len(suspects))]
-        conditional = Conditional(residuals, response, rows, scales, unit)
-        groups = np.arange(len(suspects))
-        return _sequence(suspects, conditional, groups, tests, allowed & tests.active, level, out, ahead)
-    return _bounded(trial, tests, unit, scales, allowed & tests.active, level, out, ahead)
+        every = np.arange(len(suspects))[np.newaxis]
+        conditional = Conditional(residuals[np.newaxis], response[np.newaxis], rows, scales[np.newaxis], unit)
+        return _sequences(suspects, conditional, every, tests, allowed, level, out, ahead)[0]
+    return _bounded(trial, tests, unit, scales, allowed, level, out, ahead)
 
 
-def _sequence(
+def _sequences(
     suspects: Suspects,
     conditional: Conditional,
-    groups: np.ndarray,
+    groups: Indices,
     tests: Tests,
     allowed: Bools,
     level: Level,
     out: int,
     ahead: bool,
     most: float = math.inf,
-) -> list[Choice]:
-    """Take out one group after the other while the next is significant, or hides one that is."""
-    found: list[Choice] = []
-    sure = 0
-    while len(found) < most and (ahead or sure == len(found)) and len(found) - sure <= AHEAD:
-        place = conditional.best(allowed)
-        if place is None:
+) -> list[list[Choice]]:
+    """Take out of each block one group after the other while the next is significant, or hides one that is.
+
+    `groups`: (n, K) the numbers of the groups of each block.
+    """
+    found: list[list[Choice]] = [[] for _ in groups]
+    sure = np.zeros(len(groups), dtype=np.int64)
+    left = allowed[groups]
+    going = np.arange(len(groups))
+    step = 0
+    while going.size and step < most:
+        limit = level.limit(out + step)
+        places = conditional.best(left)[going]
+        going, places = going[places >= 0], places[places >= 0]
+        significant = conditional.log_probability[going, places] < math.log(limit)
+        further = significant.copy()
+        if ahead:
+            within = step - sure[going] < AHEAD
+            hidden = [
+                hides(conditional.units[block], float(conditional.scales[block, place]))
+                for block, place in zip(going, places, strict=True)
+            ]
+            further |= within & np.array(hidden, dtype=bool)
+        going, places, significant = going[further], places[further], significant[further]
+        if not going.size:
             break
-        limit = level.limit(out + len(found))
-        significant = conditional.tests.log_probability[place] < math.log(limit)
-        if not significant and not (ahead and hides(conditional.unit, float(conditional.scales[place]))):
-            break
-        group = int(groups[place])
-        rows = conditional.part(place, suspects.parts(group))
-        chosen = conditional.choose(place, rows, allowed, math.log(limit))
-        allowed = allowed.copy()
-        allowed[place] = False
-        found.append(Choice(group, float(tests.statistic[group]), chosen, limit))
-        if significant:
-            sure = len(found)
-    return found[:sure]
+        rows = conditional.rows[places].copy()
+        for i, (block, place) in enumerate(zip(going.tolist(), places.tolist(), strict=True)):
+            parts = suspects.parts(int(groups[block, place]))
+            if parts is not None:
+                rows[i] = conditional.part(block, place, parts)
+        limits = np.full(len(going), math.log(limit))
+        chosen = conditional.choose(going, places, rows, left, limits)
+        left[going, places] = False
+        step += 1
+        sure[going[significant]] = step
+        for block, own in zip(going.tolist(), chosen, strict=True):
+            group = int(groups[block, own.group])
+            found[block].append(Choice(group, float(tests.statistic[group]), own, limit))
+    return [own[: sure[block]] for block, own in enumerate(found)]
 
 
 def hides(unit: UnitWeight, scale: float) -> bool:
@@ -154,7 +177,7 @@ def hides(unit: UnitWeight, scale: float) -> bool:
         return True
     if not unit.degrees_of_freedom > 0:
         return False
-    critical = critical_chi_square(LEVEL / 2, unit.degrees_of_freedom)
+    critical = _critical_sum(unit.degrees_of_freedom)
     return unit.weighted_sum_of_squares / scale > critical
 
 
@@ -197,6 +220,12 @@ def _beyond(tests: Tests, unit: UnitWeight, scales: Floats, limit: float) -> Boo
         return np.asarray(tests.statistic > critical * scales)
 
 
+@lru_cache
+def _critical_sum(degrees_of_freedom: float) -> float:
+    return critical_chi_square(LEVEL / 2, degrees_of_freedom)
+
+
+@lru_cache
 def _critical(unit: UnitWeight, dimension: int, limit: float) -> float:
     """Return the limit of T: of chi-square, or of F solved for T."""
     if unit.known:
@@ -216,7 +245,7 @@ def _on_points(
     allowed: Bools,
     level: Level,
     out: int,
-    candidates: np.ndarray,
+    candidates: Indices,
     ahead: bool,
 ) -> list[Choice]:
     """Choose on the point of each candidate; of a candidate without a point, itself."""
@@ -225,20 +254,26 @@ def _on_points(
     for group in candidates.tolist():
         point = int(suspects.points[group])
         first.setdefault(point if point >= 0 else -1 - group, group)
+    all_sizes = np.diff(suspects.row_starts)
+    alike: dict[tuple[int, ...], list[tuple[list[int], Floats, Floats]]] = {}
+    for own in trial.blocks(list(first.values())):
+        sizes = tuple(all_sizes[own[0]].tolist())
+        alike.setdefault(sizes, []).append(own)
     found = []
-    for groups, residuals, response in trial.blocks(list(first.values())):
-        sizes = [len(suspects.rows(group)) for group in groups]
+    for sizes, blocks in alike.items():
         starts = np.concatenate([[0], np.cumsum(sizes)])
         rows = [np.arange(a, b) for a, b in pairwise(starts.tolist())]
-        places = np.array(groups, dtype=np.int64)
-        conditional = Conditional(residuals, response, rows, scales[places], unit)
-        chosen = _sequence(suspects, conditional, places, tests, allowed[places], level, out, ahead, most=2)
-        offsets = suspects.row_starts[places] - starts[:-1]
-        found += [_among_all(choice, places, offsets) for choice in chosen]
+        groups = np.array([own[0] for own in blocks], dtype=np.int64)
+        residuals, response = np.stack([own[1] for own in blocks]), np.stack([own[2] for own in blocks])
+        conditional = Conditional(residuals, response, rows, scales[groups], unit)
+        chosen = _sequences(suspects, conditional, groups, tests, allowed, level, out, ahead, most=ON_POINT)
+        for places, choices in zip(groups, chosen, strict=True):
+            offsets = suspects.row_starts[places] - starts[:-1]
+            found += [_among_all(choice, places, offsets) for choice in choices]
     return found
 
 
-def _among_all(choice: Choice, places: np.ndarray, offsets: np.ndarray) -> Choice:
+def _among_all(choice: Choice, places: Indices, offsets: Indices) -> Choice:
     """Count rows and rivals among all."""
     own = choice.chosen
     rivals = tuple((int(places[place]), *rest) for place, *rest in own.rivals)
@@ -267,19 +302,20 @@ class _Load:
         shared = float(self.tests.shared[group])
         return 0.0 if math.isnan(shared) else shared
 
+    def _photos(self, group: int) -> list[int]:
+        """Return the photo of a group; those that its point is seen from where it has none."""
+        photo = int(self.suspects.photos[group])
+        return [photo] if photo >= 0 else self.suspects.loads(group).tolist()
+
     def leaves(self, choice: Choice, critical: float) -> bool:
         """Whether a group is significant whatever the chosen do to it."""
         group = choice.group
-        photo = int(self.suspects.photos[group])
-        photos = [photo] if photo >= 0 else self.suspects.loads(group).tolist()
-        load = max((self.of_photo.get(each, 0.0) for each in photos), default=0.0)
+        load = max((self.of_photo.get(each, 0.0) for each in self._photos(group)), default=0.0)
         left = math.sqrt(max(choice.chosen.statistic, 0.0)) - math.sqrt(self._shared(group)) * load
         return left > math.sqrt(critical) or (load == 0.0)
 
     def add(self, choice: Choice) -> None:
         """Count a group that was chosen."""
         size = math.sqrt(self._shared(choice.group) * max(choice.chosen.statistic, 0.0))
-        photos = set(self.suspects.loads(choice.group).tolist())
-        photo = int(self.suspects.photos[choice.group])
-        for each in photos | ({photo} if photo >= 0 else set()):
+        for each in self._photos(choice.group):
             self.of_photo[each] = self.of_photo.get(each, 0.0) + size

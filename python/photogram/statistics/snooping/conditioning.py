@@ -4,7 +4,7 @@ With v and R the residuals of unit weight of some rows and their cofactors, and 
 
     v <- v - R_S R_SS^- v_S,    R <- R - R_S R_SS^- R_S',    Omega <- Omega - T_S,    f <- f - m'_S
 
-is what an adjustment without S gives in a linear model (specification of snooping: Hadi and Simonoff 1993).
+is what an adjustment without S gives in a linear model (Hadi and Simonoff 1993).
 """
 
 from __future__ import annotations
@@ -94,18 +94,18 @@ class Chosen:
 
 
 class Conditional:
-    """Groups of some rows whose R is known as a whole.
+    """n blocks of rows, each with the same groups, whose R is known block by block.
 
     Parameters
     ----------
     residuals
-        (m,) of unit weight.
+        (n, m) of unit weight.
     cofactors
-        (m, m) R.
+        (n, m, m) R.
     groups
-        The rows of each group.
+        The rows of each of the K groups.
     scales
-        What the variances of each group are multiplied by before it is tested (k^2).
+        (n, K) what the variances of each group are multiplied by before it is tested (k^2).
     unit
         Of all that takes part.
     """
@@ -118,96 +118,124 @@ class Conditional:
         scales: Floats,
         unit: UnitWeight,
     ) -> None:
-        self.v = np.array(residuals)
-        self.r = np.array(cofactors)
-        self.groups = groups
-        self.scales = scales
-        self.unit = unit
+        self.v, self.r, self.scales = np.array(residuals), np.array(cofactors), scales
+        self.units = [unit] * len(self.v)
         size = max((len(rows) for rows in groups), default=1)
-        self._rows = np.full((len(groups), size), -1)
+        self.rows = np.full((len(groups), size), -1)
         for place, rows in enumerate(groups):
-            self._rows[place, : len(rows)] = rows
-        self.tests = self._tested()
+            self.rows[place, : len(rows)] = rows
+        count = (len(self.v), len(groups))
+        self.log_probability: Floats = np.full(count, math.nan)
+        self.statistic: Floats = np.zeros(count)
+        self.dimension: Indices = np.zeros(count, dtype=np.int64)
+        self._test(np.arange(len(self.v)))
 
-    def _tested(self) -> GroupTests:
-        there = self._rows >= 0
-        rows = np.where(there, self._rows, 0)
-        v = np.where(there, self.v[rows], math.nan) / np.sqrt(self.scales)[:, np.newaxis]
-        r = self.r[rows[:, :, np.newaxis], rows[:, np.newaxis, :]]
-        return group_tests(
-            r,
-            v,
-            self.unit.weighted_sum_of_squares,
-            self.unit.degrees_of_freedom,
-            known=self.unit.known,
+    def _test(self, blocks: Indices) -> None:
+        """Test all groups of some blocks."""
+        places = np.tile(np.arange(len(self.rows)), len(blocks))
+        found = self._of(np.repeat(blocks, len(self.rows)), self.rows[places], places)
+        shape = (len(blocks), len(self.rows))
+        self.log_probability[blocks] = found.log_probability.reshape(shape)
+        self.statistic[blocks] = found.statistic.reshape(shape)
+        self.dimension[blocks] = found.dimension.reshape(shape)
+
+    def _of(self, blocks: Indices, rows: Indices, places: Indices) -> GroupTests:
+        """Test rows of blocks: (b,), (b, g) with -1 for none, and the groups that they belong to."""
+        there = rows >= 0
+        rows = np.where(there, rows, 0)
+        at = blocks[:, np.newaxis]
+        scale = np.sqrt(self.scales[blocks, places])[:, np.newaxis]
+        v = np.where(there, self.v[at, rows] / scale, math.nan)
+        r = self.r[at[:, :, np.newaxis], rows[:, :, np.newaxis], rows[:, np.newaxis, :]]
+        units = [self.units[block] for block in blocks] if not self.units[0].known else self.units[:1]
+        omega = np.array([unit.weighted_sum_of_squares for unit in units])
+        freedom = np.array([unit.degrees_of_freedom for unit in units])
+        return group_tests(r, v, omega, freedom, known=self.units[0].known)
+
+    def best(self, allowed: Bools) -> Indices:
+        """Return (n,) the least probable group that is allowed, of equals the first; -1 for none."""
+        possible = allowed & (self.dimension > 0) & ~np.isnan(self.log_probability)
+        log_p = np.where(possible, self.log_probability, math.inf)
+        least = log_p.min(axis=1, initial=math.inf)
+        equal = log_p <= (least + SAME * np.maximum(np.abs(least), 1.0))[:, np.newaxis]
+        return np.asarray(np.where(np.isfinite(least), equal.argmax(axis=1), -1))
+
+    def part(self, block: int, place: int, parts: Sequence[Sequence[int]]) -> Indices:
+        """Return the rows (padded by -1) of the least probable part of a group."""
+        choices = np.full((len(parts), self.rows.shape[1]), -1)
+        for choice, part in zip(choices, parts, strict=True):
+            choice[: len(part)] = self.rows[place, list(part)]
+        places = np.full(len(parts), place)
+        log_p = self._of(np.full(len(parts), block), choices, places).log_probability
+        return np.asarray(
+            choices[int(np.nanargmin(log_p))] if not np.isnan(log_p).all() else self.rows[place]
         )
 
-    def best(self, allowed: Bools) -> int | None:
-        """Return the place of the least probable group that is allowed; of equals the first."""
-        log_p = np.where(allowed & (self.tests.dimension > 0), self.tests.log_probability, math.inf)
-        log_p = np.where(np.isnan(log_p), math.inf, log_p)
-        least = log_p.min(initial=math.inf)
-        if math.isinf(least) and least > 0:
-            return None
-        return int(np.flatnonzero(log_p <= least + SAME * max(abs(least), 1.0))[0])
+    def choose(
+        self, blocks: Indices, places: Indices, rows: Indices, allowed: Bools, log_limit: Floats
+    ) -> list[Chosen]:
+        """Take rows of one group of each of some blocks out, and test the others without them.
 
-    def part(self, place: int, parts: Sequence[Sequence[int]] | None) -> Indices:
-        """Return the rows of a group that are least probable: one of its parts, or all."""
-        rows = self.groups[place]
-        if parts is None:
-            return rows
-        choices = [np.asarray(part, dtype=np.int64) for part in parts]
-        tests = [self._of(rows[part], place) for part in choices]
-        log_p = [float(test.log_probability[0]) for test in tests]
-        return rows[choices[int(np.nanargmin(log_p))]] if not np.isnan(log_p).all() else rows
-
-    def _of(self, rows: Indices, place: int) -> GroupTests:
-        unit = self.unit
-        return group_tests(
-            self.r[np.ix_(rows, rows)][np.newaxis],
-            self.v[rows][np.newaxis] / math.sqrt(self.scales[place]),
-            unit.weighted_sum_of_squares,
-            unit.degrees_of_freedom,
-            known=unit.known,
+        Rows are padded by -1.
+        """
+        test = self._of(blocks, rows, places)
+        scale = self.scales[blocks, places]
+        before = (
+            self.log_probability[blocks].copy(),
+            self.statistic[blocks].copy(),
+            self.dimension[blocks].copy(),
         )
+        units = [self.units[block] for block in blocks]
+        statistic = scale * test.statistic
+        for block, unit, t, m in zip(blocks, units, statistic, test.dimension, strict=True):
+            self.units[block] = unit.without(float(t), int(m))
+        self._condition(blocks, rows)
+        self._test(blocks)
+        limit = np.asarray(log_limit)[:, np.newaxis]
+        with np.errstate(invalid="ignore"):
+            still = (self.dimension[blocks] > 0) & (self.log_probability[blocks] < limit)
+            fallen = allowed[blocks] & (before[0] < limit) & ~still
+        fallen[np.arange(len(blocks)), places] = False
+        found = []
+        for i, unit in enumerate(units):
+            own = (float(test.statistic[i]), int(test.dimension[i]))
+            rivals = [
+                (other, float(before[1][i, other]), int(before[2][i, other]))
+                for other in np.flatnonzero(fallen[i]).tolist()
+            ]
+            near = [(*rival, unit.odds(own, rival[1:])) for rival in rivals]
+            there = rows[i] >= 0
+            found.append(
+                Chosen(
+                    group=int(places[i]),
+                    rows=rows[i][there],
+                    statistic=float(statistic[i]),
+                    dimension=own[1],
+                    log_probability=float(test.log_probability[i]),
+                    fisher=unit.fisher(float(statistic[i]), own[1]),
+                    error=test.error[i][there] * math.sqrt(scale[i]),
+                    cofactors=test.cofactors[i][np.ix_(there, there)],
+                    rivals=tuple(sorted((own for own in near if own[3] < RIVAL), key=lambda own: own[3])),
+                )
+            )
+        return found
 
-    def choose(self, place: int, rows: Indices, allowed: Bools, log_limit: float) -> Chosen:
-        """Take rows of a group out, and test the others without them."""
-        test, before, unit = self._of(rows, place), self.tests, self.unit
-        scale = float(self.scales[place])
-        statistic, dimension = scale * float(test.statistic[0]), int(test.dimension[0])
-        self._condition(rows)
-        self.unit = unit.without(statistic, dimension)
-        self.tests = after = self._tested()
-        significant = allowed & (before.log_probability < log_limit)
-        still = (after.dimension > 0) & (after.log_probability < log_limit)
-        rivals = [
-            (other, float(t), int(m), unit.odds((statistic / scale, dimension), (float(t), int(m))))
-            for other in np.flatnonzero(significant & ~still).tolist()
-            if other != place
-            for t, m in [(before.statistic[other], before.dimension[other])]
-        ]
-        near = sorted((rival for rival in rivals if rival[3] < RIVAL), key=lambda rival: rival[3])
-        return Chosen(
-            group=place,
-            rows=rows,
-            statistic=statistic,
-            dimension=dimension,
-            log_probability=float(test.log_probability[0]),
-            fisher=unit.fisher(statistic, dimension),
-            error=test.error[0] * math.sqrt(scale),
-            cofactors=test.cofactors[0],
-            rivals=tuple(near),
-        )
-
-    def _condition(self, rows: Indices) -> None:
-        values, vectors = np.linalg.eigh(self.r[np.ix_(rows, rows)])
+    def _condition(self, blocks: Indices, rows: Indices) -> None:
+        there = rows >= 0
+        places = np.where(there, rows, 0)
+        at = blocks[:, np.newaxis]
+        own = self.r[at[:, :, np.newaxis], places[:, :, np.newaxis], places[:, np.newaxis, :]]
+        own = np.where(there[:, :, np.newaxis] & there[:, np.newaxis, :], own, 0.0)
+        values, vectors = np.linalg.eigh(own)
         seen = values > INVISIBLE
-        half = vectors[:, seen] / np.sqrt(values[seen])
-        along = self.r[:, rows] @ half
-        self.v -= along @ (half.T @ self.v[rows])
-        self.r -= along @ along.T
-        self.v[rows] = 0.0
+        half = vectors * np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[:, np.newaxis, :]
+        columns = np.take_along_axis(self.r[blocks], places[:, np.newaxis, :], axis=2)
+        along = np.where(there[:, np.newaxis, :], columns, 0.0) @ half
+        v = np.where(there, self.v[at, places], 0.0)
+        self.v[blocks] -= (along @ (np.swapaxes(half, 1, 2) @ v[:, :, np.newaxis]))[:, :, 0]
+        self.r[blocks] -= along @ np.swapaxes(along, 1, 2)
+        flat = np.broadcast_to(at, places.shape)[there]
+        self.v[flat, places[there]] = 0.0
 
 
 RIVAL = 20.0

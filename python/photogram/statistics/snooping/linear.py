@@ -77,6 +77,7 @@ class LinearTrial:
             name=lambda group: f"observation {called[group]}",
             row_name=lambda row: str(row - int(starts[np.searchsorted(starts, row, "right") - 1])),
             unit=lambda row: "",
+            photo_name=str,
         )
         self.whole = True
         self.unknowns: Floats = np.zeros(a.shape[1])
@@ -154,15 +155,16 @@ class LinearTrial:
     def resist(self, scale: float) -> Floats:
         """Reweight by Huber's loss, then by Cauchy's (Holland and Welsch 1977)."""
         weights = self._in.astype(np.float64)
+        residual = np.zeros(len(weights))
         for limit in (1.345, 2.385):
             for _ in range(10):
                 root = np.sqrt(weights)
                 x = np.linalg.lstsq(self._a * root[:, np.newaxis], self._l * root, rcond=None)[0]
-                size = np.maximum(np.abs(self._l - self._a @ x) / (limit * scale), 1e-12)
+                residual = np.where(self._in, np.abs(self._l - self._a @ x), 0.0)
+                size = np.maximum(residual / (limit * scale), 1e-12)
                 shrunk = np.minimum(1.0, 1.0 / size) if limit < 2 else 1.0 / (1.0 + size**2)
                 weights = np.where(self._in, shrunk, 0.0)
-        starts = self.suspects.row_starts
-        return np.asarray(np.minimum.reduceat(weights, starts[:-1]))
+        return np.asarray(np.sqrt(np.add.reduceat(residual**2, self.suspects.row_starts[:-1])))
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
         """Nothing goes with a group."""

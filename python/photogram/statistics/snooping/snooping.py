@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.statistics.distributions import LEVEL, log_chi_square, log_fisher
 from photogram.statistics.limits import global_test
 from photogram.statistics.reliability import TESTABLE
@@ -18,6 +18,7 @@ from photogram.statistics.snooping.log import Removal, Rival, Round
 from photogram.statistics.snooping.suspects import (
     LostSupportError,
     Out,
+    Prediction,
     Standing,
     Suspects,
     Tests,
@@ -35,8 +36,15 @@ ENOUGH = 20
 MANY = 0.05
 """Share of the images beyond `FAR` robust standard deviations from which on a robust start is needed."""
 FAR = 5.0
-CANDIDATE = 0.25
-"""A weight that a robust adjustment has lowered below this is taken for that of a gross error."""
+CANDIDATE = 4.4
+"""Robust standard deviations from which on a residual is put aside: Cauchy's loss leaves it a quarter of its
+weight."""
+MEDIAN_OF_TWO = 1.1774100225154747
+"""Of the length of a vector of two standard normal variables."""
+SCALES = 5
+"""Robust adjustments at the most until their scale stands."""
+LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
+"""Images of a photo that are out, by number and share, from which on the whole photo goes."""
 RESCUES = 5
 """Attempts to leave a round with everything determined."""
 
@@ -118,21 +126,28 @@ class _Snooping:
         self.remarks: list[str] = []
         self.returns: set[int] = set()
         self.kept: set[int] = set()
+        self.predicted: dict[int, tuple[Prediction, float]] = {}
         self.before = self.standing = trial.adjust(self.out)
         self.tests = trial.tests()
-        testable = self.tests.active & (self.tests.rank > 0) & (self.tests.least > TESTABLE)
-        self.level = Level(settings.level, int(testable.sum()), settings.fdr)
-        self.factors, self.scales = self._scales()
+        self.level = Level(settings.level, int(self._testable().sum()), settings.fdr)
+        self.factors: dict[str, float] = {}
+        self.scales: Floats = np.ones(len(suspects))
+        self.images = frozenset(np.flatnonzero(suspects.kinds == 0).tolist())
 
     def run(self) -> Outcome:
         if self._needs_robust_start():
             self._start_robustly()
+        else:
+            self.factors, self.scales = self._scales()
         for number in range(1, self.settings.max_rounds + 1):
             removed, returned = self._round(number)
             if not removed and not returned:
                 break
         else:
             self.remarks.append(f"snooping has not ended after {self.settings.max_rounds} rounds")
+        out = [place for place, each in enumerate(self.log) if each.is_out]
+        for place in out:
+            self.log[place] = self._with_prediction(place)
         return Outcome(
             log=self.log,
             rounds=self.rounds,
@@ -159,6 +174,7 @@ class _Snooping:
         remarks: list[str] = []
         removed = self._take_out(choices, number, remarks)
         returned = self._take_back(number) if any(each.is_out for each in self.log) else []
+        removed += self._take_photos_out(number)
         self.rounds.append(
             Round(
                 number=number,
@@ -175,9 +191,15 @@ class _Snooping:
         return removed, returned
 
     def _allowed(self) -> Bools:
-        allowed = self.suspects.removable & (self.tests.least > TESTABLE)
+        allowed = self.suspects.removable & self._testable()
         allowed[list(self.kept)] = False
         return allowed
+
+    def _testable(self) -> Bools:
+        """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
+        redundancy = np.nan_to_num(self.tests.redundancy)
+        largest = np.maximum.reduceat(redundancy, self.suspects.row_starts[:-1])
+        return np.asarray(self.tests.active & (self.tests.rank > 0) & (largest > TESTABLE))
 
     def _scales(self) -> tuple[dict[str, float], Floats]:
         """Return robust factors k by kind where standard deviations are too optimistic, and k^2 by group."""
@@ -217,17 +239,42 @@ class _Snooping:
             return self.settings.robust
         if self.standing.status != "converged":
             return True
-        images = np.asarray(self.suspects.kinds == 0)
-        values = self._values(images)
-        factor = max(_factor(values), 1.0) if values.size else 1.0
-        return bool(values.size) and float(np.mean(values > FAR * factor)) > MANY
+        everything = self._values(np.ones(len(self.suspects), dtype=bool))
+        if len(everything) < ENOUGH:
+            return False
+        factor = max(_factor(everything), 1.0)
+        images = self._values(np.asarray(self.suspects.kinds == 0))
+        many = bool(images.size) and float(np.mean(images > FAR * factor)) > MANY
+        return many or (self.settings.known and factor > OPTIMISTIC)
+
+    def _robust_sizes(self) -> tuple[Floats, float]:
+        """Return the sizes of residuals in a robust adjustment, and the factor of its standard deviations.
+
+        The median of all is lifted by many gross errors, whose effects spread: the factor is found anew from
+        residuals of the robust adjustment, until it stands.
+        """
+        active = self.tests.active & (self.suspects.kinds == 0)
+        rows = np.repeat(active, np.diff(self.suspects.row_starts))
+        expected = MEDIAN_OF_TWO * math.sqrt(float(np.mean(self.tests.redundancy[rows])))
+        scale = max(_factor(self._values(active)), 1.0)
+        for _ in range(SCALES):
+            sizes = self.trial.resist(scale)
+            found = max(float(np.median(sizes[active])) / expected, 1.0)
+            if found > 0.8 * scale:
+                break
+            scale = found
+        return sizes, scale
 
     def _start_robustly(self) -> None:
         """Take out what robust weights nearly vanish for; real tests decide on their return."""
         suspects = self.suspects
-        images = self._values(np.asarray(suspects.kinds == 0))
-        weights = self.trial.resist(max(_factor(images), 1.0) if images.size else 1.0)
-        candidates = np.flatnonzero((weights < CANDIDATE) & suspects.removable & self.tests.active)
+        try:
+            sizes, scale = self._robust_sizes()
+        except LostSupportError:
+            self.factors, self.scales = self._scales()
+            return
+        far = sizes > CANDIDATE * scale
+        candidates = np.flatnonzero(far & suspects.removable & self.tests.active)
         first, standing = self.tests, self.standing
         known = self._unit()
         entries = []
@@ -251,6 +298,9 @@ class _Snooping:
                 )
             )
         removed = self._apply(entries, [])
+        if not removed:
+            self._adjust(self.out)
+        self.factors, self.scales = self._scales()
         self.remarks.append(
             f"many observations disagree: a robust adjustment (Huber, then Cauchy) put {len(removed)}"
             " groups aside; tests against the others decided which stay out"
@@ -366,6 +416,60 @@ class _Snooping:
             self._keep(each)
         return []
 
+    def _take_photos_out(self, number: int) -> list[int]:
+        """Take out as a whole the photos most of whose images are out, each by itself."""
+        suspects = self.suspects
+        single = [self.log[place] for place in range(len(self.log)) if self.log[place].is_out]
+        photos = [int(suspects.photos[each.group]) for each in single if each.group in self.images]
+        counts = np.bincount([photo for photo in photos if photo >= 0])
+        added = []
+        for photo in np.flatnonzero(counts >= LEAST_OF_PHOTO).tolist():
+            own = suspects.on_photo(photo)
+            images = [group for group in own.tolist() if group in self.images]
+            if photo in self.out.photos or counts[photo] <= MOST_OF_PHOTO * len(images):
+                continue
+            out, before = self.out.copy(), self.standing
+            rows = np.concatenate([suspects.rows(group) for group in own.tolist()])
+            out.rows[rows] = True
+            out.photos.add(photo)
+            consequences: list[str] = []
+            for group in images:
+                for point in sorted(self.trial.consequences(out, group)[0] - out.points):
+                    out.points.add(point)
+                    consequences += self._left(out, point)
+            try:
+                self._adjust(out)
+            except LostSupportError:
+                continue
+            omega = before.weighted_sum_of_squares - self.standing.weighted_sum_of_squares
+            freedom = before.degrees_of_freedom - self.standing.degrees_of_freedom
+            self.log.append(
+                Removal(
+                    round=number,
+                    group=images[0],
+                    kind="photo",
+                    name=f"all of {suspects.photo_name(photo)}",
+                    rows=(),
+                    components=(),
+                    units=(),
+                    dimension=freedom,
+                    first_statistic=omega,
+                    statistic=omega,
+                    fisher=math.nan,
+                    log_probability=float(log_chi_square(max(omega, 0.0), max(freedom, 1))),
+                    limit=self.level.limit(0),
+                    error=(),
+                    error_sd=(),
+                    redundancy=math.nan,
+                    consequences=(
+                        f"{counts[photo]} of its {len(images)} images had gone one by one",
+                        *consequences,
+                    ),
+                )
+            )
+            added.append(len(self.log) - 1)
+        return added
+
     def _forced(self, entry: Removal, points: tuple[int, ...]) -> Removal:
         own = int(self.suspects.points[entry.group])
         if own not in points:
@@ -399,8 +503,7 @@ class _Snooping:
 
     def _left(self, out: Out, point: int) -> Iterator[str]:
         """Put everything of a point out, and say so."""
-        groups = np.flatnonzero(self.suspects.points == point).tolist()
-        for group in groups:
+        for group in self.suspects.on_point(point).tolist():
             rows = self.suspects.rows(group)
             if not out.rows[rows].all():
                 out.rows[rows] = True
@@ -413,22 +516,21 @@ class _Snooping:
 
     def _take_back(self, number: int) -> list[int]:
         """Test what is out against the rest, and take back what agrees: the best, or all that are apart."""
-        places = [place for place, each in enumerate(self.log) if each.is_out]
+        places = [place for place, each in enumerate(self.log) if each.is_out and each.rows]
         predictions = self.trial.predictions([self.log[place].group for place in places])
-        agreeing = []
-        for place, prediction in zip(places, predictions, strict=True):
-            if prediction is None:
-                continue
-            entry = self.log[place]
-            log_p = self._log_probability(prediction.statistic, len(prediction.rows), entry.group)
-            self.log[place] = entry.with_(
-                prediction=prediction.statistic,
-                prediction_log_probability=log_p,
-                prediction_error=prediction.error,
-            )
-            if log_p >= math.log(self.level.limit(0)) and entry.group not in self.returns:
-                agreeing.append((-log_p, place))
-        agreeing.sort()
+        known = [(place, own) for place, own in zip(places, predictions, strict=True) if own is not None]
+        log_p = self._log_probability(
+            np.array([own.statistic for _, own in known]),
+            np.array([len(own.rows) for _, own in known]),
+            np.array([self.log[place].group for place, _ in known], dtype=np.int64),
+        ).tolist()
+        self.predicted = {place: (own, value) for (place, own), value in zip(known, log_p, strict=True)}
+        limit = math.log(self.level.limit(0))
+        agreeing = sorted(
+            (-value, place)
+            for place, (_, value) in self.predicted.items()
+            if value >= limit and self.log[place].group not in self.returns
+        )
         returning = self._apart([place for _, place in agreeing])
         if not returning:
             return []
@@ -441,7 +543,7 @@ class _Snooping:
             return []
         for place in returning:
             self.returns.add(self.log[place].group)
-            self.log[place] = self.log[place].with_(returned=number)
+            self.log[place] = self._with_prediction(place).with_(returned=number)
         if not self.trial.whole:
             return returning
         return returning + self._take_back(number)
@@ -461,15 +563,26 @@ class _Snooping:
                 apart.append(place)
         return apart
 
-    def _log_probability(self, statistic: float, dimension: int, group: int) -> float:
-        """Return the log-probability of what is out as an observation of the network without it."""
+    def _with_prediction(self, place: int) -> Removal:
+        """Return an entry of the log with what the rest says of it."""
+        if place not in self.predicted:
+            return self.log[place]
+        prediction, log_p = self.predicted[place]
+        return self.log[place].with_(
+            prediction=prediction.statistic,
+            prediction_log_probability=log_p,
+            prediction_error=prediction.error,
+        )
+
+    def _log_probability(self, statistic: Floats, dimension: Indices, groups: Indices) -> Floats:
+        """Return log-probabilities of what is out as observations of the network without it."""
         if self.settings.known:
-            return float(log_chi_square(statistic / self.scales[group], dimension))
+            return log_chi_square(statistic / self.scales[groups], dimension)
         f = self.standing.degrees_of_freedom
         if not (f > 0 and self.standing.weighted_sum_of_squares > 0):
-            return 0.0
+            return np.zeros(len(statistic))
         s2 = self.standing.weighted_sum_of_squares / f
-        return float(log_fisher(statistic / dimension / s2, dimension, f))
+        return log_fisher(statistic / dimension / s2, dimension, f)
 
 
 _NOT_DETERMINED = "its point is no longer determined and has left the network"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -37,6 +38,8 @@ class Suspects:
         the group goes as a whole.
     name, row_name, unit
         What a group is called, what one of its rows is, and the unit of that row (M).
+    photo_name
+        What a photo is called.
     """
 
     row_starts: Indices
@@ -50,6 +53,7 @@ class Suspects:
     name: Callable[[int], str]
     row_name: Callable[[int], str]
     unit: Callable[[int], str]
+    photo_name: Callable[[int], str]
 
     def __len__(self) -> int:
         return len(self.kinds)
@@ -61,6 +65,30 @@ class Suspects:
     def rows(self, group: int) -> Indices:
         """Return the rows of a group."""
         return np.arange(self.row_starts[group], self.row_starts[group + 1])
+
+    @cached_property
+    def _by_point(self) -> tuple[Indices, Indices]:
+        order = np.argsort(self.points, kind="stable")
+        return order, self.points[order]
+
+    @cached_property
+    def _by_photo(self) -> tuple[Indices, Indices]:
+        order = np.argsort(self.photos, kind="stable")
+        return order, self.photos[order]
+
+    def on_point(self, point: int) -> Indices:
+        """Return the groups of a point, in their order."""
+        return _at(self._by_point, point)
+
+    def on_photo(self, photo: int) -> Indices:
+        """Return the groups of a photo, in their order."""
+        return _at(self._by_photo, photo)
+
+
+def _at(by: tuple[Indices, Indices], value: int) -> Indices:
+    order, sorted_values = by
+    first, last = np.searchsorted(sorted_values, [value, value + 1])
+    return np.asarray(order[first:last])
 
 
 @dataclass(eq=False)
@@ -204,7 +232,10 @@ class Trial(Protocol):
         ...
 
     def resist(self, scale: float) -> Floats:
-        """Adjust robustly, errors beyond `scale` standard deviations losing weight: (G,) what is left."""
+        """Adjust robustly, errors beyond some `scale` standard deviations losing weight.
+
+        Returns (G,) the lengths of the residuals of unit weight; zero for what no loss is applied to.
+        """
         ...
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:

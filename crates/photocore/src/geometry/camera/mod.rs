@@ -12,6 +12,7 @@ use super::Vector3;
 
 pub use brown::{BrownCorrection, BrownTerms};
 pub use inverse::{Matrix2, RadialLimit};
+pub use measured::Measured;
 pub use orthogonal::{Ebner12, Gruen44, Orthogonal, OrthogonalSet};
 
 /// How a camera maps u, a point in the photo's axes (it looks along -z), to image coordinates.
@@ -219,6 +220,9 @@ cameras! { $
     radial::Radial;
     equirectangular::Equirectangular;
     brown_forward::BrownForward;
+    plate::Plate;
+    on_comparator::OnComparator;
+    opencv_tilted::OpencvTilted;
     [brown] {
         Brown;
         BrownAffinityAfter;
@@ -226,6 +230,13 @@ cameras! { $
     [orthogonal] {
         Ebner;
         Gruen;
+    }
+    [measured] {
+        BrownMeasured;
+        BrownAffinityAfterMeasured;
+        EbnerMeasured;
+        GruenMeasured;
+        OnComparatorMeasured;
     }
     [vision] {
         SimplePinhole;
@@ -250,6 +261,8 @@ cameras! { $
         Eucm;
         AgisoftFrame;
         AgisoftFisheye;
+        AgisoftFrameP4;
+        AgisoftFisheyeP4;
     }
 }
 

@@ -34,6 +34,8 @@ impl Terms {
     /// All of them.
     pub const ALL: Self = Self { powers: ALL_POWERS, prism: true };
 }
+/// How tangential terms grow beyond their own powers: they are multiplied by 1 + p3 q + p4 q^2 (Brown 1966).
+pub type Profile = [f64; 2];
 
 /// Where a place goes, with its partials by the place, and what those by the terms need.
 #[derive(Debug, Clone, Copy)]
@@ -48,6 +50,10 @@ pub struct Bent {
     reciprocal: f64,
     /// s.
     factor: f64,
+    /// 1 + p3 q + p4 q^2.
+    profile: f64,
+    /// What the tangential terms would add without it; zero where there is none.
+    decentring: [f64; 2],
 }
 
 impl RadialTangential {
@@ -84,7 +90,30 @@ impl RadialTangential {
                 by_place[k][1] += along * b;
             }
         }
-        Bent { xy, by_place, place, square, reciprocal, factor }
+        Bent { xy, by_place, place, square, reciprocal, factor, profile: 1.0, decentring: [0.0; 2] }
+    }
+
+    /// Where a place goes with tangential terms that have a profile.
+    #[inline(always)]
+    pub fn bend_profiled(&self, place: [f64; 2], [p3, p4]: Profile, terms: Terms) -> Bent {
+        let ([a, b], [t1, t2], bent) = (place, self.tangential, self.bend_by(place, terms));
+        let [by_t1, by_t2] = bent.by_tangential();
+        let decentring = [0, 1].map(|k| t1 * by_t1[k] + t2 * by_t2[k]);
+        let excess = bent.square * (p3 + p4 * bent.square);
+        let slope = 2.0 * (p3 + 2.0 * p4 * bent.square);
+        let cross = excess * 2.0 * (t1 * b + t2 * a);
+        let own = [
+            [excess * (6.0 * t1 * a + 2.0 * t2 * b), cross],
+            [cross, excess * (6.0 * t2 * b + 2.0 * t1 * a)],
+        ];
+        Bent {
+            xy: [0, 1].map(|k| bent.xy[k] + excess * decentring[k]),
+            by_place: [0, 1]
+                .map(|i| [0, 1].map(|k| bent.by_place[i][k] + own[i][k] + slope * decentring[i] * place[k])),
+            profile: 1.0 + excess,
+            decentring,
+            ..bent
+        }
     }
 }
 
@@ -106,7 +135,15 @@ impl Bent {
     #[inline(always)]
     pub fn by_tangential(&self) -> [[f64; 2]; 2] {
         let ([a, b], q) = (self.place, self.square);
-        [[q + 2.0 * a * a, 2.0 * a * b], [2.0 * a * b, q + 2.0 * b * b]]
+        let whole = [[q + 2.0 * a * a, 2.0 * a * b], [2.0 * a * b, q + 2.0 * b * b]];
+        whole.map(|by| by.map(|value| self.profile * value))
+    }
+
+    /// By p3, p4 of the profile.
+    #[inline(always)]
+    pub fn by_profile(&self) -> [[f64; 2]; 2] {
+        let q = self.square;
+        [q, q * q].map(|power| self.decentring.map(|value| power * value))
     }
 
     /// By s1, s2, which only x has, as s3, s4 are those of y.

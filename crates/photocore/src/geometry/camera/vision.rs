@@ -8,7 +8,7 @@ use super::projections::{
     Central, DivisionByRadius, Equidistant, Equisolid as EquisolidRays, ExtendedUnified, FieldOfView,
     RayProjection, Seen, Stereographic as StereographicRays,
 };
-use super::radial_tangential::{Bent, RadialTangential, Terms};
+use super::radial_tangential::{Bent, Profile, RadialTangential, Terms};
 use super::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
@@ -38,6 +38,17 @@ enum Role {
     T(usize),
     /// s1 and s2 of x, s3 and s4 of y.
     S(usize),
+    /// p3 or p4 of the tangential profile.
+    P(usize),
+}
+
+/// What a lens does to a place: all terms at once, radial terms first and the others on what these have bent, or all at once with a
+/// profile of the tangential ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Action {
+    Whole,
+    Staged,
+    Profiled,
 }
 
 impl Role {
@@ -46,7 +57,9 @@ impl Role {
             Self::F | Self::Fx | Self::Fy | Self::Cx | Self::Cy | Self::W | Self::H | Self::B1 | Self::B2 => {
                 Unit::Image
             }
-            Self::Skew | Self::Own(_) | Self::N(_) | Self::D(_) | Self::T(_) | Self::S(_) => Unit::One,
+            Self::Skew | Self::Own(_) | Self::N(_) | Self::D(_) | Self::T(_) | Self::S(_) | Self::P(_) => {
+                Unit::One
+            }
         }
     }
 }
@@ -76,6 +89,7 @@ struct Parts {
     origin: [f64; 2],
     own: [f64; 2],
     lens: RadialTangential,
+    profile: Profile,
 }
 
 impl Parts {
@@ -87,7 +101,7 @@ impl Parts {
             prism: [[0.0; 2]; 2],
         };
         let (origin, own) = ([0.0; 2], [0.0; 2]);
-        let mut parts = Self { focal: [0.0; 2], shear: 0.0, skew: 0.0, origin, own, lens };
+        let mut parts = Self { focal: [0.0; 2], shear: 0.0, skew: 0.0, origin, own, lens, profile: [0.0; 2] };
         for (role, &value) in roles.iter().zip(values) {
             match *role {
                 Role::F => parts.focal = parts.focal.map(|focal| focal + value),
@@ -104,6 +118,7 @@ impl Parts {
                 Role::D(power) => parts.lens.radial.denominator[power] = value,
                 Role::T(k) => parts.lens.tangential[k] = value,
                 Role::S(k) => parts.lens.prism[k / 2][k % 2] = value,
+                Role::P(k) => parts.profile[k] = value,
             }
         }
         parts.shear += parts.skew * parts.focal[0];
@@ -112,9 +127,12 @@ impl Parts {
 
     /// The place that a lens bends, and what it is then.
     #[inline(always)]
-    fn bend(&self, ab: [f64; 2], staged: bool, terms: Terms) -> Bending {
-        if !staged {
-            let bent = self.lens.bend_by(ab, terms);
+    fn bend(&self, ab: [f64; 2], action: Action, terms: Terms) -> Bending {
+        if action != Action::Staged {
+            let bent = match action {
+                Action::Profiled => self.lens.bend_profiled(ab, self.profile, terms),
+                _ => self.lens.bend_by(ab, terms),
+            };
             return Bending {
                 first: bent,
                 last: bent,
@@ -167,6 +185,7 @@ impl Parts {
                 let own = bending.last.by_prism()[k % 2];
                 self.moved(if k < 2 { [own, 0.0] } else { [0.0, own] })
             }
+            Role::P(k) => self.moved(bending.last.by_profile()[k]),
         }
     }
 }
@@ -180,10 +199,10 @@ struct Bending {
     by_place: Matrix2,
 }
 
-/// A model as a table; the projection, whether tangential and prism terms act on what the radial ones have bent, and the roles.
+/// A model as a table: the projection, how its terms act, and the roles.
 trait Table<const N: usize>: Copy {
     type Projection: RayProjection;
-    const STAGED: bool;
+    const ACTION: Action;
     const ROLES: [Role; N];
     const TERMS: Terms = terms(&Self::ROLES);
 
@@ -198,14 +217,14 @@ trait Table<const N: usize>: Copy {
     fn place(&self, u: &Vector3) -> [f64; 2] {
         let parts = self.parts();
         let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
-        parts.image(parts.bend(seen.ab, Self::STAGED, Self::TERMS).last.xy)
+        parts.image(parts.bend(seen.ab, Self::ACTION, Self::TERMS).last.xy)
     }
 
     #[inline(always)]
     fn with_partials(&self, u: &Vector3) -> Image<[f64; N]> {
         let parts = self.parts();
         let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
-        let bending = parts.bend(seen.ab, Self::STAGED, Self::TERMS);
+        let bending = parts.bend(seen.ab, Self::ACTION, Self::TERMS);
         let by_ray = [0, 1, 2]
             .map(|k| parts.moved(super::inverse::times(&bending.by_place, seen.by_ray.map(|row| row[k]))));
         let by_u = |row: usize| Vector3::new(by_ray[0][row], -by_ray[1][row], -by_ray[2][row]);
@@ -219,7 +238,7 @@ trait Table<const N: usize>: Copy {
         let b = (y - parts.origin[1]) / parts.focal[1];
         let a = (x - parts.origin[0] - parts.shear * b) / parts.focal[0];
         let ab = from_radial(&parts.lens.radial, [a, b], |place| {
-            let bending = parts.bend(place, Self::STAGED, Self::TERMS);
+            let bending = parts.bend(place, Self::ACTION, Self::TERMS);
             (bending.last.xy, bending.by_place)
         })?;
         let [x, y, z] = Self::Projection::ray(ab, parts.own)?;
@@ -248,7 +267,7 @@ trait Table<const N: usize>: Copy {
 /// Declares cameras: name and number of parameters, what files call it, projection, formula of the lens, parameters with their roles. The
 /// last `constants` of them are never unknowns.
 macro_rules! cameras_of_vision {
-    ($($(#[$doc:meta])* $name:ident[$count:literal] = $said:literal, $projection:ident, $staged:literal, $constants:literal,
+    ($($(#[$doc:meta])* $name:ident[$count:literal] = $said:literal, $projection:ident, $action:ident, $constants:literal,
        $formula:expr, [$($parameter:literal: $role:expr),* $(,)?];)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq)]
@@ -259,7 +278,7 @@ macro_rules! cameras_of_vision {
 
         impl Table<$count> for $name {
             type Projection = $projection;
-            const STAGED: bool = $staged;
+            const ACTION: Action = Action::$action;
             const ROLES: [Role; $count] = [$($role),*];
 
             #[inline(always)]
@@ -343,66 +362,66 @@ use Role::*;
 
 cameras_of_vision! {
     /// SIMPLE_PINHOLE of COLMAP: a central perspective.
-    SimplePinhole[3] = "simple_pinhole", Central, false, 0,
+    SimplePinhole[3] = "simple_pinhole", Central, Whole, 0,
         central!("(f a + cx, f b + cy)", "no lens"),
         ["f": F, "cx": Cx, "cy": Cy];
     /// PINHOLE of COLMAP: pixels that are not square.
-    Pinhole[4] = "pinhole", Central, false, 0,
+    Pinhole[4] = "pinhole", Central, Whole, 0,
         central!("(fx a + cx, fy b + cy)", "no lens"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy];
     /// SIMPLE_RADIAL of COLMAP: one radial term.
-    SimpleRadial[4] = "simple_radial", Central, false, 0,
+    SimpleRadial[4] = "simple_radial", Central, Whole, 0,
         central!("(f A + cx, f B + cy)", "(A, B) = (a, b) (1 + k r^2)"),
         ["f": F, "cx": Cx, "cy": Cy, "k": N(1)];
     /// OPENCV of COLMAP: two radial and two tangential terms; p1, p2 are P2, P1 of photogrammetry.
-    Opencv[8] = "opencv", Central, false, 0,
+    Opencv[8] = "opencv", Central, Whole, 0,
         central!("(fx A + cx, fy B + cy)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4) + (2 p1 a b + p2 (r^2 + 2 a^2), p1 (r^2 + 2 b^2) + 2 p2 a b)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0)];
     /// FULL_OPENCV of COLMAP: a rational radial factor; k3 stands behind p2.
-    FullOpencv[12] = "full_opencv", Central, false, 0,
+    FullOpencv[12] = "full_opencv", Central, Whole, 0,
         central!("(fx A + cx, fy B + cy)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + (2 p1 a b + p2 (r^2 + 2 a^2), \
              p1 (r^2 + 2 b^2) + 2 p2 a b)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0), "k3": N(3), "k4": D(1), "k5": D(2),
          "k6": D(3)];
     /// The camera of OpenCV itself: that of [`FullOpencv`] with a thin prism; pixel centres are whole numbers.
-    OpencvPinhole[16] = "opencv_pinhole", Central, false, 0,
+    OpencvPinhole[16] = "opencv_pinhole", Central, Whole, 0,
         central!("(fx A + cx, fy B + cy)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + (2 p1 a b + p2 (r^2 + 2 a^2), \
              p1 (r^2 + 2 b^2) + 2 p2 a b) + (s1 r^2 + s2 r^4, s3 r^2 + s4 r^4)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0), "k3": N(3), "k4": D(1), "k5": D(2),
          "k6": D(3), "s1": S(0), "s2": S(1), "s3": S(2), "s4": S(3)];
     /// FOV of COLMAP (Devernay and Faugeras 2001). At omega = 0 nothing depends on omega to first order: do not start there.
-    Fov[5] = "fov", FieldOfView, false, 0,
+    Fov[5] = "fov", FieldOfView, Whole, 0,
         central!("(fx A + cx, fy B + cy)", "(A, B) = (a, b) atan(2 r tan(omega / 2)) / (r omega)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "omega": Own(0)];
     /// SIMPLE_FISHEYE of COLMAP: equidistant.
-    SimpleFisheye[3] = "simple_fisheye", Equidistant, false, 0,
+    SimpleFisheye[3] = "simple_fisheye", Equidistant, Whole, 0,
         fisheye!("(f a + cx, f b + cy)", "no lens"),
         ["f": F, "cx": Cx, "cy": Cy];
     /// FISHEYE of COLMAP: equidistant.
-    Fisheye[4] = "fisheye", Equidistant, false, 0,
+    Fisheye[4] = "fisheye", Equidistant, Whole, 0,
         fisheye!("(fx a + cx, fy b + cy)", "no lens"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy];
     /// SIMPLE_RADIAL_FISHEYE of COLMAP: one radial term in theta.
-    SimpleRadialFisheye[4] = "simple_radial_fisheye", Equidistant, false, 0,
+    SimpleRadialFisheye[4] = "simple_radial_fisheye", Equidistant, Whole, 0,
         fisheye!("(f A + cx, f B + cy)", "(A, B) = (a, b) (1 + k r^2)"),
         ["f": F, "cx": Cx, "cy": Cy, "k": N(1)];
     /// RADIAL_FISHEYE of COLMAP: two radial terms in theta.
-    RadialFisheye[5] = "radial_fisheye", Equidistant, false, 0,
+    RadialFisheye[5] = "radial_fisheye", Equidistant, Whole, 0,
         fisheye!("(f A + cx, f B + cy)", "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4)"),
         ["f": F, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2)];
     /// OPENCV_FISHEYE of COLMAP (Kannala and Brandt 2006): four radial terms in theta.
-    OpencvFisheye[8] = "opencv_fisheye", Equidistant, false, 0,
+    OpencvFisheye[8] = "opencv_fisheye", Equidistant, Whole, 0,
         fisheye!("(fx A + cx, fy B + cy)", "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4)];
     /// The fisheye of OpenCV itself: that of [`OpencvFisheye`] with a skew; pixel centres are whole numbers.
-    OpencvFisheyeSkew[9] = "opencv_fisheye_skew", Equidistant, false, 0,
+    OpencvFisheyeSkew[9] = "opencv_fisheye_skew", Equidistant, Whole, 0,
         fisheye!("(fx (A + skew B) + cx, fy B + cy)", "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "skew": Skew, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4)];
     /// THIN_PRISM_FISHEYE of COLMAP; k3 stands behind p2.
-    ThinPrismFisheye[12] = "thin_prism_fisheye", Equidistant, false, 0,
+    ThinPrismFisheye[12] = "thin_prism_fisheye", Equidistant, Whole, 0,
         fisheye!("(fx A + cx, fy B + cy)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (2 p1 a b + p2 (r^2 + 2 a^2), p1 (r^2 + 2 b^2) + 2 p2 a b) + \
              (sx1, sy1) r^2"),
@@ -410,44 +429,58 @@ cameras_of_vision! {
          "sy1": S(2)];
     /// RAD_TAN_THIN_PRISM_FISHEYE of COLMAP: tangential and prism terms act on what the radial ones have bent; p0, p1 are P1, P2 of
     /// photogrammetry.
-    RadTanThinPrismFisheye[16] = "rad_tan_thin_prism_fisheye", Equidistant, true, 0,
+    RadTanThinPrismFisheye[16] = "rad_tan_thin_prism_fisheye", Equidistant, Staged, 0,
         fisheye!("(fx A + cx, fy B + cy)",
             "(x, y) = (a, b) (1 + k0 r^2 + ... + k5 r^12), q^2 = x^2 + y^2, (A, B) = (x + p0 (2 x^2 + q^2) + 2 p1 x y + s0 q^2 + s1 q^4, \
              y + 2 p0 x y + p1 (2 y^2 + q^2) + s2 q^2 + s3 q^4)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k0": N(1), "k1": N(2), "k2": N(3), "k3": N(4), "k4": N(5), "k5": N(6), "p0": T(0),
          "p1": T(1), "s0": S(0), "s1": S(1), "s2": S(2), "s3": S(3)];
     /// SIMPLE_DIVISION of COLMAP (Fitzgibbon 2001).
-    SimpleDivision[4] = "simple_division", DivisionByRadius, false, 0,
+    SimpleDivision[4] = "simple_division", DivisionByRadius, Whole, 0,
         "(A, B) = (P1, -P2) 2 / (-P3 + sqrt(P3^2 - 4 k (P1^2 + P2^2))), image = (f A + cx, f B + cy)",
         ["f": F, "cx": Cx, "cy": Cy, "k": Own(0)];
     /// DIVISION of COLMAP (Fitzgibbon 2001).
-    Division[5] = "division", DivisionByRadius, false, 0,
+    Division[5] = "division", DivisionByRadius, Whole, 0,
         "(A, B) = (P1, -P2) 2 / (-P3 + sqrt(P3^2 - 4 k (P1^2 + P2^2))), image = (fx A + cx, fy B + cy)",
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k": Own(0)];
     /// A fisheye that shows equal areas of the sky as equal areas, as most lenses of all-sky cameras do.
-    Equisolid[6] = "equisolid", EquisolidRays, false, 0,
+    Equisolid[6] = "equisolid", EquisolidRays, Whole, 0,
         "(a, b) = 2 sin(theta / 2) (P1, -P2) / rho, rho = hypot(P1, P2), theta = atan2(rho, -P3), r^2 = a^2 + b^2, \
          (A, B) = (a, b) (1 + k1 r^2 + k2 r^4), image = (fx A + cx, fy B + cy)",
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2)];
     /// A fisheye that shows circles of the sky as circles.
-    Stereographic[6] = "stereographic", StereographicRays, false, 0,
+    Stereographic[6] = "stereographic", StereographicRays, Whole, 0,
         "(a, b) = 2 tan(theta / 2) (P1, -P2) / rho, rho = hypot(P1, P2), theta = atan2(rho, -P3), r^2 = a^2 + b^2, \
          (A, B) = (a, b) (1 + k1 r^2 + k2 r^4), image = (fx A + cx, fy B + cy)",
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2)];
     /// EUCM of COLMAP: the extended unified camera (Khomutenko, Garcia and Martinet 2016).
-    Eucm[6] = "eucm", ExtendedUnified, false, 0,
+    Eucm[6] = "eucm", ExtendedUnified, Whole, 0,
         "d = sqrt(beta (P1^2 + P2^2) + P3^2), (A, B) = (P1, -P2) / (alpha d - (1 - alpha) P3), image = (fx A + cx, fy B + cy)",
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "alpha": Own(0), "beta": Own(1)];
     /// The frame camera of Agisoft; cx, cy are counted from the centre of the picture of w by h pixels, p1, p2 are P1, P2 of photogrammetry.
-    AgisoftFrame[13] = "agisoft_frame", Central, false, 2,
+    AgisoftFrame[13] = "agisoft_frame", Central, Whole, 2,
         central!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b)"),
         ["f": F, "cx": Cx, "cy": Cy, "b1": B1, "b2": B2, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4), "p1": T(0), "p2": T(1), "w": W,
          "h": H];
     /// The fisheye of Agisoft: [`AgisoftFrame`] with an equidistant projection.
-    AgisoftFisheye[13] = "agisoft_fisheye", Equidistant, false, 2,
+    AgisoftFisheye[13] = "agisoft_fisheye", Equidistant, Whole, 2,
         fisheye!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b)"),
         ["f": F, "cx": Cx, "cy": Cy, "b1": B1, "b2": B2, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4), "p1": T(0), "p2": T(1), "w": W,
          "h": H];
+    /// [`AgisoftFrame`] with the profile of its tangential terms that files of 2016 to about 2020 hold.
+    AgisoftFrameP4[15] = "agisoft_frame_p4", Central, Profiled, 2,
+        central!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
+            "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b) \
+             (1 + p3 r^2 + p4 r^4)"),
+        ["f": F, "cx": Cx, "cy": Cy, "b1": B1, "b2": B2, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4), "p1": T(0), "p2": T(1),
+         "p3": P(0), "p4": P(1), "w": W, "h": H];
+    /// [`AgisoftFisheye`] with the same.
+    AgisoftFisheyeP4[15] = "agisoft_fisheye_p4", Equidistant, Profiled, 2,
+        fisheye!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
+            "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b) \
+             (1 + p3 r^2 + p4 r^4)"),
+        ["f": F, "cx": Cx, "cy": Cy, "b1": B1, "b2": B2, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4), "p1": T(0), "p2": T(1),
+         "p3": P(0), "p4": P(1), "w": W, "h": H];
 }

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.statistics.groups import INVISIBLE
 from photogram.statistics.snooping.suspects import (
     LostSupportError,
     Out,
@@ -34,6 +35,9 @@ HUBER, CAUCHY = 1.50, 2.55
 ROBUST_ITERATIONS = 20
 
 
+T = TypeVar("T")
+
+
 class NetworkTrial:
     """A network tried without some of its observations.
 
@@ -43,56 +47,30 @@ class NetworkTrial:
         The network in the core.
     suspects
         Its groups of observations.
-    images
-        (m, 2) photo and point of each image.
     supported
         (P,) whether what is known of the pose of a photo determines it without images.
-    touched
-        Points that each observation beside images is of.
-    tolerance
-        When the adjustment of a round is over; see the core.
+    rough, exact
+        When the adjustment of a round is over, the latter where R of all rows is used; see the core.
     """
 
     def __init__(
         self,
         core: _photocore.NetworkTrial,
         suspects: Suspects,
-        images: Indices,
         supported: Bools,
-        tolerance: float | None,
+        rough: float,
+        exact: float,
     ) -> None:
-        self.core, self.suspects, self.tolerance = core, suspects, tolerance
+        self.core, self.suspects, self.rough, self.exact = core, suspects, rough, exact
         self.deviations: Floats = core.deviations
         self._supported = supported
-        kinds, subjects = core.subjects
-        self._subjects = subjects
-        self._image_groups = np.flatnonzero(kinds == IMAGE)
-        self._photos = np.where(kinds == IMAGE, images[np.minimum(subjects, len(images) - 1), 0], -1)
-        self._held = {
-            int(point): int(group)
-            for group, point in zip(np.flatnonzero(kinds == CONTROL), subjects[kinds == CONTROL], strict=True)
-        }
+        self._is_image = np.asarray(core.subjects[0] == IMAGE)
         starts = suspects.row_starts
         sizes = np.diff(starts)
         self._block_starts = np.concatenate([[0], np.cumsum(sizes**2)])
         row = np.arange(starts[-1]) - np.repeat(starts[:-1], sizes)
         self._diagonal = np.repeat(self._block_starts[:-1], sizes) + row * (np.repeat(sizes, sizes) + 1)
         self._tests: dict[str, np.ndarray] = {}
-
-    @cached_property
-    def _on_point(self) -> dict[int, list[int]]:
-        """The image groups of every point."""
-        found: dict[int, list[int]] = {}
-        for group in self._image_groups.tolist():
-            found.setdefault(int(self.suspects.points[group]), []).append(group)
-        return found
-
-    @cached_property
-    def _on_photo(self) -> dict[int, list[int]]:
-        found: dict[int, list[int]] = {}
-        for group in self._image_groups.tolist():
-            found.setdefault(int(self.suspects.photos[group]), []).append(group)
-        return found
 
     @property
     def whole(self) -> bool:
@@ -101,23 +79,48 @@ class NetworkTrial:
 
     def adjust(self, out: Out) -> Standing:
         """Adjust without what is out, from where the last adjustment has ended."""
+        tolerance = self.exact if self.whole else self.rough
+        standing = self._asked(
+            self.core.adjust,
+            out.rows,
+            sorted(out.points),
+            sorted(out.photos),
+            tolerance=tolerance,
+            progress=None,
+        )
+        status, _, omega, freedom, collapsed = standing
+        if collapsed:
+            raise LostSupportError(collapsed, [])
+        return Standing(status, omega, freedom)
+
+    @staticmethod
+    def _asked(ask: Callable[..., T], *arguments: Any, **options: Any) -> T:
+        """Ask the core; what is undetermined is a LostSupportError."""
         try:
-            standing = self.core.adjust(
-                out.rows, sorted(out.points), sorted(out.photos), tolerance=self.tolerance, progress=None
-            )
+            return ask(*arguments, **options)
         except (_photocore.BlockError, _photocore.CollectionError) as error:
             kind, _, combinations, points = error.args
             if kind == "undetermined points":
                 raise LostSupportError(points, []) from error
             if kind == "undetermined photos":
-                raise LostSupportError(
-                    [], sorted({photo for each in combinations for photo in each[0]})
-                ) from error
+                photos = {photo for combination in combinations for photo in combination[0]}
+                raise LostSupportError([], sorted(photos)) from error
             raise
-        status, _, omega, freedom, collapsed = standing
-        if collapsed:
-            raise LostSupportError(collapsed, [])
+
+    def stand(self) -> Standing:
+        """Take the network as its adjustment has ended."""
+        status, _, omega, freedom, _ = self.core.stand()
         return Standing(status, omega, freedom)
+
+    def correlation(self, first: int, second: int, between: Floats) -> float:
+        """Return the largest canonical correlation of two groups; `between` has the rows of the first."""
+        halves = []
+        for group in (first, second):
+            values, vectors = np.linalg.eigh(self.own_block(group))
+            seen = values > INVISIBLE
+            halves.append(vectors[:, seen] / np.sqrt(values[seen]))
+        product = halves[0].T @ between @ halves[1]
+        return min(float(np.linalg.norm(product, 2)), 1.0) if product.size else 0.0
 
     def tests(self) -> Tests:
         """Test all groups."""
@@ -171,9 +174,13 @@ class NetworkTrial:
 
     def _alone(self, group: int) -> tuple[list[int], Floats, Floats]:
         rows = self.suspects.rows(group)
+        return [group], np.nan_to_num(self._tests["residual"][rows]), self.own_block(group)
+
+    def own_block(self, group: int) -> Floats:
+        """Return R of a group."""
         start, end = self._block_starts[group : group + 2]
-        response = self._tests["cofactors"][start:end].reshape(len(rows), len(rows))
-        return [group], np.nan_to_num(self._tests["residual"][rows]), response
+        size = math.isqrt(int(end - start))
+        return np.asarray(self._tests["cofactors"][start:end].reshape(size, size))
 
     def response(self) -> tuple[Floats, Floats]:
         """Return residuals of unit weight and R of all rows; zero for those that are out."""
@@ -185,40 +192,43 @@ class NetworkTrial:
         return np.where(out, 0.0, residuals), response
 
     def resist(self, scale: float) -> Floats:
-        """Adjust by Huber's loss, then by Cauchy's from there."""
-        self.core.resist("huber", HUBER * scale, iterations=ROBUST_ITERATIONS, progress=None)
-        return self.core.resist("cauchy", CAUCHY * scale, iterations=ROBUST_ITERATIONS, progress=None)
+        """Adjust by Huber's loss, then by Cauchy's from there: (G,) lengths of residuals of unit weight."""
+        self._asked(self.core.resist, "huber", HUBER * scale, iterations=ROBUST_ITERATIONS, progress=None)
+        weights = self._asked(
+            self.core.resist, "cauchy", CAUCHY * scale, iterations=ROBUST_ITERATIONS, progress=None
+        )
+        # Its weight is 1 / (1 + (size / scale)^2).
+        return np.asarray(CAUCHY * scale * np.sqrt(np.maximum(1.0 / np.maximum(weights, 1e-12) - 1.0, 0.0)))
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
         """Return points left with too few rays, and photos left without support, when a group is out."""
-        point = int(self.suspects.points[group])
-        photo = int(self._photos[group])
+        suspects = self.suspects
+        point, photo = int(suspects.points[group]), int(suspects.photos[group])
         points: set[int] = set()
-        photos = {photo} if photo >= 0 else set()
+        photos = {photo} if photo >= 0 and self._is_image[group] else set()
+        leaving: Indices = np.empty(0, dtype=np.int64)
         if point >= 0 and point not in out.points:
-            images = self._on_point.get(point, [])
-            rays = [image for image in images if self._is_in(out, image)]
-            held = self._held.get(point)
-            components = 0 if held is None else int((~out.rows[self.suspects.rows(held)]).sum())
-            if not rays or (len(rays) == 1 and components <= 1):
-                points = {point}
-                photos |= {int(self._photos[image]) for image in rays}
-        return points, {each for each in photos if self._falls(out, each, points)}
+            own = suspects.on_point(point)
+            images = own[self._is_image[own]]
+            rays = images[self._are_in(out, images)]
+            held = own[~self._is_image[own]]
+            components = sum(int((~out.rows[suspects.rows(each)]).sum()) for each in held.tolist())
+            if not rays.size or (rays.size == 1 and components <= 1):
+                points, leaving = {point}, rays
+                photos |= {int(suspects.photos[image]) for image in rays.tolist()}
+        return points, {each for each in photos if self._falls(out, each, leaving)}
 
-    def _is_in(self, out: Out, image: int) -> bool:
-        return not out.rows[self.suspects.row_starts[image]]
+    def _are_in(self, out: Out, images: Indices) -> Bools:
+        return np.asarray(~out.rows[self.suspects.row_starts[images]])
 
-    def _falls(self, out: Out, photo: int, leaving: set[int]) -> bool:
+    def _falls(self, out: Out, photo: int, leaving: Indices) -> bool:
+        """Whether a photo is left with too few images; those of points that are out are out themselves."""
         if self._supported[photo] or photo in out.photos:
             return False
-        used = 0
-        for image in self._on_photo[photo]:
-            point = int(self.suspects.points[image])
-            if self._is_in(out, image) and point not in leaving and point not in out.points:
-                used += 1
-                if used >= SUPPORT:
-                    return False
-        return True
+        own = self.suspects.on_photo(photo)
+        images = own[self._is_image[own]]
+        gone = np.isin(images, leaving).sum() if leaving.size else 0
+        return int(self._are_in(out, images).sum() - gone) < SUPPORT
 
 
 def image_loads(points: Indices, photos: Indices) -> Callable[[int], Indices]:

@@ -7,21 +7,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.network_trial import (
+from photogram.arguments.types import Indices
+from photogram.network.block import Block
+from photogram.network.observations import Observation, observation_rows
+from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
     IMAGE,
     KINDS,
     OBSERVATION,
     POSITION,
+    NetworkTrial,
     image_loads,
 )
-from photogram.arguments.types import Indices
-from photogram.network.block import Block
-from photogram.network.observations import Observation, observation_rows
 from photogram.statistics.snooping.suspects import Suspects
 
-__all__ = ["block_suspects", "observations_of_core"]
+__all__ = ["block_suspects", "network_trial", "observations_of_core"]
 
 ANGLES = ("omega", "phi", "kappa")
 
@@ -35,6 +36,24 @@ def block_suspects(block: Block, core: _photocore.NetworkTrial, *, parts: bool =
         Whether a part of a control point or of a station may go alone.
     """
     return _Named(block, core, parts).suspects()
+
+
+ROUGH = 0.1
+"""Standard deviations: a step that moves no unknown by more is the last of a round."""
+EXACT = 1e-7
+"""The same where R of all rows is used: a small network."""
+
+
+def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> NetworkTrial:
+    """Return a block as tests ask it."""
+    deviations = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
+    return NetworkTrial(
+        core=core,
+        suspects=block_suspects(block, core, parts=parts),
+        supported=np.asarray(np.isfinite(deviations).all(axis=1)),
+        rough=ROUGH,
+        exact=EXACT,
+    )
 
 
 def observations_of_core(block: Block) -> list[Observation]:
@@ -76,6 +95,7 @@ class _Named:
             name=self.name,
             row_name=self.row_name,
             unit=self.unit,
+            photo_name=lambda photo: f"photo {block.photo_ids[photo]}",
         )
 
     def loads(self, group: int) -> Indices:

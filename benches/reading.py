@@ -1,0 +1,107 @@
+"""How long a million image records take to be read: from CSV, from Parquet, and from COLMAP's binary files.
+
+python benches/reading.py [RECORDS]
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from photogram.formats.colmap.binary import read_binary, write_binary
+from photogram.formats.colmap.content import Camera, Images, Model, Points
+from photogram.io.delimited import read_columns
+from photogram.io.places import Place
+
+SEED = 7
+POINTS_OF_PHOTO = 1000
+
+
+def timed(what: str, work: Callable[[], object]) -> None:
+    """Print the least of three times."""
+    least = min(_once(work) for _ in range(3))
+    print(f"{what:<28}{least[0]:8.2f} s{least[1]:8.2f} s of processor time")
+
+
+def _once(work: Callable[[], object]) -> tuple[float, float]:
+    wall, processor = time.perf_counter(), time.process_time()
+    work()
+    return time.perf_counter() - wall, time.process_time() - processor
+
+
+def table(path: Path) -> None:
+    """Read a table of images as the plain project does."""
+    read = read_columns(path, numbers={"column", "row"})
+    read.names("photo"), read.names("point"), read.numbers("column"), read.numbers("row")
+
+
+def main(records: int) -> None:
+    """Write the files, and time reading them."""
+    random = np.random.default_rng(SEED)
+    photos = np.arange(records) // POINTS_OF_PHOTO
+    points = (np.arange(records) * 7) % (records // 5)
+    xy = random.uniform(0, 4000, (records, 2))
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        lines = [
+            f"IMG_{photo:05d}.JPG,T{point:06d},{x!r},{y!r}"
+            for photo, point, (x, y) in zip(photos.tolist(), points.tolist(), xy.tolist(), strict=True)
+        ]
+        (place / "images.csv").write_text("\n".join(["photo,point,column,row", *lines, ""]))
+        timed(f"CSV, {records} records", lambda: table(place / "images.csv"))
+        _parquet(place / "images.parquet", photos, points, xy)
+        for name, content in write_binary(_model(photos, points, xy)).items():
+            (place / name).write_bytes(content)
+        timed("COLMAP, binary", lambda: read_binary(place))
+
+
+def _parquet(path: Path, photos: np.ndarray, points: np.ndarray, xy: np.ndarray) -> None:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ModuleNotFoundError:
+        print("Parquet: pyarrow is not installed")
+        return
+    names = [
+        pyarrow.array([f"{mark}{each}" for each in own.tolist()]).dictionary_encode()
+        for mark, own in (("IMG_", photos), ("T", points))
+    ]
+    columns = dict(zip(("photo", "point", "column", "row"), (*names, *xy.T), strict=True))
+    pyarrow.parquet.write_table(pyarrow.table(columns), path, compression="zstd")
+    timed("Parquet", lambda: table(path))
+
+
+def _model(photos: np.ndarray, points: np.ndarray, xy: np.ndarray) -> Model:
+    count, own = int(photos.max()) + 1, int(points.max()) + 1
+    places = [Place()] * count
+    return Model(
+        Path(),
+        [Camera(1, "PINHOLE", 4000, 3000, (3000.0, 3000.0, 2000.0, 1500.0), Place())],
+        Images(
+            np.arange(1, count + 1),
+            np.ones(count, dtype=np.int64),
+            np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+            np.zeros((count, 3)),
+            [f"IMG_{photo:05d}.JPG" for photo in range(count)],
+            np.bincount(photos),
+            xy,
+            points + 1,
+            places,
+        ),
+        Points(
+            np.arange(1, own + 1),
+            np.zeros((own, 3)),
+            np.zeros((own, 3), dtype=np.int64),
+            np.zeros(own, dtype=np.int64),
+            [],
+        ),
+    )
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000)

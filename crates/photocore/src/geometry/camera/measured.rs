@@ -1,0 +1,93 @@
+//! Backward cameras whose residuals lie in the measured image: errors of measured coordinates have the weights that they are given.
+
+use super::backward::BackwardModel;
+use super::inverse::RadialLimit;
+use super::{Brown, BrownAffinityAfter, CameraModel, Ebner, Gruen, Image, LensDirection, OnComparator, Unit};
+use crate::geometry::Vector3;
+
+/// A backward camera that is compared where it is measured: residual = measured - the image that it has of u.
+///
+/// To first order this is D^-1 (g(measured) - c (u1, u2) / u3) with D = dg/d(measured), and its weight that of the residual in the
+/// corrected image with the covariance D S D^T. Least squares of what is left, the image being found by Newton's method, has no bias: with
+/// D S D^T as weights that move with the parameters it would.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured<C>(pub C);
+
+/// A model with a name for its measured form.
+trait Named: BackwardModel {
+    const MEASURED: &'static str;
+}
+
+macro_rules! measured {
+    ($($(#[$doc:meta])* $name:ident = $camera:ident, $said:literal;)*) => {$(
+        $(#[$doc])*
+        pub type $name = Measured<$camera>;
+
+        impl Named for $camera {
+            const MEASURED: &'static str = $said;
+        }
+    )*};
+}
+
+measured! {
+    /// [`Brown`], compared where it is measured.
+    BrownMeasured = Brown, "brown_measured";
+    /// [`BrownAffinityAfter`], the same.
+    BrownAffinityAfterMeasured = BrownAffinityAfter, "brown_affinity_after_measured";
+    /// [`Ebner`], the same.
+    EbnerMeasured = Ebner, "ebner_measured";
+    /// [`Gruen`], the same.
+    GruenMeasured = Gruen, "gruen_measured";
+    /// [`OnComparator`], the same.
+    OnComparatorMeasured = OnComparator, "on_comparator_measured";
+}
+
+impl<C: Named> CameraModel for Measured<C> {
+    type Parameters = <C as BackwardModel>::Parameters;
+
+    const NAME: &'static str = C::MEASURED;
+    const PARAMETERS: &'static [(&'static str, Unit)] = <C as CameraModel>::PARAMETERS;
+    const CONSTANTS: usize = <C as CameraModel>::CONSTANTS;
+    const FORMULA: &'static str = <C as CameraModel>::FORMULA;
+    const LENS: LensDirection = LensDirection::Backward;
+
+    fn with_parameters(parameters: Self::Parameters) -> Self {
+        Self(BackwardModel::with_parameters(parameters))
+    }
+
+    fn parameters(&self) -> Self::Parameters {
+        BackwardModel::parameters(&self.0)
+    }
+
+    fn scale(&self) -> f64 {
+        self.0.scale()
+    }
+
+    fn image(&self, u: &Vector3) -> [f64; 2] {
+        self.0.image(u)
+    }
+
+    fn linearize(&self, u: &Vector3) -> Image<Self::Parameters> {
+        self.0.linearize(u)
+    }
+
+    fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
+        self.0.direction(xy)
+    }
+
+    fn radius(&self, u: &Vector3, measured: [f64; 2]) -> f64 {
+        CameraModel::radius(&self.0, u, measured)
+    }
+
+    fn fold(&self) -> f64 {
+        CameraModel::fold(&self.0)
+    }
+
+    fn correction(&self, measured: [f64; 2]) -> Option<[f64; 2]> {
+        self.0.correction(measured)
+    }
+
+    fn radial_limit(&self) -> Option<RadialLimit> {
+        CameraModel::radial_limit(&self.0)
+    }
+}

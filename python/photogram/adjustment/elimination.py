@@ -1,0 +1,151 @@
+"""Backward elimination: terms of lenses that the observations do not ask for are left out, one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from photogram.adjustment.adjustment import UnitVariance, adjust
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import shown
+from photogram.errors import InputError
+from photogram.network.block import Block
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.model_tests import EFFECT, KEPT, TermsTest, groups_of_terms, terms_test
+from photogram.results.result import Result
+
+__all__ = ["Elimination", "eliminate_terms"]
+
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """What backward elimination has left of a model.
+
+    Attributes
+    ----------
+    removed
+        Tests of the groups that were left out, in order.
+    kept
+        Tests of those that stay.
+    level
+        Of each test: that of all divided by the number of groups (Bonferroni).
+    block, result
+        The block with the terms that stay, and its adjustment.
+    """
+
+    removed: tuple[TermsTest, ...]
+    kept: tuple[TermsTest, ...]
+    level: float
+    block: Block
+    result: Result
+
+    def log(self) -> list[str]:
+        """Say what was left out and why, and what stays."""
+        lines = [f"{_named(each)}: left out, {_why(each, self.level)}" for each in self.removed]
+        return lines + [
+            f"{_named(each)}: stays, probability {each.probability:.2g}, up to {each.effect:.3g} standard"
+            " deviations of an image"
+            for each in self.kept
+        ]
+
+
+def eliminate_terms(
+    block: Block,
+    *,
+    groups: Sequence[Sequence[str]] | None = None,
+    level: float = KEPT,
+    unit_variance: UnitVariance = "constrained",
+    threads: int | None = None,
+) -> Elimination:
+    """Leave out terms of lenses that are not worth having, the least probable group first.
+
+    A group stays when it is significant and moves an image by more than a fifth of its standard deviation. A
+    radial term is only asked about when those of higher powers are out. Every round adjusts anew.
+
+    Parameters
+    ----------
+    block
+        A block with cameras; free or weighted terms of their lenses are asked about.
+    groups
+        Terms that stay or go together; None: radial ones one by one, all others by their letter.
+    level
+        Of all tests together.
+    unit_variance, threads
+        As of :func:`photogram.adjust`.
+
+    Raises
+    ------
+    InputError
+        No cameras, or no terms to ask about.
+    AdjustmentError, RankError
+        As of the adjustment.
+    """
+    if not isinstance(block, Block) or not block.cameras:
+        raise InputError(f"no block with cameras: {shown(block)}")
+    if not 0 < level < 1:
+        raise InputError(f"a level is a probability between 0 and 1, not {level:g}")
+    result = adjust(block, unit_variance=unit_variance, threads=threads)
+    first = [(camera.name, names) for camera in result.cameras for names in _groups(camera, groups)]
+    if not first:
+        raise InputError("no term of a lens is estimated: there is nothing to ask about")
+    own = level / len(first)
+    removed: list[TermsTest] = []
+    while True:
+        tests = [
+            terms_test(result, names, camera=camera.name)
+            for camera in result.cameras
+            for names in _groups(camera, groups)
+        ]
+        asked = [each for each in tests if not _waits(each, tests) and not _stays(each, own)]
+        if not asked:
+            return Elimination(tuple(removed), tuple(tests), own, block, result)
+        worst = max(asked, key=lambda each: each.probability)
+        removed.append(worst)
+        block = _without(block, worst)
+        result = adjust(block, unit_variance=unit_variance, threads=threads)
+
+
+def _groups(camera: AdjustedCamera, given: Sequence[Sequence[str]] | None) -> list[tuple[str, ...]]:
+    """Return the groups of terms of a camera that are still estimated."""
+    estimated = {camera.names[k] for k in camera.estimated}
+    groups = groups_of_terms(camera) if given is None else [tuple(names) for names in given]
+    return [names for names in groups if names and set(names) <= estimated]
+
+
+def _stays(test: TermsTest, level: float) -> bool:
+    return test.probability < level and test.effect > EFFECT
+
+
+def _waits(test: TermsTest, tests: Sequence[TermsTest]) -> bool:
+    """Whether a radial term has one of a higher power above it."""
+    name = test.names[0]
+    if len(test.names) > 1 or name[0] not in "Kk":
+        return False
+    others = [each for each in tests if each.camera == test.camera and len(each.names) == 1]
+    return any(each.names[0][0] == name[0] and each.names[0] > name for each in others)
+
+
+def _without(block: Block, test: TermsTest) -> Block:
+    """Return the block with terms held at zero."""
+    place = block.camera_names.index(test.camera)
+    camera = block.cameras[place]
+    if camera.covariance is not None and set(camera.covariance[0]) & set(test.names):
+        raise InputError(f"{_named(test)} was observed with others: give the camera without its covariance")
+    zero = dict.fromkeys(test.names, 0.0)
+    sd = camera.sd if isinstance(camera.sd, dict) else dict(zip(camera.names, camera.deviations, strict=True))
+    changed = camera.replace(parameters={**camera.parameters, **zero}, sd={**sd, **zero})
+    cameras = [changed if k == place else each for k, each in enumerate(block.cameras)]
+    return block.replace(cameras=cameras)
+
+
+def _named(test: TermsTest) -> str:
+    return f"{', '.join(test.names)} of {test.camera}"
+
+
+def _why(test: TermsTest, level: float) -> str:
+    if not test.probability < level:
+        return f"probability {test.probability:.2g}, limit {level:.2g}"
+    return f"no image is moved by more than {test.effect:.2g} standard deviations"
+
+
+check_arguments(globals(), ["eliminate_terms"])

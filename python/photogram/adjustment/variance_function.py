@@ -1,0 +1,165 @@
+"""Variances of image coordinates as a function of the radius, or of any quantity of the user's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.adjustment.components import Weighing, weighing
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import shaped, shown
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.results.group_sums import Probing, group_sums, observables
+from photogram.results.grouping import Grouping
+from photogram.results.network import AdjustedNetwork
+from photogram.results.variance_function import Bin, VarianceFunction
+from photogram.statistics.components import GroupsOf
+from photogram.statistics.variance_function import estimate_function
+
+__all__ = ["variance_function"]
+
+TOLERANCE = 1e-6
+"""Of the adjustments, in standard deviations."""
+
+
+class _Left:
+    """What an adjustment leaves of image coordinates."""
+
+    def __init__(self, own: Weighing, result: AdjustedNetwork, probing: Probing) -> None:
+        self._own, self._probing = own, probing
+        with np.errstate(invalid="ignore"):
+            self.squares: Floats = ((result.residuals / result.image_given_sd) ** 2).ravel()
+        self.redundancy: Floats = np.nan_to_num(result.redundancy).ravel()
+
+    def information(self, terms: Floats) -> Floats:
+        """Return (t, t) sums of R_ij^2 c_i c_j^T, by random signs."""
+        rows, count = terms.shape
+        factored = self._own.factored()
+        options = self._probing.options(rows)
+        if rows <= options["exact"]:
+            columns = np.eye(rows).reshape(rows, -1, 2)
+            projected = factored.project_images(columns, threads=0, progress=None).reshape(rows, rows)
+            return np.asarray(terms.T @ projected**2 @ terms)
+        signs = np.random.default_rng(options["seed"]).choice([-1.0, 1.0], (options["vectors"], rows))
+        found = np.empty((count, count))
+        for k in range(count):
+            columns = (signs * np.sqrt(terms[:, k])).reshape(len(signs), -1, 2)
+            projected = factored.project_images(columns, threads=0, progress=None).reshape(len(signs), rows)
+            found[:, k] = (projected**2).mean(axis=0) @ terms
+        return (found + found.T) / 2
+
+
+def variance_function(
+    network: object,
+    of: ArrayLike = "radius",
+    *,
+    center: Sequence[float] = (0.0, 0.0),
+    bins: int = 10,
+    max_steps: int = 30,
+    probing: Probing | None = None,
+    threads: int | None = None,
+) -> VarianceFunction:
+    """Estimate how the variance of image coordinates grows with the radius: sigma^2 = a^2 + b^2 r^2.
+
+    All other observations keep their weights. The regression of squared residuals on redundancy numbers is
+    repeated with the weights that it gives until nothing changes: once would be badly biased.
+
+    Parameters
+    ----------
+    network
+        The block or collection; the given standard deviations are the unit of a and b.
+    of
+        `radius`, or (m,) values of the user's own, not negative, one for each image: their squares take the
+        place of the squares of the radius.
+    center
+        What the radius is counted from, in the unit of the image coordinates.
+    bins
+        How many quantiles of the radius are shown beside the function.
+    max_steps
+        Adjustments at the most.
+    probing
+        How standard deviations are found.
+    threads
+        As of :func:`photogram.adjust`.
+
+    Raises
+    ------
+    InputError
+        What is no network, values that do not fit, no redundancy.
+    AdjustmentError, RankError
+        As of the adjustment.
+    """
+    probing = probing or Probing()
+    if bins < 2 or max_steps < 1:
+        raise InputError("there must be two bins and one step at least")
+    seen = observables(network)
+    images = len(seen.image_photos)
+    own = weighing(network, threads=threads, tolerance=TOLERANCE)
+    values = _values(own, of, center, images)
+    used = own.first.used_images
+    largest = float(values[used].max(initial=0.0))
+    if not largest > 0 or not np.isfinite(own.first.redundancy[used]).all():
+        raise InputError("the values are all zero, or there are no redundancy numbers")
+    share = np.repeat((values / largest) ** 2, 2)
+    terms = np.stack([np.ones(2 * images), share], axis=1)
+    grouping = _each(seen.point_observed.shape, seen.photo_observed.shape, len(seen.observations), images)
+    first = True
+
+    def adjusted(factors: Floats) -> _Left:
+        nonlocal first
+        result = own.first if first else own.adjust(grouping, factors)
+        first = False
+        return _Left(own, result, probing)
+
+    found = estimate_function(adjusted, terms, max_steps=max_steps)
+    shown_bins = _bins(own.result, values, found.factors.reshape(-1, 2)[:, 0], bins, probing)
+    name = "radius" if isinstance(of, str) else "value"
+    return VarianceFunction(name, largest, found, shown_bins, own.network, own.result)
+
+
+def _values(own: Weighing, of: ArrayLike, center: Sequence[float], images: int) -> Floats:
+    if isinstance(of, str):
+        if of != "radius":
+            raise InputError(f"variances are a function of the radius or of values, not of {shown(of)}")
+        middle = shaped("center", center, (2,))
+        return np.asarray(np.linalg.norm(own.network.image_xy - middle, axis=1))
+    values = shaped("of", of, (images,))
+    if not ((values >= 0) & np.isfinite(values)).all():
+        raise InputError("values that a variance is a function of are finite and not negative")
+    return np.asarray(values)
+
+
+def _each(points: tuple[int, ...], photos: tuple[int, ...], observations: int, images: int) -> Grouping:
+    """Return a group for each image coordinate, and nothing else."""
+    return Grouping(
+        groups=GroupsOf(("",) * (2 * images)),
+        images=np.arange(2 * images).reshape(-1, 2),
+        points=np.full(points, -1),
+        photos=np.full(photos, -1),
+        observations=np.full(observations, -1),
+    )
+
+
+def _bins(
+    result: AdjustedNetwork, values: Floats, factors: Floats, count: int, probing: Probing
+) -> tuple[Bin, ...]:
+    """Return quantiles of the values with what their residuals say beside the function."""
+    edges = np.quantile(values[result.used_images], np.linspace(0, 1, count + 1)[1:-1])
+    places: Indices = np.searchsorted(edges, values, side="right")
+    labels = np.array([f"{place:03d}" for place in places], dtype=object)
+    sums = group_sums(result, {"images": labels}, probing=probing)
+    found = []
+    for place in range(count):
+        inside = (places == place) & result.used_images
+        if not inside.any():
+            continue
+        each = sums[f"{place:03d}"]
+        middle = float(np.average(factors[inside]))
+        found.append(Bin.of(each, float(values[inside].mean()), middle))
+    return tuple(found)
+
+
+check_arguments(globals(), ["variance_function"])

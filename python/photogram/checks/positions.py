@@ -1,0 +1,265 @@
+"""Observed positions of photos as a whole: what is wrong with all of them has a form of its own.
+
+    feet for metres, exchanged axes                             the coordinates that were meant
+    heights above the ellipsoid for those above the geoid       C + A l + (0, 0, N)
+    another datum                                               C + A l + s
+    a wrong lever arm                                           C + A (l + d)
+    positions of another time                                   C + A l + tau dC/dt
+
+Each is tried: the block is adjusted with the coordinates that were meant, or with N, s, l or tau unknown, and
+judged by its likelihood ratio; a parameter more must gain ln f more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+
+from photogram.adjustment.hypotheses import FOOT
+from photogram.arguments.types import Floats
+from photogram.checks.adjusting import Adjuster
+from photogram.network.block import Block
+from photogram.network.observations import Position
+from photogram.network.rays import local_axes
+from photogram.network.strips import strips_of
+from photogram.network.unknowns import LeverArm, Shift, Unknown
+from photogram.results.result import Result
+from photogram.statistics.likelihood import RIVAL, TESTED, Judged, judged, likelihood
+
+__all__ = ["Wrong", "wrong_positions"]
+
+FEWEST = 5
+"""Observed positions that can be judged as a whole."""
+EQUAL = 0.15
+"""Relative difference within which a lever arm is the given one with other signs or axes."""
+WORST = 1e6
+"""What cannot be adjusted as it is leaves so many times what the worst hypothesis does."""
+WHAT = "observed positions of the photos"
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """What is wrong with the observed positions as a whole.
+
+    Attributes
+    ----------
+    kind, text
+        In a word or two, and in a sentence.
+    judged
+        How sure it is.
+    change
+        Makes of the block what was meant.
+    """
+
+    kind: str
+    text: str
+    judged: Judged
+    change: Callable[[Block], Block]
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A hypothesis: its words, the adjustment with it, its parameters, and the positions that were meant."""
+
+    kind: str
+    text: str
+    result: Result | None
+    parameters: int
+    meant: list[Position]
+
+    @property
+    def left(self) -> float:
+        """Omega; infinite where it cannot be adjusted."""
+        if self.result is None or not self.result.converged:
+            return math.inf
+        return self.result.sums_of_squares.total
+
+
+def wrong_positions(block: Block, adjusted: Adjuster) -> Wrong | None:
+    """Return what explains why the observed positions of a block do not fit, if something does.
+
+    Positions with shifts or drifts that are unknown are left to these.
+    """
+    given = _positions(block)
+    if len(given) < FEWEST:
+        return None
+    first = adjusted.tried(_with(block, given))
+    found = [*_coordinates(block, given, adjusted), *_unknown(block, given, adjusted)]
+    found += _later(block, given, adjusted)
+    found = [each for each in found if math.isfinite(each.left)]
+    by_kind = {each.kind: each for each in found}
+    freedom = next((each.result.degrees_of_freedom for each in found if each.result is not None), 0)
+    if freedom < TESTED:
+        return None
+    part = by_kind.get("geoid")
+    for whole in (by_kind.get("shift"), by_kind.get("lever arm")):
+        # A height is a part of these: they must be better by far.
+        if whole and part and likelihood(part.left, whole.left, freedom) < RIVAL + 2 * math.log(freedom):
+            found.remove(whole)
+    left = [each.left for each in found]
+    usable = first is not None and first.converged
+    before = first.sums_of_squares.total if first is not None and usable else WORST * max(left)
+    verdict = judged(before, left, freedom, parameters=[each.parameters for each in found], known_weight=True)
+    if verdict is None:
+        return None
+    best = [found[row] for row in verdict.best]
+    word = "probably" if len(best) == 1 else "it cannot be told which:"
+    text = f"{word} {'; or '.join(each.text for each in best)}"
+    text += f": residuals of the block would be {verdict.fall:.3g} times smaller"
+    meant = best[0].meant
+    return Wrong(best[0].kind, text, verdict, lambda own: _with(own, meant))
+
+
+def _positions(block: Block) -> list[Position]:
+    """Return observed positions, weighted ones of photos among them."""
+    found = [each for each in block.observations if isinstance(each, Position)]
+    if any(each.shift is not None or each.drift is not None for each in found):
+        return []
+    sd = block.photo_position_sd
+    observed = (
+        block.photo_positions if block.photo_positions_observed is None else block.photo_positions_observed
+    )
+    for row in np.flatnonzero((np.isfinite(sd) & (sd > 0)).all(axis=1)).tolist():
+        metres = sd[row].copy()
+        if block.spheroid is not None:
+            metres *= [block.spheroid.a * math.cos(observed[row, 1]), block.spheroid.a, 1.0]
+        found.append(Position(block.photo_ids[row], observed[row], sd=metres))
+    return found
+
+
+def _with(block: Block, positions: Sequence[Position]) -> Block:
+    """Return a block with these observed positions in place of its own."""
+    sd = block.photo_position_sd
+    weighted = (np.isfinite(sd) & (sd > 0)).all(axis=1, keepdims=True)
+    others = [each for each in block.observations if not isinstance(each, Position)]
+    return block.replace(
+        photo_position_sd=np.where(weighted, np.inf, sd),
+        photo_positions_observed=None,
+        observations=[*others, *positions],
+    )
+
+
+def _changed(
+    position: Position, observed: Floats | None = None, arm: object = None, shift: Shift | None = None
+) -> Position:
+    return Position(
+        position.photo,
+        position.position if observed is None else observed,
+        covariance=position.precision,
+        lever_arm=position.lever_arm if arm is None else arm,  # type: ignore[arg-type]
+        shift=shift,
+        time=position.time,
+    )
+
+
+def _coordinates(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
+    """Try other units and axes."""
+    hypotheses = [("feet in heights", f"heights of the {WHAT} are in feet, all else in metres", [0, 1, 2], 2)]
+    if block.spheroid is None:
+        hypotheses += [
+            ("feet", f"the {WHAT} are in feet, all else in metres", [0, 1, 2], 0),
+            ("X and Y exchanged", f"X and Y of the {WHAT} are exchanged", [1, 0, 2], 3),
+        ]
+    trials = []
+    for kind, text, order, first in hypotheses:
+        factors = np.where(np.arange(3) >= first, FOOT, 1.0)
+        meant = [_changed(each, np.asarray(each.position)[order] * factors) for each in given]
+        trials.append(_Trial(kind, text, adjusted.tried(_with(block, meant)), 0, meant))
+    return trials
+
+
+def _unknown(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
+    """Try what is unknown and common to all: a height, a shift, a lever arm."""
+    unit = block.linear_unit
+    arms = np.array([_arm(each) for each in given])
+    trials = []
+    unknowns: tuple[tuple[str, Unknown], ...] = (
+        ("geoid", Shift("of the heights", sd=[0.0, 0.0, np.inf])),
+        ("shift", Shift("of all", sd=np.inf)),
+        ("lever arm", LeverArm("of all", np.median(arms, axis=0), sd=np.inf)),
+    )
+    for kind, unknown in unknowns:
+        if isinstance(unknown, Shift):
+            changed = [_changed(each, shift=unknown) for each in given]
+        else:
+            changed = [_changed(each, arm=unknown) for each in given]
+        result = adjusted.tried(_with(block, changed))
+        if result is None or not result.converged:
+            continue
+        (found,) = [each for each in result.unknowns if each.given is unknown]
+        value = np.asarray(found.position)
+        sd = np.sqrt(np.maximum(np.diagonal(found.cofactors), 0))
+        shown = f"({', '.join(f'{v:.3f} +- {s:.3f}' for v, s in zip(value, sd, strict=True))}) {unit}"
+        if kind == "geoid":
+            text = (
+                f"heights of the {WHAT} are {value[2]:.3f} {unit} above those of the control: ellipsoidal and"
+                " orthometric heights are mixed"
+            )
+        elif kind == "shift":
+            text = f"the {WHAT} are in another datum, shifted by {shown}"
+        else:
+            text = _said_of_arm(np.median(arms, axis=0), value, shown)
+        if isinstance(unknown, Shift):
+            fixed = Shift(unknown.name, value, sd=0.0)
+            meant = [_changed(each, shift=fixed) for each in given]
+        else:
+            meant = [_changed(each, arm=value) for each in given]
+        trials.append(_Trial(kind, text, result, 1 if kind == "geoid" else 3, meant))
+    return trials
+
+
+def _arm(position: Position) -> Floats:
+    arm = position.lever_arm
+    return np.asarray(position.observed[3:6]) if not isinstance(arm, LeverArm) else arm.position
+
+
+def _said_of_arm(given: Floats, meant: Floats, shown: str) -> str:
+    """Say what is wrong with a lever arm."""
+    size = float(np.linalg.norm(given))
+    if not size:
+        return f"the antenna has a lever arm of {shown}"
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        if np.linalg.norm(given[list(order)] * signs - meant) < EQUAL * size:
+            wrong = "the wrong sign" if order == (0, 1, 2) else "other axes"
+            return f"the lever arm has {wrong}: it should be about {shown}"
+    return f"the lever arm is wrong: it should be about {shown}"
+
+
+def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
+    """Try positions of another time: Omega is a parabola of it, whose least value three adjustments give."""
+    axes = local_axes(block)
+    number = {name: row for row, name in enumerate(block.photo_ids)}
+    centres = axes.positions(block.photo_positions)[[number[each.photo] for each in given]]
+    times = np.array([each.time for each in given])
+    velocities = np.full(centres.shape, np.nan)
+    timed = bool(np.ptp(times) > 0)
+    for strip in strips_of(centres):
+        steps = times[strip] if timed else np.arange(len(strip), dtype=np.float64)
+        if len(strip) > 1 and (np.diff(steps) > 0).all():
+            velocities[strip] = np.gradient(centres[strip], steps, axis=0)
+    if not np.isfinite(velocities).all():
+        return []
+
+    def earlier(tau: float) -> list[Position]:
+        places = axes.positions(np.array([each.observed[:3] for each in given])) - tau * velocities
+        return [_changed(each, place) for each, place in zip(given, axes.from_local(places), strict=True)]
+
+    def omega(tau: float) -> float:
+        result = adjusted.tried(_with(block, earlier(tau)))
+        return math.inf if result is None or not result.converged else result.sums_of_squares.total
+
+    step = float(np.median([np.sqrt(np.diagonal(each.precision)).max() for each in given]))
+    step *= 3 / float(np.median(np.linalg.norm(velocities, axis=1)))
+    before, here, after = omega(-step), omega(0.0), omega(step)
+    bend = before - 2 * here + after
+    if not (math.isfinite(bend) and bend > 0):
+        return []
+    tau = step * (before - after) / (2 * bend)
+    per = "s" if timed else "steps from photo to photo"
+    text = f"the {WHAT} are those of another time, {abs(tau):.4g} {per} {'later' if tau > 0 else 'earlier'}"
+    meant = earlier(tau)
+    return [_Trial("time offset", text, adjusted.tried(_with(block, meant)), 1, meant)]

@@ -1,0 +1,84 @@
+"""Variance components on the command line, and what the variance of unit weight is based on."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from photogram.cli.job import Job
+
+if TYPE_CHECKING:
+    from photogram.results.components import VarianceComponents
+    from photogram.show.sections import Section
+
+__all__ = ["COMPONENTS", "Components", "UnitVarianceName", "estimated", "with_components"]
+
+COMPONENTS = "components.txt"
+"""What goes to the output directory where variance components are asked for."""
+
+
+class UnitVarianceName(StrEnum):
+    """What the variance of unit weight is based on."""
+
+    FREE = "free"
+    CONSTRAINED = "constrained"
+    UNITY = "unity"
+    REDUNDANCY = "redundancy"
+
+
+class Basis(StrEnum):
+    """What groups of observations are made by."""
+
+    KIND = "kind"
+    CAMERA = "camera"
+    STRIP = "strip"
+    PHOTO = "photo"
+    POINT_CLASS = "point-class"
+    COMPONENT = "component"
+    RAYS = "rays"
+
+
+Components = Annotated[
+    list[Basis] | None,
+    typer.Option(
+        "--components",
+        help="Estimate variance components of groups of observations: by which factors their standard"
+        " deviations are wrong. Given more than once: of all combinations. The results stay those of the"
+        " given weights.",
+        show_default=False,
+    ),
+]
+
+
+def estimated(
+    job: Job, network: object, bases: list[Basis] | None, threads: int | None
+) -> VarianceComponents | None:
+    """Estimate the components that are asked for, if any."""
+    if not bases:
+        return None
+    from photogram.adjustment.components import variance_components
+
+    groups = [basis.value.replace("-", " ") for basis in bases]
+    with job.status("variance components") as status:
+
+        def tell(number: int, _: object) -> None:
+            if status is not None:
+                status.update(f"variance components, adjustment {number + 1}")
+
+        return variance_components(network, groups, threads=threads, progress=tell)
+
+
+def with_components(sections: list[Section], found: VarianceComponents | None) -> list[Section]:
+    """Return a summary, whose first section is the verdict, with what components say in its place."""
+    if found is None:
+        return sections
+    from photogram.results.components import component_lines, statement
+    from photogram.show.sections import verdict_section
+
+    own = [
+        verdict_section(found.verdict),
+        ("Variance components", [*statement(found), *component_lines(found)]),
+    ]
+    return [*own, *sections[1:]]

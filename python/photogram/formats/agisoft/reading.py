@@ -1,0 +1,376 @@
+"""From the camera XML of Metashape to a project: poses, references and markers; it has no tie points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from photogram.arguments.arrays import is_covariance
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.format import Wishes
+from photogram.formats.project import Frame, Project, Size, assembled
+from photogram.formats.xml_stream import Element, read_stream
+from photogram.messages import Message, listed
+from photogram.network.cameras import Camera
+from photogram.network.observations import Control, Observation, Position
+
+__all__ = ["TITLE", "read"]
+
+TITLE = "Agisoft camera XML"
+FLIP = np.diag([1.0, -1.0, -1.0])
+GEOCENTRIC = 1e6
+"""Metres from the origin beyond which a world is geocentric."""
+_TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2")
+
+
+@dataclass
+class _Sensor:
+    camera: Camera
+    size: Size
+    pixel: float | None
+
+
+@dataclass
+class _Similarity:
+    """X_world = s R X_chunk + T."""
+
+    rotation: Floats
+    translation: Floats
+    scale: float
+
+
+def read(path: Path, wishes: Wishes) -> Project:
+    """Read the first chunk of a document.
+
+    Raises
+    ------
+    InputError
+        What is no such document, a calibration in a form that is not known for certain.
+    """
+    root = read_stream(path, {}, "document")
+    chunk = root.child("chunk")
+    if chunk is None:
+        raise root.error("has no chunk")
+    messages: list[Message] = []
+    sensors = _sensors(chunk, messages)
+    shots = _shots(chunk, sensors, messages)
+    centres, matrices, world = _poses(chunk, shots)
+    references = chunk.word("reference")
+    frame, positions = _frame(world, centres, matrices, references, messages)
+    names = [each.attributes["label"] for each in shots]
+    observations, lacks = _gnss(positions, shots, names, wishes)
+    markers = {each.attributes.get("id", ""): each for each in _members(chunk, "markers", "marker")}
+    points, starts, held, sd, full = _markers(positions, list(markers.values()), wishes)
+    rows = {each.attributes["id"]: row for row, each in enumerate(shots)}
+    photos, owners, xy = _locations(chunk, rows, {key: row for row, key in enumerate(markers)})
+    order = list(sensors)
+    return assembled(
+        path=path,
+        title=TITLE,
+        cameras=[each.camera for each in sensors.values()],
+        sizes=[each.size for each in sensors.values()],
+        pixel_mm=[each.pixel for each in sensors.values()],
+        photo_ids=names,
+        photo_cameras=[order.index(each.attributes["sensor_id"]) for each in shots],
+        centres=centres,
+        matrices=matrices,
+        point_ids=points,
+        starts=starts,
+        point_positions=held,
+        point_sd=sd,
+        image_photos=photos,
+        image_points=owners,
+        image_xy=xy,
+        observations=[*full, *observations],
+        frame=frame,
+        lacks=["no tie points: export BlocksExchange for these", *lacks],
+        messages=messages,
+    )
+
+
+def _members(chunk: Element, folder: str, name: str) -> list[Element]:
+    """Return the elements of a list, also within groups."""
+    found = chunk.child(folder)
+    if found is None:
+        return []
+    return [own for each in found.children for own in ([each] if each.name == name else each.all(name))]
+
+
+def _sensors(chunk: Element, messages: list[Message]) -> dict[str, _Sensor]:
+    found: dict[str, _Sensor] = {}
+    names: set[str] = set()
+    for each in _members(chunk, "sensors", "sensor"):
+        key = each.attributes.get("id", "")
+        name = each.attributes.get("label") or f"sensor {key}"
+        while name in names:
+            name += "'"
+        names.add(name)
+        try:
+            found[key] = _sensor(each, name, messages)
+        except InputError as error:
+            raise (error if error.file else each.error(error.message)) from None
+    if not found:
+        raise chunk.error("has no sensors")
+    return found
+
+
+def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
+    kind = element.attributes.get("type", "frame")
+    resolution = element.need("resolution")
+    width, height = resolution.attribute("width"), resolution.attribute("height")
+    if not (0 < width < 2**31 and 0 < height < 2**31 and width == int(width) and height == int(height)):
+        raise resolution.error("the pictures have no size")
+    size = int(width), int(height)
+    properties = {
+        each.attributes.get("name"): each.attribute("value")
+        for each in element.all("property")
+        if each.attributes.get("name") in ("pixel_width", "focal_length")
+    }
+    pixel = properties.get("pixel_width") or None
+    if kind == "spherical":
+        return _Sensor(Camera("equirectangular", {"w": width, "h": height}, name=name), size, pixel)
+    if kind not in ("frame", "fisheye"):
+        raise element.error(f"sensors of the type {kind} are not read")
+    by_class = {each.attributes.get("class", ""): each for each in element.all("calibration")}
+    calibration = by_class.get("adjusted") or by_class.get("initial")
+    values = {"w": width, "h": height}
+    if calibration is None:
+        if not pixel or "focal_length" not in properties:
+            raise element.error("has neither a calibration nor pixel_width and focal_length")
+        values["f"] = properties["focal_length"] / pixel
+    elif calibration.child("fx") is not None:
+        fx, fy = calibration.number("fx"), calibration.number("fy")
+        values |= {term: calibration.number(term, 0.0) for term in ("k1", "k2", "k3", "k4", "p1", "p2")}
+        values |= {"f": fy, "b1": fx - fy, "b2": calibration.number("skew", 0.0)}
+        values |= {"cx": calibration.number("cx") - width / 2, "cy": calibration.number("cy") - height / 2}
+        if values["p1"] or values["p2"]:
+            messages.append(
+                Message(
+                    f"{name}: documents of version 1.2 are said to have p1 and p2 exchanged: look"
+                    " at the residuals"
+                )
+            )
+    else:
+        values |= {"f": calibration.number("f")} | {term: calibration.number(term, 0.0) for term in _TERMS}
+    if calibration is not None:
+        for term in ("p3", "p4"):
+            if calibration.number(term, 0.0):
+                raise calibration.error(f"{term} is not zero: no camera of ours has it")
+    return _Sensor(Camera(f"agisoft_{kind}", values, name=name), size, pixel)
+
+
+def _shots(chunk: Element, sensors: dict[str, _Sensor], messages: list[Message]) -> list[Element]:
+    """Return cameras with a pose; the others cannot show anything."""
+    found, lost, seen = [], [], set()
+    for each in _members(chunk, "cameras", "camera"):
+        label = each.attributes.get("label", "")
+        if not label or "id" not in each.attributes:
+            continue
+        if each.attributes.get("sensor_id") not in sensors:
+            raise each.error(f"the sensor of {label} is not there")
+        if each.child("transform") is None:
+            lost.append(label)
+            continue
+        if label in seen or not label.isprintable() or not label.strip():
+            raise each.error(f"the camera {label} is there twice, or has no name that prints")
+        seen.add(label)
+        found.append(each)
+    if lost:
+        messages.append(Message(f"{len(lost)} cameras were not aligned and are left out: {listed(lost, 3)}"))
+    if not found:
+        raise chunk.error("has no aligned cameras")
+    return found
+
+
+def _poses(chunk: Element, shots: list[Element]) -> tuple[Floats, Floats, bool]:
+    """Return centres and attitudes in the world, and whether that is geocentric."""
+    own = chunk.child("transform")
+    whole = _similarity(own) if own is not None and own.child("rotation") is not None else None
+    components = {
+        each.attributes.get("id"): each.child("transform")
+        for each in _members(chunk, "components", "component")
+    }
+    by_component = {
+        key: _similarity(each)
+        for key, each in components.items()
+        if each is not None and each.child("rotation")
+    }
+    centres, matrices = np.empty((len(shots), 3)), np.empty((len(shots), 3, 3))
+    for row, each in enumerate(shots):
+        transform = each.need("transform")
+        values = transform.numbers(16).reshape(4, 4)
+        turn = _rotation(transform, values[:3, :3])
+        similarity = by_component.get(each.attributes.get("component_id"), whole)
+        if similarity is None:
+            similarity = _Similarity(np.eye(3), np.zeros(3), 1.0)
+        matrices[row] = similarity.rotation @ turn @ FLIP
+        centres[row] = similarity.scale * similarity.rotation @ values[:3, 3] + similarity.translation
+    return centres, matrices, bool(np.linalg.norm(centres.mean(axis=0)) > GEOCENTRIC)
+
+
+def _similarity(element: Element) -> _Similarity:
+    rotation = element.need("rotation")
+    scale = element.number("scale", 1.0)
+    if not scale > 0:
+        raise element.error("the scale is not positive")
+    shift = element.child("translation")
+    translation = np.zeros(3) if shift is None else shift.numbers(3)
+    return _Similarity(_rotation(rotation, rotation.numbers(9).reshape(3, 3)), translation, scale)
+
+
+def _rotation(element: Element, matrix: Floats) -> Floats:
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    if not apart < 1e-6 or np.linalg.det(matrix) < 0:
+        raise element.error("is no rotation matrix: not orthonormal, or mirrored")
+    found: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2
+    return found
+
+
+@dataclass
+class _Positions:
+    """What carries references into the frame."""
+
+    frame: Frame
+    crs: str
+
+    def carried(self, xyz: Floats, sd: Floats) -> tuple[Floats, Floats]:
+        """Return positions and covariances in the frame."""
+        covariances = np.zeros((len(xyz), 3, 3))
+        covariances[:, range(3), range(3)] = sd**2
+        if self.frame.kind == "cartesian" or not len(xyz):
+            return xyz, covariances
+        from photogram.formats.crs import to_frame
+
+        found, turned, _ = to_frame(self.crs, xyz, covariances, self.frame)
+        return found, turned
+
+
+def _frame(
+    geocentric: bool, centres: Floats, matrices: Floats, reference: str, messages: list[Message]
+) -> tuple[Frame, _Positions]:
+    """Turn poses from geocentric axes into a topocentric frame, in place."""
+    if not geocentric:
+        frame = Frame()
+        return frame, _Positions(frame, "")
+    from photogram.formats.crs import GEOCENTRIC as EARTH
+    from photogram.formats.crs import GEOGRAPHIC, amid, to_frame, turn_to_frame
+
+    frame = Frame("topocentric", "EPSG:4979", amid(EARTH, centres))
+    matrices[:] = turn_to_frame(EARTH, centres, frame) @ matrices
+    centres[:] = to_frame(EARTH, centres, np.zeros((len(centres), 3, 3)), frame)[0]
+    messages.append(Message(f"geocentric poses are adjusted in a frame that is {frame}"))
+    if not reference:
+        messages.append(
+            Message("the document names no system of its references: longitude, latitude, height")
+        )
+    return frame, _Positions(frame, reference or GEOGRAPHIC)
+
+
+def _reference(element: Element, default: Floats) -> tuple[Floats, Floats] | None:
+    """Return the reference of a camera or marker, and its standard deviations; None without."""
+    own = element.child("reference")
+    if own is None or any(axis not in own.attributes for axis in "xyz"):
+        return None
+    position = np.array([own.attribute(axis) for axis in "xyz"])
+    common = own.attribute("sxy", float("nan")) if "sxy" in own.attributes else None
+    sd = [
+        own.attribute(f"s{axis}", float(default[k] if common is None or k == 2 else common))
+        for k, axis in enumerate("xyz")
+    ]
+    return position, np.array(sd)
+
+
+def _enabled(element: Element) -> bool:
+    own = element.child("reference")
+    return own is not None and own.attributes.get("enabled", "true").lower() not in ("false", "0")
+
+
+def _gnss(
+    positions: _Positions, shots: list[Element], names: list[str], wishes: Wishes
+) -> tuple[list[Observation], list[str]]:
+    default = np.broadcast_to(wishes.sd.get("gnss", (np.nan,)), 3)
+    given = {
+        row: own
+        for row, each in enumerate(shots)
+        if _enabled(each) and (own := _reference(each, default)) is not None
+    }
+    known = {row: own for row, own in given.items() if (own[1] > 0).all()}
+    lacks = []
+    if len(known) < len(given):
+        lacks.append(
+            f"no standard deviations of {len(given) - len(known)} references of cameras (--sd gnss=..)"
+        )
+    if not known:
+        return [], lacks
+    found, turned = positions.carried(
+        np.array([own[0] for own in known.values()]), np.array([own[1] for own in known.values()])
+    )
+    return [
+        Position(names[row], found[k], covariance=(turned[k] + turned[k].T) / 2)
+        for k, row in enumerate(known)
+    ], lacks
+
+
+def _markers(
+    positions: _Positions, markers: list[Element], wishes: Wishes
+) -> tuple[list[str], Floats, Floats, Floats, list[Observation]]:
+    names: list[str] = []
+    count = len(markers)
+    starts, sd = np.full((count, 3), np.nan), np.full((count, 3), np.inf)
+    held = starts.copy()
+    observed: list[Observation] = []
+    default = np.broadcast_to(wishes.sd.get("control", (np.nan,)), 3)
+    for row, each in enumerate(markers):
+        name = each.attributes.get("label") or f"marker {row}"
+        if name in names or not name.isprintable() or not name.strip():
+            raise each.error(f"the marker {name} is there twice, or has no name that prints")
+        names.append(name)
+        reference = _reference(each, default)
+        if reference is None:
+            continue
+        enabled = _enabled(each)
+        if enabled and not (reference[1] > 0).all():
+            raise each.error(f"the marker {name} has no accuracy: --sd control=...")
+        found, turned = positions.carried(reference[0][np.newaxis], np.nan_to_num(reference[1])[np.newaxis])
+        starts[row] = held[row] = found[0]
+        if not enabled:
+            continue
+        if (turned[0] == np.diag(np.diag(turned[0]))).all():
+            sd[row] = np.sqrt(np.diag(turned[0]))
+        elif is_covariance(turned[0]):
+            held[row] = np.nan
+            observed.append(Control(name, found[0], covariance=(turned[0] + turned[0].T) / 2))
+        else:
+            raise each.error(f"the accuracies of the marker {name} cannot be")
+    return names, starts, held, sd, observed
+
+
+def _locations(
+    chunk: Element, rows: dict[str, int], markers: dict[str, int]
+) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], np.ndarray[tuple[int], np.dtype[np.int64]], Floats]:
+    """Return what was measured by hand: predicted locations are no observations."""
+    photos, points, xy = [], [], []
+    for frame in _members(chunk, "frames", "frame"):
+        for marker in _members(frame, "markers", "marker"):
+            point = markers.get(marker.attributes.get("marker_id", ""))
+            for each in marker.all("location"):
+                photo = rows.get(each.attributes.get("camera_id", ""))
+                if point is None or photo is None:
+                    continue
+                if (
+                    each.attributes.get("pinned", "true") == "false"
+                    or each.attributes.get("valid", "true") == "false"
+                ):
+                    continue
+                photos.append(photo)
+                points.append(point)
+                xy.append((each.attribute("x"), each.attribute("y")))
+    return (
+        np.array(photos, dtype=np.int64),
+        np.array(points, dtype=np.int64),
+        np.array(xy, dtype=float).reshape(-1, 2),
+    )

@@ -1,0 +1,389 @@
+"""From BlocksExchange XML to a project."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.blocks_exchange.systems import PhotoRecord, PointRecord, Systems
+from photogram.formats.format import Wishes
+from photogram.formats.project import Project, Size, assembled
+from photogram.formats.self_check import agreement
+from photogram.formats.xml_stream import Element, read_stream
+from photogram.messages import Message
+from photogram.network.attitudes import Attitudes
+from photogram.network.cameras import Camera
+
+__all__ = ["ORIENTATIONS", "TITLE", "read"]
+
+TITLE = "BlocksExchange"
+ORIENTATIONS = {
+    "XRightYDown": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+    "XRightYUp": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "XLeftYDown": ((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
+    "XLeftYUp": ((-1, 0, 0), (0, 1, 0), (0, 0, -1)),
+    "XDownYRight": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
+    "XDownYLeft": ((0, -1, 0), (-1, 0, 0), (0, 0, -1)),
+    "XUpYRight": ((0, 1, 0), (1, 0, 0), (0, 0, -1)),
+    "XUpYLeft": ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
+}
+"""Rows: the axes of a camera orientation in those of the house, x right, y up, z back."""
+CENTER = 0.5
+"""The middle of the first pixel is 0, 0: what is added to count from the corner."""
+_TERMS = frozenset({"K1", "K2", "K3", "P1", "P2"})
+BETTER, NOTICED = 3.0, 0.1
+"""How much better another reading of the distortion must be to refuse a file, and above which median."""
+
+
+@dataclass
+class _Group:
+    """Photos of one camera."""
+
+    camera: Camera
+    size: Size
+    axes: Floats
+    pixel: float | None
+
+
+@dataclass
+class _Found:
+    """What was found in a file, as it comes."""
+
+    wishes: Wishes
+    systems: dict[str, str] = field(default_factory=dict)
+    blocks: list[str] = field(default_factory=list)
+    groups: list[_Group] = field(default_factory=list)
+    photos: dict[int, PhotoRecord] = field(default_factory=dict)
+    points: list[PointRecord] = field(default_factory=list)
+    images: list[tuple[int, int, float, float, bool]] = field(default_factory=list)
+    """Photo id, point, x, y, and whether these are millimetres from the principal point."""
+    measured: list[Element] = field(default_factory=list)
+
+
+def read(path: Path, wishes: Wishes) -> Project:
+    """Read a file with one block.
+
+    Raises
+    ------
+    InputError
+        What is no such file, a camera or an attitude in a form that is not known for certain.
+    """
+    found = _Found(wishes)
+    take = {
+        "SRS": partial(_system, found),
+        "Photogroup": partial(_group, found),
+        "ControlPoint": partial(_control, found),
+        "TiePoint": partial(_tie, found),
+    }
+    root = read_stream(path, take, "BlocksExchange")
+    block = root.child("Block")
+    if len(list(root.all("Block"))) > 1:
+        raise root.error("holds several blocks: export them one by one")
+    if block is None or not found.photos:
+        raise root.error("holds no block with photos")
+    return _checked(_project(path, found, block.word("SRSId")))
+
+
+def _system(found: _Found, element: Element) -> None:
+    found.systems[element.word("Id")] = element.word("Definition")
+
+
+def _group(found: _Found, element: Element) -> None:
+    dimensions = element.need("ImageDimensions")
+    size = dimensions.whole("Width"), dimensions.whole("Height")
+    if not (0 < size[0] < 2**31 and 0 < size[1] < 2**31):
+        raise dimensions.error("the pictures have no size")
+    kind = element.word("CameraModelType", "Perspective")
+    if kind != "Perspective":
+        raise element.error(f"cameras of the type {kind} are not read: their formula is not published")
+    orientation = element.word("CameraOrientation", "XRightYDown")
+    if orientation not in ORIENTATIONS:
+        raise element.error(f"the camera orientation {orientation} is none of {', '.join(ORIENTATIONS)}")
+    axes = np.array(ORIENTATIONS[orientation], dtype=float)
+    pixel = _pixel(element, size)
+    try:
+        camera = _camera(
+            element, size, axes, pixel, f"{element.word('Name') or 'camera'} {len(found.groups) + 1}"
+        )
+    except InputError as error:
+        raise (error if error.file else element.error(error.message)) from None
+    found.groups.append(_Group(camera, size, axes, pixel))
+    srs = element.word("SRSId")
+    for photo in element.all("Photo"):
+        _photo(found, photo, srs)
+
+
+def _pixel(element: Element, size: Size) -> float | None:
+    """Return the side of a pixel in millimetres."""
+    if element.child("PixelSize") is not None:
+        pixel = element.number("PixelSize")
+    elif element.child("SensorSize") is not None:
+        pixel = element.number("SensorSize") / max(size)
+    else:
+        return None
+    if not pixel > 0:
+        raise element.error("the size of the sensor is not positive")
+    return pixel
+
+
+def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, name: str) -> Camera:
+    if element.child("FocalLengthPixels") is not None:
+        f = element.number("FocalLengthPixels")
+    elif pixel is not None:
+        f = element.number("FocalLength") / pixel
+    else:
+        raise element.error("has neither FocalLengthPixels nor the size of the sensor")
+    cx, cy = size[0] / 2, size[1] / 2
+    point = element.child("PrincipalPoint")
+    if point is not None and point.child("xmm") is not None:
+        if pixel is None:
+            raise point.error("is in millimetres, and the sensor has no size")
+        right, up = (axes[:2, :2].T @ [point.number("xmm"), point.number("ymm")]) / pixel
+        cx, cy = cx + right, cy - up
+    elif point is not None:
+        cx, cy = point.number("x") + CENTER, point.number("y") + CENTER
+    terms = _terms(element)
+    fy, skew = f * element.number("AspectRatio", 1.0), element.number("Skew", 0.0)
+    if skew:
+        offsets = {"cx": cx - size[0] / 2, "cy": cy - size[1] / 2, "w": float(size[0]), "h": float(size[1])}
+        own = {"k1": terms["K1"], "k2": terms["K2"], "k3": terms["K3"], "p1": terms["P1"], "p2": terms["P2"]}
+        return Camera("agisoft_frame", {"f": fy, "b1": f - fy, "b2": skew, **offsets, **own}, name=name)
+    return Camera(
+        "full_opencv",
+        # P1 is the coefficient of r^2 + 2 x^2 in x, which OpenCV calls p2.
+        {
+            "fx": f,
+            "fy": fy,
+            "cx": float(cx),
+            "cy": float(cy),
+            "k1": terms["K1"],
+            "k2": terms["K2"],
+            "k3": terms["K3"],
+            "p1": terms["P2"],
+            "p2": terms["P1"],
+        },
+        name=name,
+    )
+
+
+def _terms(element: Element) -> dict[str, float]:
+    found = dict.fromkeys(sorted(_TERMS), 0.0)
+    distortion = element.child("Distortion")
+    if distortion is None:
+        return found
+    for each in distortion.children:
+        if each.name in _TERMS:
+            found[each.name] = each.value
+        elif each.text.strip() not in ("", "0", "0.0", "false"):
+            raise each.error(f"a distortion with {each.name} is not known")
+    return found
+
+
+def _photo(found: _Found, element: Element, srs: str) -> None:
+    number = element.whole("Id")
+    if number in found.photos:
+        raise element.error(f"the photo {number} is there twice")
+    pose = element.child("Pose")
+    unknown = np.full(3, np.nan)
+    centre, rotation, gnss, gnss_srs = unknown, np.full((3, 3), np.nan), None, srs
+    if pose is not None:
+        own = pose.child("Center")
+        if own is not None:
+            centre, srs = _position(own), own.word("SRSId") or srs
+        turn = pose.child("Rotation")
+        if turn is not None:
+            rotation = found.groups[-1].axes.T @ _rotation(turn)
+        metadata = pose.child("Metadata")
+        if metadata is not None and metadata.child("Center") is not None:
+            gnss, gnss_srs = _position(metadata.need("Center")), metadata.word("SRSId") or srs
+    path = element.word("ImagePath")
+    if not path:
+        raise element.error(f"the photo {number} has no ImagePath")
+    found.photos[number] = PhotoRecord(
+        path, len(found.groups) - 1, centre, rotation, srs, gnss, gnss_srs, element
+    )
+
+
+def _position(element: Element) -> Floats:
+    return np.array([element.number(axis) for axis in "xyz"])
+
+
+def _rotation(element: Element) -> Floats:
+    """Return (3, 3) world to camera, in the axes of the camera orientation."""
+    if element.child("M_00") is not None:
+        matrix = np.array([[element.number(f"M_{i}{j}") for j in range(3)] for i in range(3)])
+        with np.errstate(over="ignore", invalid="ignore"):
+            apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
+        if not apart < 1e-6 or np.linalg.det(matrix) < 0:
+            raise element.error("is no rotation matrix: not orthonormal, or mirrored")
+        nearest: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2
+        return nearest
+    if element.child("Omega") is not None:
+        angles = np.radians([[element.number(name) for name in ("Omega", "Phi", "Kappa")]])
+        if np.abs(angles).max() > 1e4:
+            raise element.error("has angles that are no degrees")
+        found: Floats = Attitudes.of("omega_phi_kappa", angles).values("matrix_to_photo")[0]
+        return found
+    raise element.error(
+        "is neither a matrix nor Omega, Phi, Kappa; conventions of other angles are not certain: export"
+        " matrices"
+    )
+
+
+def _control(found: _Found, element: Element) -> None:
+    name = element.word("Name") or f"control {len(found.points) + 1}"
+    category = element.word("Category", "Full")
+    given = element.need("Position")
+    position = np.array([np.nan if given.child(axis) is None else given.number(axis) for axis in "xyz"])
+    if category == "Horizontal":
+        position[2] = np.nan
+    elif category == "Vertical":
+        position[:2] = np.nan
+    elif category != "Full":
+        raise element.error(f"the category {category} is none of Full, Horizontal, Vertical")
+    default = np.broadcast_to(found.wishes.sd.get("control", (np.nan,)), 3)
+    sd = np.array(
+        [
+            *[element.number("HorizontalAccuracy", float(default[0]))] * 2,
+            element.number("VerticalAccuracy", float(default[2])),
+        ]
+    )
+    check = element.word("CheckPoint").lower() in ("true", "1")
+    if not check and not (sd[~np.isnan(position)] > 0).all():
+        raise element.error(f"the control point {name} has no accuracy: --sd control=...")
+    found.points.append(PointRecord(name, element, position, element.word("SRSId"), sd, check))
+    _measurements(found, element)
+
+
+def _tie(found: _Found, element: Element) -> None:
+    given = element.child("Position")
+    position = np.full(3, np.nan) if given is None else _position(given)
+    name = element.word("Name") or f"tie {len(found.points) + 1}"
+    found.points.append(PointRecord(name, element, position, element.word("SRSId")))
+    _measurements(found, element)
+
+
+def _measurements(found: _Found, element: Element) -> None:
+    point = len(found.points) - 1
+    for each in element.all("Measurement"):
+        millimetres = each.child("xmm") is not None
+        x, y = (each.number(name) for name in (("xmm", "ymm") if millimetres else ("x", "y")))
+        found.images.append((each.whole("PhotoId"), point, x, y, millimetres))
+        found.measured.append(each)
+
+
+def _project(path: Path, found: _Found, srs: str) -> Project:
+    messages: list[Message] = []
+    photos = list(found.photos.values())
+    rows = {number: row for row, number in enumerate(found.photos)}
+    frames = Systems(found.systems, srs, photos, messages)
+    centres = np.array([each.centre for each in photos])
+    matrices = np.array([each.rotation.T for each in photos])
+    centres, matrices = frames.poses(photos, centres, matrices)
+    images = [each for each in found.images if each[0] in rows]
+    if len(images) < len(found.images):
+        messages.append(
+            Message(f"{len(found.images) - len(images)} measurements are on photos that are not there")
+        )
+    names = [each.path.replace("\\", "/").rsplit("/", 1)[-1] for each in photos]
+    if len(set(names)) < len(names):
+        names = [each.path for each in photos]
+    for name, photo in zip(names, photos, strict=True):
+        if not name.strip() or not name.isprintable():
+            raise photo.place.error("the ImagePath is no name")
+    points = _names(found)
+    starts, positions, sd, observed = frames.points(found.points, points)
+    of_photo = np.array([each.group for each in photos], dtype=np.int64)
+    image_photos = np.array([rows[each[0]] for each in images], dtype=np.int64)
+    return assembled(
+        path=path,
+        title=TITLE,
+        cameras=[each.camera for each in found.groups],
+        sizes=[each.size for each in found.groups],
+        pixel_mm=[each.pixel for each in found.groups],
+        photo_ids=names,
+        photo_cameras=of_photo,
+        centres=centres,
+        matrices=matrices,
+        point_ids=points,
+        starts=starts,
+        point_positions=positions,
+        point_sd=sd,
+        image_photos=image_photos,
+        image_points=np.array([each[1] for each in images], dtype=np.int64),
+        image_xy=_corner(found, images, of_photo[image_photos]),
+        observations=[*observed, *frames.gnss(photos, names, found.wishes)],
+        frame=frames.frame,
+        lacks=frames.lacks,
+        messages=messages,
+    )
+
+
+def _names(found: _Found) -> list[str]:
+    names: list[str] = []
+    taken: set[str] = set()
+    for each in found.points:
+        name = each.name
+        while name in taken:
+            if each.sd is not None:
+                raise each.place.error(f"the control point {name} is there twice")
+            name += "'"
+        if not name.strip() or not name.isprintable():
+            raise each.place.error("the point has no name that prints")
+        taken.add(name)
+        names.append(name)
+    return names
+
+
+def _corner(found: _Found, images: list[tuple[int, int, float, float, bool]], groups: Any) -> Floats:
+    """Return (m, 2) columns and rows from the corner."""
+    xy = np.array([each[2:4] for each in images], dtype=float).reshape(-1, 2)
+    millimetres = np.array([each[4] for each in images], dtype=bool)
+    corner = xy + CENTER
+    for row, group in enumerate(found.groups):
+        own = millimetres & (groups == row)
+        if not own.any():
+            continue
+        if group.pixel is None:
+            raise found.measured[0].error("measurements are in millimetres, and the sensor has no size")
+        right, up = (xy[own] @ group.axes[:2, :2] / group.pixel).T
+        values = group.camera.parameters
+        cx, cy = values["cx"], values["cy"]
+        if group.camera.model == "agisoft_frame":
+            cx, cy = cx + group.size[0] / 2, cy + group.size[1] / 2
+        corner[own] = np.column_stack([cx + right, cy - up])
+    return corner
+
+
+def _checked(project: Project) -> Project:
+    """Refuse a file whose lens terms fit better in another reading."""
+    as_read = agreement(project).median
+    if not as_read > NOTICED:
+        return project
+    for name, change in (("P1 and P2 exchanged", _exchanged), ("K1, K2, K3 with the other sign", _negated)):
+        cameras = [change(each) for each in project.block.cameras]
+        other = agreement(project.replace(block=project.block.replace(cameras=cameras))).median
+        if other * BETTER < as_read:
+            raise InputError(
+                f"the median residual is {as_read:.3g} px by the published distortion, {other:.3g} px"
+                f" with {name}:"
+                " the program that wrote the file means something else",
+                file=project.path,
+            )
+    return project
+
+
+def _exchanged(camera: Camera) -> Camera:
+    values = camera.parameters
+    return camera.replace(parameters={**values, "p1": values["p2"], "p2": values["p1"]})
+
+
+def _negated(camera: Camera) -> Camera:
+    values = camera.parameters
+    return camera.replace(parameters={**values, **{name: -values[name] for name in ("k1", "k2", "k3")}})

@@ -1,0 +1,183 @@
+"""From a project to BlocksExchange XML, version 2.1: matrices, pixels, y down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.blocks_exchange.reading import CENTER
+from photogram.formats.images import sizes_of, to_corner
+from photogram.formats.lenses import lens_of
+from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.project import Project, Size
+from photogram.network.cameras import Camera
+from photogram.network.observations import Control, Position
+
+__all__ = ["FILE", "cannot_hold", "write"]
+
+FILE = "block.xml"
+
+
+def cannot_hold(project: Project) -> list[str]:
+    """Return what of a project the file has no place for."""
+    block = project.block
+    found = ["standard deviations of images, poses and cameras"]
+    sd = block.point_sd[np.isfinite(block.point_sd).all(axis=1)]
+    if (sd[:, 0] != sd[:, 1]).any():
+        found.append(
+            "standard deviations of control that differ in x and y: their root mean square stands for both"
+        )
+    if any(isinstance(each, Control) for each in block.observations):
+        found.append("correlations between coordinates of control")
+    others = sum(not isinstance(each, Position | Control) for each in block.observations)
+    if others:
+        found.append(f"{others} observations beside images, control and GNSS")
+    if any(isinstance(each, Position) for each in block.observations):
+        found.append("standard deviations of GNSS, lever arms, shifts and drifts")
+    if block.mounts:
+        found.append("rigs: photos have their poses")
+    return found
+
+
+def write(project: Project) -> Mapping[str, bytes]:
+    """Return the file.
+
+    Raises
+    ------
+    InputError
+        Cameras with more than K1, K2, K3, P1, P2; pictures of unknown size; geographic coordinates.
+    """
+    block = project.block
+    if block.geographic:
+        raise InputError(
+            "blocks are written in a cartesian frame: geographic coordinates have no place there"
+        )
+    cameras, which = known_cameras(block)
+    frame = project.frame
+    definition = (
+        "ENU:{!r},{!r},{!r}".format(*frame.origin)
+        if frame.kind == "topocentric" and frame.origin is not None
+        else 'LOCAL_CS["Local",UNIT["metre",1]]'
+    )
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>',
+        '<BlocksExchange version="2.1">',
+        "<SpatialReferenceSystems>",
+    ]
+    lines += [f"<SRS><Id>0</Id><Name>frame</Name><Definition>{escape(definition)}</Definition></SRS>"]
+    lines += ["</SpatialReferenceSystems>", "<Block>", f"<Name>{_text(block.title or 'block')}</Name>"]
+    lines += ["<Type>Aerial</Type>", "<SRSId>0</SRSId>", "<Photogroups>"]
+    gnss = {
+        each.photo: each.observed[:3].tolist() for each in block.observations if isinstance(each, Position)
+    }
+    rotations = np.diag([1.0, -1.0, -1.0]) @ attitude_matrices(block).transpose(0, 2, 1)
+    for row, (camera, size) in enumerate(zip(cameras, sizes_of(project), strict=True)):
+        lines += ["<Photogroup>", *_camera(camera, size)]
+        for photo in np.flatnonzero(np.asarray(which) == row).tolist():
+            lines += _photo(project, photo, rotations[photo].tolist(), gnss)
+        lines.append("</Photogroup>")
+    lines += ["</Photogroups>", *_points(project), "</Block>", "</BlocksExchange>", ""]
+    return {FILE: "\n".join(lines).encode()}
+
+
+def _text(text: str) -> str:
+    return escape("".join(each if each.isprintable() else " " for each in text))
+
+
+def _tags(values: Mapping[str, float]) -> str:
+    return "".join(f"<{name}>{value!r}</{name}>" for name, value in values.items())
+
+
+def _camera(camera: Camera, size: Size) -> list[str]:
+    lens = lens_of(camera, size)
+    if lens is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
+        raise InputError(
+            f"the camera {camera.title} has the model {camera.model}, which BlocksExchange does not have"
+        )
+    terms = {"K1": lens.k1, "K2": lens.k2, "K3": lens.k3, "P1": lens.p2, "P2": lens.p1}
+    return [
+        f"<Name>{_text(camera.title)}</Name>",
+        f"<ImageDimensions><Width>{size[0]}</Width><Height>{size[1]}</Height></ImageDimensions>",
+        "<CameraModelType>Perspective</CameraModelType>",
+        f"<FocalLengthPixels>{lens.fx!r}</FocalLengthPixels>",
+        "<CameraOrientation>XRightYDown</CameraOrientation>",
+        f"<PrincipalPoint>{_tags({'x': lens.cx - CENTER, 'y': lens.cy - CENTER})}</PrincipalPoint>",
+        f"<Distortion>{_tags(terms)}</Distortion>",
+        f"<AspectRatio>{lens.fy / lens.fx!r}</AspectRatio>",
+        "<Skew>0.0</Skew>",
+    ]
+
+
+def _photo(
+    project: Project, photo: int, rotation: list[list[float]], gnss: Mapping[str, list[float]]
+) -> list[str]:
+    name = project.block.photo_ids[photo]
+    pose = ""
+    if np.isfinite(rotation).all():
+        matrix = {f"M_{i}{j}": rotation[i][j] for i in range(3) for j in range(3)}
+        pose += f"<Rotation>{_tags(matrix)}<Accurate>true</Accurate></Rotation>"
+    centre = project.block.photo_positions[photo]
+    if np.isfinite(centre).all():
+        own = _tags(dict(zip("xyz", centre.tolist(), strict=True)))
+        pose += f"<Center>{own}<Accurate>true</Accurate></Center>"
+    if name in gnss:
+        own = _tags(dict(zip("xyz", gnss[name], strict=True)))
+        pose += f"<Metadata><SRSId>0</SRSId><Center>{own}</Center></Metadata>"
+    return [
+        "<Photo>",
+        f"<Id>{photo}</Id>",
+        f"<ImagePath>{escape(name)}</ImagePath>",
+        *([f"<Pose>{pose}</Pose>"] if pose else []),
+        "</Photo>",
+    ]
+
+
+def _points(project: Project) -> list[str]:
+    block = project.block
+    corner = (to_corner(project) - CENTER).tolist()
+    images: list[list[str]] = [[] for _ in block.point_ids]
+    for photo, point, (x, y) in zip(
+        block.image_photos.tolist(), block.image_points.tolist(), corner, strict=True
+    ):
+        images[point].append(f"<Measurement><PhotoId>{photo}</PhotoId><x>{x!r}</x><y>{y!r}</y></Measurement>")
+    full = {each.point: each for each in block.observations if isinstance(each, Control)}
+    control, ties = ["<ControlPoints>"], ["<TiePoints>"]
+    checks = set(project.checks)
+    for row, name in enumerate(block.point_ids):
+        position, sd = block.point_positions[row], block.point_sd[row]
+        if name in full:
+            position, sd = full[name].observed, np.sqrt(np.diag(full[name].precision))
+        if name in full or row in checks or np.isfinite(sd).any():
+            control += [
+                "<ControlPoint>",
+                f"<Name>{escape(name)}</Name>",
+                *_given(position, sd, row in checks),
+            ]
+            control += [*images[row], "</ControlPoint>"]
+            continue
+        start = project.starts[row]
+        known = (
+            [f"<Position>{_tags(dict(zip('xyz', start.tolist(), strict=True)))}</Position>"]
+            if np.isfinite(start).all()
+            else []
+        )
+        ties += ["<TiePoint>", f"<Name>{escape(name)}</Name>", *known, *images[row], "</TiePoint>"]
+    return [*control, "</ControlPoints>", *ties, "</TiePoints>"]
+
+
+def _given(position: Floats, sd: Floats, check: bool) -> list[str]:
+    held = np.isfinite(position) if check else np.isfinite(sd)
+    category = "Full" if held.all() else "Vertical" if held[2] and not held[:2].any() else "Horizontal"
+    tags = {axis: float(value) for axis, value, own in zip("xyz", position, held, strict=True) if own}
+    lines = [f"<Category>{category}</Category>", f"<Position>{_tags(tags)}</Position>"]
+    if check:
+        return [*lines, "<CheckPoint>true</CheckPoint>"]
+    if held[:2].all():
+        lines.append(f"<HorizontalAccuracy>{float(np.sqrt((sd[:2] ** 2).mean()))!r}</HorizontalAccuracy>")
+    if held[2]:
+        lines.append(f"<VerticalAccuracy>{float(sd[2])!r}</VerticalAccuracy>")
+    return lines

@@ -1,0 +1,102 @@
+"""Text files of words in lines, as PATB and BINGO have them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.io.delimited import read_columns
+from photogram.io.files import read_lines
+from photogram.io.numbers import finite_number
+from photogram.io.places import Place
+from photogram.messages import quoted
+
+__all__ = ["END", "Card", "angle_unit", "cards", "names_beside", "to_radians"]
+
+END = "-99"
+"""What ends a photo, or a file."""
+_UNITS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}
+
+
+class Card:
+    """The words of a line, and where it stands."""
+
+    def __init__(self, place: Place) -> None:
+        self.place = place
+        self.words = (place.text or "").split()
+
+    def number(self, index: int, what: str) -> float:
+        """Return a word as a number.
+
+        Raises
+        ------
+        InputError
+            There is none, or it is no number.
+        """
+        if index >= len(self.words):
+            raise self.place.error(f"ends before {what}")
+        try:
+            return finite_number(self.words[index])
+        except ValueError as error:
+            raise self.place.error(f"{what}: {error}") from None
+
+    def numbers(self, first: int, names: str) -> Floats:
+        """Return some words as numbers, by their names."""
+        return np.array([self.number(first + k, name) for k, name in enumerate(names.split())])
+
+    @property
+    def ends(self) -> bool:
+        """Whether the line is the mark of an end: -99, alone or with zeros."""
+        return (
+            bool(self.words)
+            and self.words[0] == END
+            and all(word.strip("0.") == "" for word in self.words[1:])
+        )
+
+
+def cards(path: Path) -> Iterator[Card]:
+    """Yield the lines of a file that are no comments (`C ...`), blank ones too."""
+    for record, line in enumerate(read_lines(path), 1):
+        words = line.split()
+        if words and words[0] in ("C", "#"):
+            continue
+        yield Card(Place(path, record, line))
+
+
+def names_beside(path: Path) -> dict[str, str]:
+    """Return the names of numbers of a table `number, name`; none where it is not there.
+
+    Raises
+    ------
+    InputError
+        A number that is there twice.
+    """
+    if not path.is_file():
+        return {}
+    table = read_columns(path, known=("number", "name"))
+    table.require("number", "name")
+    table.names("number")
+    found: dict[str, str] = {}
+    for row, (number, name) in enumerate(zip(table.texts("number"), table.texts("name"), strict=True)):
+        if number in found or not name:
+            raise table.error(row, f"the number {quoted(number)} is there twice, or has no name")
+        found[number] = name
+    return found
+
+
+def angle_unit(wished: str | None, default: str | None, path: Path) -> str:
+    """Return the unit of angles: as wished, as the format has it, or an error where neither says."""
+    unit = wished or default
+    if unit is None:
+        raise InputError("has angles, and does not say in which unit: --angles deg, gon or rad", file=path)
+    return unit
+
+
+def to_radians(values: Floats, unit: str) -> Floats:
+    """Return angles in radians."""
+    found: Floats = values * _UNITS[unit]
+    return found

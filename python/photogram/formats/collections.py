@@ -1,0 +1,162 @@
+"""Collections of photos, each with a camera f, k1, k2, as projects: Bundler and BAL."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.collection.collection import Collection
+from photogram.errors import InputError
+from photogram.formats.intersection import complete_positions
+from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.project import Project, Size, assembled
+from photogram.messages import Message, listed
+from photogram.network.cameras import Camera
+from photogram.network.directions import image_directions
+
+__all__ = ["cannot_hold", "collection_of", "project_of"]
+
+
+def project_of(
+    found: Collection, path: Path, title: str, names: Sequence[str], messages: Sequence[Message] = ()
+) -> Project:
+    """Return the project of a collection; photos of which nothing is known (f is 0) are left out."""
+    registered = found.photo_parameters[:, 6] != 0
+    rows = np.flatnonzero(registered)
+    remarks = list(messages)
+    if len(rows) < len(registered):
+        lost = [names[row] for row in np.flatnonzero(~registered).tolist()]
+        remarks.append(Message(f"{len(lost)} photos were not registered and are left out: {listed(lost, 4)}"))
+    parameters = found.photo_parameters[rows]
+    to_photo = _photocore.vector_rotations(np.ascontiguousarray(parameters[:, :3]))
+    places = np.full(len(registered), -1, dtype=np.int64)
+    places[rows] = np.arange(len(rows))
+    remarks.append(
+        Message("each photo has a camera of its own: f, k1, k2 are held; --self-calibrate f,k1,k2 frees them")
+    )
+    return assembled(
+        path=path,
+        title=title,
+        cameras=[
+            Camera("bal", {"f": f, "k1": k1, "k2": k2}, name=names[row])
+            for row, (f, k1, k2) in zip(rows.tolist(), parameters[:, 6:].tolist(), strict=True)
+        ],
+        sizes=[None] * len(rows),
+        photo_ids=[names[row] for row in rows.tolist()],
+        photo_cameras=np.arange(len(rows)),
+        centres=-np.einsum("nji,nj->ni", to_photo, parameters[:, 3:6]),
+        matrices=to_photo.transpose(0, 2, 1),
+        point_ids=[str(row) for row in range(len(found.point_positions))],
+        starts=np.array(found.point_positions),
+        image_photos=places[found.image_photos],
+        image_points=found.image_points,
+        image_xy=np.array(found.image_xy),
+        lacks=["no control, scale or position on the earth: a free network (--control FILE)"],
+        messages=remarks,
+    )
+
+
+def cannot_hold(project: Project) -> list[str]:
+    """Return what of a project a collection has no place for."""
+    block = project.block
+    found = [
+        "names of points, standard deviations, the frame and its unit",
+        "that photos share a camera: each has f, k1, k2 of its own",
+    ]
+    if any(_reduced(each, size) is None for each, size in zip(*_cameras(project), strict=True)):
+        found.append(
+            "principal points and lens terms beside k1, k2: image coordinates are moved to where a camera"
+            " without"
+            " distortion would have seen them, which is exact for the geometry"
+        )
+    if np.isfinite(block.point_sd).any() or project.checks:
+        found.append("what control is")
+    if block.observations or block.mounts:
+        found.append("observations beside images, and rigs")
+    return found
+
+
+def _cameras(project: Project) -> tuple[list[Camera], list[Size | None]]:
+    cameras, _ = known_cameras(project.block)
+    return cameras, [*project.sizes, *(None for _ in cameras[len(project.sizes) :])]
+
+
+def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | None:
+    """Return f, k1, k2 of a camera that has no more than that; None for all others."""
+    values = camera.parameters
+    if camera.model == "bal":
+        return values["f"], values["k1"], values["k2"]
+    if (
+        camera.model == "radial"
+        and size is not None
+        and (values["cx"], values["cy"]) == (size[0] / 2, size[1] / 2)
+    ):
+        return values["f"], values["k1"], values["k2"]
+    return None
+
+
+def collection_of(project: Project) -> tuple[Collection, list[str]]:
+    """Return the collection of a project, and the names of its photos.
+
+    Raises
+    ------
+    InputError
+        Geographic coordinates; no photo with a pose that shows a point with a position.
+    """
+    block = project.block
+    if block.geographic:
+        raise InputError("the format is cartesian: geographic coordinates have no place there")
+    cameras, photo_cameras = known_cameras(block)
+    sizes = _cameras(project)[1]
+    positions = complete_positions(project)
+    poses = np.hstack([block.photo_positions, block.photo_attitudes])
+    placed: Bools = np.asarray(np.isfinite(positions).all(axis=1))
+    posed: Bools = np.asarray(np.isfinite(poses).all(axis=1))
+    rows = np.flatnonzero(posed[block.image_photos] & placed[block.image_points])
+    if not len(rows):
+        raise InputError("no photo with a pose shows a point with a position")
+    xy = _moved(project, cameras, sizes, np.asarray(photo_cameras)[block.image_photos])
+    rows = rows[np.isfinite(xy[rows]).all(axis=1)]
+    photos, points = np.flatnonzero(posed), np.flatnonzero(placed)
+    of_photo, of_point = np.full(len(posed), -1), np.full(len(placed), -1)
+    of_photo[photos], of_point[points] = np.arange(len(photos)), np.arange(len(points))
+    to_photo = attitude_matrices(block)[photos].transpose(0, 2, 1)
+    lenses = [
+        _reduced(each, size) or (each.scale, 0.0, 0.0) for each, size in zip(cameras, sizes, strict=True)
+    ]
+    parameters = np.hstack(
+        [
+            _photocore.rotation_vectors(np.ascontiguousarray(to_photo)),
+            -np.einsum("nij,nj->ni", to_photo, block.photo_positions[photos]),
+            np.array([lenses[photo_cameras[row]] for row in photos]).reshape(-1, 3),
+        ]
+    )
+    found = Collection(
+        photo_parameters=parameters,
+        point_positions=positions[points],
+        image_photos=of_photo[block.image_photos[rows]],
+        image_points=of_point[block.image_points[rows]],
+        image_xy=xy[rows],
+    )
+    return found, [block.photo_ids[row] for row in photos]
+
+
+def _moved(
+    project: Project, cameras: list[Camera], sizes: Sequence[Size | None], of_images: Indices
+) -> Floats:
+    """Return (m, 2) image coordinates from the middle, y up: moved where a camera has more than f, k1, k2."""
+    block = project.block
+    found = block.image_xy.copy()
+    directions = image_directions(block)
+    for row, (camera, size) in enumerate(zip(cameras, sizes, strict=True)):
+        own = of_images == row
+        if _reduced(camera, size) is None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                found[own] = -camera.scale * directions[own, :2] / directions[own, 2:]
+        elif camera.model == "radial" and size is not None:
+            found[own] = np.column_stack([found[own, 0] - size[0] / 2, size[1] / 2 - found[own, 1]])
+    return found

@@ -1,0 +1,176 @@
+"""Control with its measurements in files of OpenSfM: `gcp_list.txt`, `ground_control_points.json`."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from photogram.formats.project import Project
+from photogram.formats.tree import read_json
+from photogram.io.delimited import ColumnTable
+from photogram.io.files import read_lines
+from photogram.io.numbers import finite_number
+from photogram.io.places import Place
+from photogram.messages import Message
+
+__all__ = ["ControlList", "read_control_list"]
+
+WGS84 = "EPSG:4979"
+_UTM = re.compile(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
+DIFFER = 1e-6
+
+
+@dataclass(frozen=True)
+class ControlList:
+    """Control points in a system of coordinates, and where they were measured.
+
+    Attributes
+    ----------
+    control
+        A table `point, x, y, z`.
+    images
+        A table `photo, point, column, row`, pixels from the corner.
+    crs
+        Of the control.
+    messages
+        Remarks.
+    """
+
+    control: ColumnTable
+    images: ColumnTable
+    crs: str
+    messages: list[Message]
+
+
+def read_control_list(path: Path, project: Project) -> ControlList | None:
+    """Read a list of control points with their measurements; None where a file is a table.
+
+    Raises
+    ------
+    InputError
+        A list that is at fault.
+    """
+    if path.suffix.lower() == ".json":
+        return _of_json(path, project)
+    first = next((line.strip() for line in read_lines(path) if line.strip()), "")
+    if first.upper().startswith(("WGS84", "EPSG:", "+PROJ=")):
+        return _of_text(path)
+    return None
+
+
+def _crs(line: str, place: Place) -> str:
+    if line.upper() == "WGS84":
+        return WGS84
+    if line.upper().startswith(("EPSG:", "+PROJ=")):
+        return line
+    match = _UTM.fullmatch(line)
+    if match is None or not 1 <= int(match[1]) <= 60:
+        raise place.error("is no system of coordinates: WGS84, WGS84 UTM 32N, EPSG:n or +proj=...")
+    return f"EPSG:{32600 + int(match[1]) + (100 if match[2].upper() == 'S' else 0)}"
+
+
+def _of_text(path: Path) -> ControlList:
+    lines = [
+        Place(path, record, line)
+        for record, line in enumerate(read_lines(path), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    head, *rest = lines
+    crs = _crs((head.text or "").strip(), head)
+    points: dict[str, tuple[str, str, str]] = {}
+    places: dict[str, int] = {}
+    by_position: dict[tuple[str, str, str], str] = {}
+    images: dict[str, list[str]] = {"photo": [], "point": [], "column": [], "row": []}
+    records: list[int] = []
+    for place in rest:
+        words = (place.text or "").split()
+        if len(words) < 6:
+            raise place.error(f"has {len(words)} words: x y z column row image [name]")
+        try:
+            for word in (*words[:2], *words[3:5], *(() if words[2].lower() == "nan" else words[2:3])):
+                finite_number(word)
+        except ValueError as error:
+            raise place.error(str(error)) from None
+        position = (words[0], words[1], "" if words[2].lower() == "nan" else words[2])
+        name = (
+            words[6]
+            if len(words) > 6
+            else by_position.setdefault(position, f"control {len(by_position) + 1}")
+        )
+        if points.setdefault(name, position) != position and _apart(points[name], position):
+            raise place.error(f"the point {name} has another position in record {places[name]}")
+        places.setdefault(name, place.record or 0)
+        # Pixels count from the middle of the first pixel.
+        values = (words[5], name, repr(finite_number(words[3]) + 0.5), repr(finite_number(words[4]) + 0.5))
+        for column, value in zip(images, values, strict=True):
+            images[column].append(value)
+        records.append(place.record or 0)
+    if not points:
+        raise head.error("is followed by no points")
+    return _lists(path, head, points, places, images, records, crs, [])
+
+
+def _apart(one: tuple[str, str, str], other: tuple[str, str, str]) -> bool:
+    return any(
+        (a == "") != (b == "") or (a and abs(float(a) - float(b)) > DIFFER)
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def _of_json(path: Path, project: Project) -> ControlList:
+    block = project.block
+    sizes = {
+        name: project.sizes[int(row)]
+        for name, row in zip(
+            block.photo_ids, block.photo_cameras if block.photo_cameras is not None else (), strict=False
+        )
+    }
+    points: dict[str, tuple[str, str, str]] = {}
+    images: dict[str, list[str]] = {"photo": [], "point": [], "column": [], "row": []}
+    messages = []
+    for each in read_json(path)["points"]:
+        name = each["id"].text()
+        if "position" in each:
+            position = each["position"]
+            height = repr(position["altitude"].number()) if "altitude" in position else ""
+            points[name] = (repr(position["longitude"].number()), repr(position["latitude"].number()), height)
+        for own in each.get("observations", []):
+            shot = own["shot_id"].text()
+            size = sizes.get(shot)
+            if "projection" not in own or size is None:
+                messages.append(
+                    Message(f"{name} on {shot} is left out: no such photo, or no place in it", path)
+                )
+                continue
+            x, y = own["projection"].numbers(2).tolist()
+            scale = max(size)
+            values = (shot, name, repr(size[0] / 2 + scale * x), repr(size[1] / 2 + scale * y))
+            for column, value in zip(images, values, strict=True):
+                images[column].append(value)
+    head = Place(path)
+    if not points:
+        raise head.error("has no points with a position")
+    return _lists(
+        path, head, points, dict.fromkeys(points, 1), images, [1] * len(images["photo"]), WGS84, messages
+    )
+
+
+def _lists(
+    path: Path,
+    head: Place,
+    points: dict[str, tuple[str, str, str]],
+    places: dict[str, int],
+    images: dict[str, list[str]],
+    records: list[int],
+    crs: str,
+    messages: list[Message],
+) -> ControlList:
+    cells = {
+        "point": list(points),
+        **{axis: [own[k] for own in points.values()] for k, axis in enumerate("xyz")},
+    }
+    control = ColumnTable(path, head, tuple(cells), len(points), cells, [places[name] for name in points])
+    return ControlList(
+        control, ColumnTable(path, head, tuple(images), len(records), images, records), crs, messages
+    )

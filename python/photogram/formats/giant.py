@@ -1,0 +1,76 @@
+"""GIANT projects: five files of cards."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.formats.format import Format, Wishes
+from photogram.formats.project import Frame, Options, Project
+from photogram.giant import read_project
+from photogram.giant.assembly import job_refraction
+from photogram.giant.files import present_files, to_bytes
+from photogram.giant.project import Project as GiantProject
+
+__all__ = ["FORMAT", "TITLE"]
+
+TITLE = "GIANT project"
+
+
+def _recognises(path: Path) -> bool:
+    if not path.is_dir():
+        return False
+    present = present_files(path)
+    # Many folders hold files that are called cameras and images; only these have COMMON.
+    return bool(present["COMMON"] and present["IMAGES"])
+
+
+def read(path: Path, wishes: Wishes) -> Project:
+    """Read a project, with the refraction and the variance of unit weight that its COMMON asks for."""
+    del wishes
+    found = read_project(path)
+    block = found.to_block()
+    block = block.replace(refraction=job_refraction(found.common))
+    count = len(block.cameras)
+    return Project(
+        block=block,
+        path=path,
+        title=TITLE,
+        sizes=(None,) * count,
+        pixel_mm=(None,) * count,
+        starts=np.array(block.point_positions),
+        frame=Frame("geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
+        if block.spheroid
+        else Frame(),
+        options=Options(unit_variance=found.common.unit_variance),
+        messages=tuple(found.messages),
+    )
+
+
+def write(project: Project) -> Mapping[str, bytes]:
+    """Return the five files.
+
+    Raises
+    ------
+    InputError
+        What GIANT cards cannot say: cameras with distortion or in pixels, observations beside images.
+    """
+    records = GiantProject.from_block(project.block).records()
+    return {name: to_bytes(lines) for name, lines in records.items()}
+
+
+def cannot_hold(project: Project) -> list[str]:
+    """Return what of a project the cards have no place for."""
+    try:
+        GiantProject.from_block(project.block)
+    except InputError as error:
+        return [f"the project: {error.message}"]
+    return ["digits beyond the columns of the cards: 5 decimals of the millimetre, 4 of the second"]
+
+
+FORMAT = Format(
+    name="giant", title=TITLE, recognises=_recognises, read=read, write=write, cannot_hold=cannot_hold
+)

@@ -1,0 +1,139 @@
+"""PATB: image file in micrometres, orientation with matrices, control with codes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.formats.cards import Card, angle_unit, cards, names_beside, to_radians
+from photogram.formats.format import Format, Wishes
+from photogram.formats.project import Project
+from photogram.formats.reduced import Reduced, project_of, with_fitting_rotations
+from photogram.messages import Message
+from photogram.network.attitudes import Attitudes
+
+__all__ = ["FORMAT", "TITLE"]
+
+TITLE = "PATB block"
+IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
+MICROMETRES = 1e-3
+
+
+def _one(path: Path, suffix: str) -> Path | None:
+    """Return the file of an ending in a folder, in any case."""
+    found = [each for each in sorted(path.iterdir()) if each.suffix.lower() == suffix and each.is_file()]
+    if len(found) > 1:
+        raise InputError(f"has several files {suffix}: {', '.join(each.name for each in found)}", file=path)
+    return found[0] if found else None
+
+
+def _recognises(path: Path) -> bool:
+    if path.is_dir():
+        return any(each.suffix.lower() == IMAGES for each in path.iterdir())
+    return path.suffix.lower() == IMAGES
+
+
+def read(path: Path, wishes: Wishes) -> Project:
+    """Read the image file, with orientation, control and names where they lie beside it.
+
+    Raises
+    ------
+    InputError
+        Lines that hold something else, rotations by which rays do not meet.
+    """
+    folder = path if path.is_dir() else path.parent
+    images = path if path.is_file() else _one(folder, IMAGES)
+    if images is None:
+        raise InputError(f"has no image file *{IMAGES}", file=path)
+    names = names_beside(folder / NAMES)
+    found, messages = Reduced(), []
+    _images(images, names, found)
+    if not found.images:
+        raise InputError("has no images", file=images)
+    first = found.images[0]
+    messages.append(
+        Message(
+            f"micrometres; first record: point {first[1]} on photo {first[0]}, x {first[2]:.4f} mm, y"
+            f" {first[3]:.4f} mm",
+            images,
+        )
+    )
+    if (orientation := _one(folder, ORIENTATION)) is not None:
+        _orientation(orientation, names, found, wishes)
+    if (control := _one(folder, CONTROL)) is not None:
+        _control(control, names, found)
+    return with_fitting_rotations(project_of(found, images, TITLE, wishes, messages))
+
+
+def _images(path: Path, names: dict[str, str], found: Reduced) -> None:
+    photo: str | None = None
+    for card in cards(path):
+        if not card.words:
+            continue
+        if card.ends:
+            photo = None
+        elif photo is None:
+            photo = names.get(card.words[0], card.words[0])
+            if photo in found.photos:
+                raise card.place.error(f"the photo {photo} is there twice")
+            c = card.number(1, "the principal distance") * MICROMETRES
+            found.photos[photo] = found.principal_distance(c, card.place)
+        else:
+            x, y = (MICROMETRES * card.numbers(1, "x y")).tolist()
+            found.images.append((photo, names.get(card.words[0], card.words[0]), x, y))
+
+
+def _orientation(path: Path, names: dict[str, str], found: Reduced, wishes: Wishes) -> None:
+    lines = [card for card in cards(path) if card.words and not card.ends]
+    row = 0
+    while row < len(lines):
+        head = lines[row]
+        row += 1
+        photo = names.get(head.words[0], head.words[0])
+        centre = head.numbers(1, "X Y Z")
+        if len(head.words) >= 7:
+            unit = angle_unit(wishes.angles, None, path)
+            angles = to_radians(head.numbers(4, "omega phi kappa"), unit)
+            matrix = Attitudes.of("omega_phi_kappa", [angles]).matrices[0]
+        else:
+            elements: list[float] = []
+            while len(elements) < 9:
+                if row >= len(lines):
+                    raise head.place.error("ends before the nine elements of the rotation")
+                elements += lines[row].numbers(0, " ".join(["element"] * len(lines[row].words))).tolist()
+                row += 1
+            matrix = _rotation(head, elements)
+        if photo in found.poses:
+            raise head.place.error(f"the photo {photo} is there twice")
+        found.poses[photo] = centre, matrix
+
+
+def _rotation(card: Card, elements: list[float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Return A, photo to object; twelve digits are not orthonormal to the last bit."""
+    if len(elements) != 9:
+        raise card.place.error(f"is followed by {len(elements)} elements of a rotation, not 9")
+    matrix = np.array(elements).reshape(3, 3)
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    if not apart < 1e-4 or np.linalg.det(matrix) < 0:
+        raise card.place.error("is followed by no rotation matrix: not orthonormal, or mirrored")
+    u, _, vt = np.linalg.svd(matrix)
+    nearest: np.ndarray[tuple[int, int], np.dtype[np.float64]] = u @ vt
+    return nearest
+
+
+def _control(path: Path, names: dict[str, str], found: Reduced) -> None:
+    for card in cards(path):
+        if not card.words or card.ends:
+            continue
+        name = names.get(card.words[0], card.words[0])
+        position = card.numbers(1, "X Y Z")
+        codes = [card.number(k, "a code") for k in range(4, min(len(card.words), 6))]
+        if name in found.control:
+            raise card.place.error(f"the point {name} is there twice")
+        found.control[name] = position, all(code > 0 for code in codes) and bool(codes)
+
+
+FORMAT = Format(name="patb", title=TITLE, recognises=_recognises, read=read)

@@ -1,0 +1,199 @@
+"""Tables of measured pixels: photo, point, column, row; cameras come from a table of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.format import Format, Wishes
+from photogram.formats.images import from_corner, to_corner
+from photogram.formats.plain.cameras import read_cameras
+from photogram.formats.plain.settings import bare_settings
+from photogram.formats.plain.tables import Tables
+from photogram.formats.project import Project, assembled
+from photogram.io.csv_text import csv_text
+from photogram.io.delimited import ColumnTable, read_columns
+from photogram.messages import Message, quoted
+
+__all__ = ["FORMAT", "TITLE", "corner_of", "pixel_table"]
+
+TITLE = "table of pixels"
+FILE = "images.csv"
+_SYNONYMS = {
+    "image": "photo",
+    "file": "photo",
+    "filename": "photo",
+    "name": "point",
+    "id": "point",
+    "target": "point",
+    "track": "point",
+    "marker": "point",
+    "x": "column",
+    "u": "column",
+    "col": "column",
+    "y": "row",
+    "v": "row",
+}
+_NEEDED = ("photo", "point", "column", "row")
+_NUMBERS = {"column", "row", "sd", "sd_column", "sd_row"}
+
+
+def pixel_table(path: Path) -> ColumnTable:
+    """Read a table of image measurements under all usual names of its columns.
+
+    Raises
+    ------
+    InputError
+        A column that is missing, or whatever a table refuses.
+    """
+    table = read_columns(
+        path, known=_NEEDED, numbers=_NUMBERS, spelling=lambda name: _SYNONYMS.get(name, name)
+    )
+    table.require(*_NEEDED)
+    return table
+
+
+def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
+    """Return (rows, 2) columns and rows from the upper-left corner.
+
+    Raises
+    ------
+    InputError
+        An empty cell.
+    """
+    found = np.column_stack([table.numbers("column"), table.numbers("row")])
+    missing = np.argwhere(np.isnan(found))
+    if len(missing):
+        row, k = missing[0].tolist()
+        raise table.error(row, f"column {('column', 'row')[k]}: is empty")
+    return found + 0.5 if pixel_origin == "center" else found
+
+
+def _recognises(path: Path) -> bool:
+    if not path.is_file() or path.suffix.lower() not in (".csv", ".tsv", ".txt"):
+        return False
+    try:
+        with path.open("rb") as file:
+            begin = file.read(4096).decode("latin-1")
+    except OSError:
+        return False
+    words = {_SYNONYMS.get(each, each) for each in _words(begin)}
+    return set(_NEEDED) <= words
+
+
+def _words(begin: str) -> set[str]:
+    lines = [line for line in begin.replace("\r", "\n").split("\n") if line.strip()]
+    for line in lines:
+        if not line.lstrip("\xef\xbb\xbf \t").startswith("#"):
+            break
+    else:
+        return set()
+    for mark in ",;\t|":
+        line = line.replace(mark, " ")
+    return {word.strip('"').lower() for word in line.lstrip("\xef\xbb\xbf").split()}
+
+
+def read(path: Path, wishes: Wishes) -> Project:
+    """Read a table; photos have the only camera of `--camera FILE`, or that of a column `camera`."""
+    if wishes.cameras is None:
+        raise InputError("a table of pixels has no cameras: --camera FILE gives them", file=path)
+    table = pixel_table(path)
+    cameras = read_cameras(Tables(bare_settings(path, {"cameras": wishes.cameras}), []))
+    photos, points = table.names("photo"), table.names("point")
+    which = _cameras_of(table, [each.name for each in cameras.cameras])
+    of_photo = np.zeros(len(photos.names), dtype=np.int64)
+    of_photo[photos.rows] = which
+    other = np.flatnonzero(of_photo[photos.rows] != which)
+    if len(other):
+        raise table.error(int(other[0]), "column camera: the photo had another camera before")
+    corner = corner_of(table, wishes.pixel_origin)
+    messages = []
+    if wishes.pixel_origin != "center" and (corner < 0).any() and (corner >= -0.5).all():
+        messages.append(
+            Message(
+                "coordinates below 0 say that the middle of the first pixel is 0, 0: --pixel-origin center"
+            )
+        )
+    xy = corner.copy()
+    for row, camera in enumerate(cameras.cameras):
+        own = which == row
+        xy[own] = from_corner(camera, cameras.sizes[row], corner[own])
+    count = len(photos.names)
+    return assembled(
+        path=path,
+        title=TITLE,
+        cameras=cameras.cameras,
+        sizes=cameras.sizes,
+        pixel_mm=cameras.pixel_mm,
+        photo_ids=photos.names,
+        photo_cameras=of_photo,
+        centres=np.full((count, 3), np.nan),
+        matrices=np.full((count, 3, 3), np.nan),
+        point_ids=points.names,
+        starts=np.full((len(points.names), 3), np.nan),
+        image_photos=photos.rows,
+        image_points=points.rows,
+        image_xy=xy,
+        image_sd=_sd(table, wishes),
+        lacks=["no poses and no control: a free network, oriented first (--control FILE)"],
+        messages=messages,
+    )
+
+
+def _sd(table: ColumnTable, wishes: Wishes) -> Floats | None:
+    default = wishes.sd.get("images", (1.0,))[0]
+    if not {"sd", "sd_column"} & set(table.columns):
+        return None
+    common = table.numbers("sd", default)
+    found = np.column_stack([table.numbers("sd_column"), table.numbers("sd_row")])
+    found = np.where(np.isnan(found), common[:, np.newaxis], found)
+    bad = np.flatnonzero(~(found > 0).all(axis=1))
+    if len(bad):
+        raise table.error(int(bad[0]), "a standard deviation is not positive")
+    return found
+
+
+def _cameras_of(table: ColumnTable, names: list[str]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    if "camera" not in table:
+        if len(names) > 1:
+            raise table.head.error(f"the column camera is missing, and there are {len(names)} cameras")
+        return np.zeros(table.count, dtype=np.int64)
+    places = {name: row for row, name in enumerate(names)}
+    texts = table.texts("camera", names[0] if len(names) == 1 else "")
+    bad = next((row for row, name in enumerate(texts) if name not in places), None)
+    if bad is not None:
+        raise table.error(bad, f"column camera: there is no camera {quoted(texts[bad])}")
+    return np.array([places[name] for name in texts], dtype=np.int64)
+
+
+def write(project: Project) -> Mapping[str, bytes]:
+    """Return the table."""
+    block = project.block
+    photos, points = np.array(block.photo_ids, dtype=object), np.array(block.point_ids, dtype=object)
+    corner = to_corner(project)
+    columns = {
+        "photo": photos[block.image_photos],
+        "point": points[block.image_points],
+        "column": corner[:, 0],
+        "row": corner[:, 1],
+        "sd_column": block.image_sd[:, 0],
+        "sd_row": block.image_sd[:, 1],
+    }
+    return {
+        FILE: csv_text(columns, ["pixels from the upper-left corner: the middle of the first is 0.5, 0.5"])
+    }
+
+
+def cannot_hold(project: Project) -> list[str]:
+    """Return what of a project a table of pixels has no place for."""
+    del project
+    return ["everything but image coordinates and their standard deviations"]
+
+
+FORMAT = Format(
+    name="pixels", title=TITLE, recognises=_recognises, read=read, write=write, cannot_hold=cannot_hold
+)

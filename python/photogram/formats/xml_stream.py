@@ -1,0 +1,180 @@
+"""XML read as a stream: elements of some names are handed over whole, with their lines, and forgotten."""
+
+from __future__ import annotations
+
+import xml.parsers.expat
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.io.files import reading
+from photogram.io.numbers import finite_number, whole_number
+from photogram.io.places import Place
+
+__all__ = ["Element", "read_stream", "root_of"]
+
+PIECE = 1 << 16
+DEEPEST = 200
+
+
+@dataclass
+class Element:
+    """An element: its name, attributes, children and text."""
+
+    name: str
+    attributes: Mapping[str, str]
+    file: Path
+    line: int
+    children: list[Element] = field(default_factory=list)
+    text: str = ""
+
+    def error(self, message: str) -> InputError:
+        """Return an error that names the line."""
+        return Place(self.file, self.line, f"<{self.name}> {self.text.strip()}"[:120]).error(message)
+
+    def child(self, name: str) -> Element | None:
+        """Return the first child of a name."""
+        return next((each for each in self.children if each.name == name), None)
+
+    def all(self, name: str) -> Iterator[Element]:
+        """Yield the children of a name."""
+        return (each for each in self.children if each.name == name)
+
+    def need(self, name: str) -> Element:
+        """Return the first child of a name; an error where there is none."""
+        found = self.child(name)
+        if found is None:
+            raise self.error(f"has no {name}")
+        return found
+
+    def word(self, name: str, default: str = "") -> str:
+        """Return the text of a child."""
+        found = self.child(name)
+        return default if found is None else found.text.strip()
+
+    @property
+    def value(self) -> float:
+        """The text as a finite number."""
+        return self._number(self.text.strip())
+
+    def _number(self, text: str) -> float:
+        try:
+            return finite_number(text)
+        except ValueError as error:
+            raise self.error(str(error)) from None
+
+    def number(self, name: str, default: float | None = None) -> float:
+        """Return the number of a child."""
+        found = self.child(name)
+        if found is None and default is not None:
+            return default
+        return self.need(name).value
+
+    def whole(self, name: str) -> int:
+        """Return the whole number of a child."""
+        found = self.need(name)
+        try:
+            return whole_number(found.text.strip(), highest=2**53)
+        except ValueError as error:
+            raise found.error(str(error)) from None
+
+    def attribute(self, name: str, default: float | None = None) -> float:
+        """Return an attribute as a number."""
+        if name not in self.attributes:
+            if default is not None:
+                return default
+            raise self.error(f"has no attribute {name}")
+        return self._number(self.attributes[name])
+
+    def numbers(self, count: int) -> Floats:
+        """Return the text as so many numbers."""
+        words = self.text.split()
+        if len(words) != count:
+            raise self.error(f"has {len(words)} numbers, not {count}")
+        return np.array([self._number(word) for word in words])
+
+
+def root_of(path: Path) -> str:
+    """Return the name of the root element of a file; nothing for what is no XML."""
+    found = ""
+
+    def start(name: str, _: dict[str, str]) -> None:
+        nonlocal found
+        found = found or name
+
+    parser = xml.parsers.expat.ParserCreate()
+    parser.StartElementHandler = start
+    try:
+        with path.open("rb") as file:
+            parser.Parse(file.read(PIECE), False)
+    except (OSError, xml.parsers.expat.ExpatError):
+        return found
+    return found
+
+
+def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: str) -> Element:
+    """Read a file; return its root without the elements that were handed over.
+
+    Parameters
+    ----------
+    path
+        The file.
+    take
+        What is called with each element of a name when it ends.
+    root
+        The name of the root element.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is no XML or one of another kind.
+    """
+    stack: list[Element] = []
+    first: list[Element] = []
+    parser = xml.parsers.expat.ParserCreate()
+    parser.buffer_text = True
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        element = Element(name, attributes, path, parser.CurrentLineNumber)
+        if not stack and name != root:
+            raise element.error(f"the root is {name}, not {root}")
+        if len(stack) >= DEEPEST:
+            raise element.error("elements are nested too deep")
+        first[:] = first or [element]
+        stack.append(element)
+
+    def end(name: str) -> None:
+        element = stack.pop()
+        if name in take:
+            take[name](element)
+        elif stack:
+            stack[-1].children.append(element)
+
+    def text(data: str) -> None:
+        stack[-1].text += data
+
+    def declares(*_: Any) -> None:
+        raise Place(path, parser.CurrentLineNumber).error("declares entities, which are not read")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler, parser.EntityDeclHandler = text, declares
+    try:
+        with reading(path), path.open("rb") as file:
+            while piece := file.read(PIECE):
+                parser.Parse(piece, False)
+            parser.Parse(b"", True)
+    except xml.parsers.expat.ExpatError as error:
+        what = xml.parsers.expat.ErrorString(error.code)
+        raise InputError(
+            f"is no XML: {what}, column {error.offset + 1}", file=path, record=error.lineno
+        ) from None
+    except (ValueError, LookupError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"is no XML: {error}", file=path, record=parser.CurrentLineNumber) from None
+    return first[0]

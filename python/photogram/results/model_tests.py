@@ -1,0 +1,496 @@
+"""Which unknowns of cameras are worth having: terms that are there, terms that are not, models side by side.
+
+* Terms that are estimated, k of them with the cofactors Q_kk (a priori unit weight): T = x' Q_kk^-1 x is by
+  how much the weighted sum of squares would rise without them (Wald; exact where the model is linear).
+* Terms that are held: B the partials of the images by them, in standard deviations, and ~v the residuals,
+  c = B' ~v and C = B' R B, T = c' C^-1 c is by how much it would fall with them (Rao's score; no adjustment).
+* T is chi-square with k where the unit weight is known; (T / k) / (Omega' / f') is F(k, f') where it is not,
+  Omega' and f' being those with the terms.
+* Models that are not nested: BIC = Omega + k ln n or, unit weight not known, n ln(Omega / n) + k ln n, with
+  n = f + k, since points take as many observations as they have coordinates (Schwarz 1978).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram import _photocore
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import shown
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.network.cameras import Camera
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.distortion import INTERIOR
+from photogram.results.group_sums import factored
+from photogram.results.result import Result
+from photogram.show.ways import Shown, columns_of, report_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Comparison", "Model", "TermsTest", "compare", "groups_of_terms", "score_test", "terms_test"]
+
+KEPT = 0.01
+"""Level of the test that a term must pass to be kept."""
+EFFECT = 0.2
+"""Standard deviations of an image: terms that move none by more are not worth having."""
+DECISIVE, POSITIVE = 10.0, 2.0
+"""Differences of BIC."""
+CHECKS = 10
+"""Check points from which they say something of models."""
+SEEN = 2000
+"""Images on which the effect of terms is looked at."""
+
+
+@dataclass(frozen=True)
+class TermsTest:
+    """A test of terms of a camera, all together.
+
+    Attributes
+    ----------
+    camera, names
+        The camera and its parameters.
+    statistic
+        T: by how much the weighted sum of squares rises without them, or falls with them.
+    dimension, freedom
+        k, and the degrees of freedom of the unit variance with the terms; infinite where that is known.
+    probability
+        Of a value as large where the terms are what they are held to.
+    effect
+        How far they move an image at the most, in standard deviations of it; NaN for terms that are held.
+    """
+
+    camera: str
+    names: tuple[str, ...]
+    statistic: float
+    dimension: int
+    freedom: float
+    probability: float
+    effect: float
+
+    @property
+    def worth_keeping(self) -> bool:
+        """Whether they are significant at 1 percent, and move some image by a fifth of its deviation."""
+        return self.probability < KEPT and not self.effect <= EFFECT
+
+
+@dataclass(frozen=True)
+class Model:
+    """One of several models of the same observations.
+
+    Attributes
+    ----------
+    name
+        What the caller calls it.
+    squares, freedom, parameters
+        Weighted sum of squares, degrees of freedom, estimated parameters of cameras.
+    bic
+        The criterion; the least is the best.
+    checks
+        Root mean square of check points, in the linear unit, where there are ten; NaN otherwise.
+    """
+
+    name: str
+    squares: float
+    freedom: int
+    parameters: int
+    bic: float
+    checks: float
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(Shown):
+    """Models of the same observations side by side.
+
+    Attributes
+    ----------
+    models
+        The best first.
+    known
+        Whether the unit weight is taken for known.
+    nested
+        Tests of every model against the next larger one that has all its parameters and more: names of both,
+        T, its dimension, and the probability where the smaller one is right.
+    """
+
+    models: tuple[Model, ...]
+    known: bool
+    nested: tuple[tuple[str, str, float, int, float], ...]
+
+    @property
+    def best(self) -> Model:
+        """The model with the least criterion."""
+        return self.models[0]
+
+    def difference(self, name: str) -> float:
+        """Return by how much the criterion of a model is larger than the least."""
+        for each in self.models:
+            if each.name == name:
+                return each.bic - self.best.bic
+        raise KeyError(name)
+
+    def statement(self) -> str:
+        """Return what the criterion says, in words."""
+        if len(self.models) < 2:
+            return f"{self.best.name} is the only model"
+        rival = self.models[1]
+        difference = rival.bic - self.best.bic
+        size = "decisive" if difference > DECISIVE else "positive" if difference > POSITIVE else "none"
+        if size == "none":
+            return f"{self.best.name} and {rival.name} are as good as each other (BIC {difference:.1f} apart)"
+        return f"{self.best.name} is better than {rival.name}: {size} evidence (BIC {difference:.1f} apart)"
+
+    def table(self) -> pd.DataFrame:
+        """Return the models as a data frame."""
+        return self._table("model")
+
+
+@columns_of.register(Comparison)
+def _columns(found: Comparison, what: str) -> dict[str, Any]:
+    """`model`, its sum of squares, degrees of freedom, parameters, BIC, check points."""
+    del what
+    return {
+        "model": [each.name for each in found.models],
+        "sum_of_squares": [each.squares for each in found.models],
+        "degrees_of_freedom": [each.freedom for each in found.models],
+        "parameters": [each.parameters for each in found.models],
+        "bic": [each.bic for each in found.models],
+        "rms_check": [each.checks for each in found.models],
+    }
+
+
+@report_of.register(Comparison)
+def _report(found: Comparison) -> str:
+    """Return the models as lines of text, the best first."""
+    heads = ("v P v", "freedom", "parameters", "BIC", "rms of checks")
+    lines = [found.statement(), f"{'model':<24}" + "".join(f"{head:>15}" for head in heads)]
+    for each in found.models:
+        checks = f"{each.checks:>15.5g}" if math.isfinite(each.checks) else f"{'-':>15}"
+        lines.append(
+            f"{each.name:<24}{each.squares:>15.3f}{each.freedom:>15}{each.parameters:>15}{each.bic:>15.2f}{checks}"
+        )
+    lines += [
+        f"{small} within {large}: T {value:.3f} with {dimension}, probability {probability:.2g}"
+        for small, large, value, dimension, probability in found.nested
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def terms_test(result: Result, names: Sequence[str], *, camera: str | None = None) -> TermsTest:
+    """Test estimated terms of a camera together, without another adjustment (Wald).
+
+    Parameters
+    ----------
+    result
+        The adjusted block, with covariances.
+    names
+        Free or weighted parameters, tested against 0: terms of the lens.
+    camera
+        The name of the camera; may be left out where there is one.
+
+    Raises
+    ------
+    InputError
+        No such camera, terms that are not estimated, no covariances.
+    """
+    found = _camera(result, camera)
+    rows = _rows(found, names)
+    if not set(rows) <= set(found.estimated):
+        raise InputError(f"not all of {', '.join(names)} of the camera {found.name} are estimated")
+    q = found.cofactors[np.ix_(rows, rows)]
+    if not np.isfinite(q).all():
+        raise InputError("the result has no covariances")
+    statistic = _quadratic(q, found.values[rows])
+    freedom = _freedom(result)
+    scale = result.covariance_scale if math.isfinite(freedom) else 1.0
+    effect = _largest_effect(result, found, rows)
+    return _tested(found.name, names, statistic, freedom, scale, effect)
+
+
+def score_test(
+    result: Result,
+    names: Sequence[str] = (),
+    *,
+    camera: str | None = None,
+    partials: ArrayLike | None = None,
+) -> TermsTest:
+    """Test terms that are held, or effects that the model has not, without adjusting with them (Rao).
+
+    Parameters
+    ----------
+    result
+        The adjusted block.
+    names
+        Held parameters of a camera; or what the `partials` are called.
+    camera
+        The name of the camera; may be left out where there is one.
+    partials
+        (k, m, 2) partials of the image coordinates by k effects of one's own, in the unit of the image
+        coordinates (of cameras whose terms correct what was measured, of corrected ones); None for those of
+        the held parameters.
+
+    Raises
+    ------
+    InputError
+        No such camera, terms that are estimated, partials of another shape, effects that the unknowns of the
+        block take up altogether.
+    """
+    block = result.block
+    m = len(block.image_xy)
+    if partials is None:
+        found = _camera(result, camera)
+        rows = _rows(found, names)
+        if set(rows) & set(found.estimated):
+            raise InputError(f"some of {', '.join(names)} of the camera {found.name} are estimated already")
+        columns, title = _partials(result, found, rows), found.name
+    else:
+        columns = np.asarray(partials, dtype=np.float64)
+        if columns.ndim != 3 or columns.shape[1:] != (m, 2) or not np.isfinite(columns).all():
+            raise InputError(f"partials are finite and have the shape (k, {m}, 2), not {columns.shape}")
+        title = camera or ""
+        names = tuple(names) or tuple(f"effect {k + 1}" for k in range(len(columns)))
+    used = result.used_images
+    b = np.where(used[:, np.newaxis], columns / block.image_sd, 0.0)
+    v = np.where(used[:, np.newaxis], result.residuals / block.image_sd, 0.0)
+    projected = factored(result).project_images(b, threads=0, progress=None)
+    k = len(b)
+    info = b.reshape(k, -1) @ projected.reshape(k, -1).T
+    info = (info + info.T) / 2
+    size = np.einsum("kmi,kmi->k", b, b)
+    if not (np.linalg.eigvalsh(info / np.sqrt(np.outer(size, size))) > 1e-9).all():
+        raise InputError(f"the unknowns of the block take up {', '.join(names)}: nothing can be tested")
+    statistic = _quadratic(info, b.reshape(k, -1) @ v.ravel())
+    freedom = _freedom(result) - k
+    omega = result.covariance_scale * (freedom + k) - statistic
+    scale = max(omega, 1e-12 * statistic) / freedom if 0 < freedom < math.inf else 1.0
+    return _tested(title, names, statistic, freedom, scale, math.nan)
+
+
+def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comparison:
+    """Compare models of the same observations, nested or not.
+
+    Parameters
+    ----------
+    results
+        Adjusted blocks by the names of their models. They must have the same images with the same standard
+        deviations, all of them used: take gross errors out of all that any of them rejects.
+    known
+        Whether the unit weight is known; None: unless covariances are scaled by its estimate.
+
+    Raises
+    ------
+    InputError
+        Fewer than two results, other observations, no degrees of freedom.
+    """
+    if not isinstance(results, Mapping) or len(results) < 2:
+        raise InputError("compare takes two results at least, by the names of their models")
+    for name, result in results.items():
+        if not isinstance(result, Result):
+            raise InputError(f"{shown(name)} is not the result of the adjustment of a block: {shown(result)}")
+    names, all_results = list(results), list(results.values())
+    first = all_results[0]
+    for name, other in zip(names[1:], all_results[1:], strict=True):
+        _check_same(names[0], first, name, other)
+    taken = all(math.isinf(_freedom(each)) for each in all_results) if known is None else known
+    models = [_model(name, result, taken) for name, result in results.items()]
+    nested = []
+    for small in names:
+        larger = [each for each in names if _is_within(results[small], results[each])]
+        if larger:
+            large = min(larger, key=lambda each: _count(results[each]))
+            nested.append(_nested(small, results[small], large, results[large], taken))
+    return Comparison(tuple(sorted(models, key=lambda each: each.bic)), taken, tuple(nested))
+
+
+def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> float:
+    """Return how far terms of a camera move an image at the most, in standard deviations of the image."""
+    block, own = result.block, _images_of(result, camera)
+    if not own.size:
+        return math.nan
+    own = own[np.unique(np.linspace(0, own.size - 1, SEEN).round().astype(np.int64))]
+    without = {**camera.camera.parameters, **dict.fromkeys((camera.names[row] for row in rows), 0.0)}
+    rays = camera.camera.rays(block.image_xy[own])
+    other = camera.camera.replace(parameters=without, sd=0.0, covariance=None).project(rays)
+    moved = np.abs(other - block.image_xy[own]) / block.image_sd[own]
+    return float(np.nanmax(moved)) if np.isfinite(moved).any() else math.nan
+
+
+def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
+    """Return the estimated terms of a lens as they are kept or left out together.
+
+    Radial terms one by one, the highest power first; all others by their letter (P1 and P2, B1 and B2).
+    """
+    radial, others = [], dict[str, list[str]]()
+    for k in camera.estimated:
+        name = camera.names[k]
+        if name in INTERIOR:
+            continue
+        if re.fullmatch(r"[Kk]_?\d", name):
+            radial.append(name)
+        else:
+            others.setdefault(re.sub(r"[\d_]+$", "", name), []).append(name)
+    return [(name,) for name in reversed(radial)] + [tuple(names) for names in others.values()]
+
+
+def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Floats:
+    """Return (k, m, 2) partials of what images are compared with by parameters of a camera, by differences.
+
+    Forward cameras compare measured with computed images, backward ones corrected with ideal images.
+    """
+    block = result.block
+    own = _images_of(result, camera)
+    columns = np.zeros((len(rows), len(block.image_xy), 2))
+    plain = camera.camera.replace(sd=0.0, covariance=None)
+    measured, residuals = block.image_xy[own], result.residuals[own]
+    backward = plain.direction == "backward"
+    rays = None if backward else plain.rays(measured - residuals)
+    reach = float(np.abs(measured).max(initial=1.0))
+
+    def compared(parameters: Mapping[str, float]) -> Floats:
+        changed = plain.replace(parameters=parameters)
+        return -_corrected(changed, measured) if rays is None else changed.project(rays)
+
+    for place, row in enumerate(rows):
+        name = camera.names[row]
+        # A step that moves images by about a millionth of the frame.
+        step, value = 1e-6 * reach ** plain.powers[name], plain.parameters[name]
+        ends = (value + step, value - step)
+        after, before = (compared({**plain.parameters, name: end}) for end in ends)
+        columns[place, own] = (after - before) / (2 * step)
+        if backward and name == "c":
+            columns[place, own] += (_corrected(plain, measured) - residuals) / value
+    return np.nan_to_num(columns)
+
+
+def _corrected(camera: Camera, measured: Floats) -> Floats:
+    """Return what the lens of a backward camera makes of measured positions: c (u1, u2) / u3 of rays."""
+    u = camera.rays(measured)
+    return np.asarray(camera.parameters["c"] * u[:, :2] / u[:, 2:])
+
+
+def _images_of(result: Result, camera: AdjustedCamera) -> Indices:
+    """Return the images that were used of photos with a camera."""
+    block = result.block
+    _, photo_cameras = block.core_cameras()
+    number = block.camera_names.index(camera.name)
+    return np.flatnonzero(result.used_images & (photo_cameras[block.image_photos] == number))
+
+
+def _camera(result: Result, name: str | None) -> AdjustedCamera:
+    if not isinstance(result, Result):
+        raise InputError(f"not the result of the adjustment of a block: {shown(result)}")
+    for each in result.cameras:
+        if each.name == name or (name is None and len(result.cameras) == 1):
+            return each
+    raise InputError(f"the block has no camera {shown(name)}" if name else "which camera? name it")
+
+
+def _rows(camera: AdjustedCamera, names: Sequence[str]) -> list[int]:
+    if isinstance(names, str) or not names:
+        raise InputError(f"terms are a list of names, not {shown(names)}")
+    for name in names:
+        if name not in camera.names:
+            raise InputError(f"the camera {camera.name} has no parameter {shown(name)}")
+    return [camera.names.index(name) for name in names]
+
+
+def _quadratic(matrix: Floats, vector: Floats) -> float:
+    """Return x' M^-1 x, M scaled to unit diagonal before."""
+    scale = np.sqrt(np.diag(matrix))
+    scaled = vector / scale
+    return float(scaled @ np.linalg.solve(matrix / np.outer(scale, scale), scaled))
+
+
+def _freedom(result: Result) -> float:
+    """Return the degrees of freedom of the unit variance; infinite where that is known."""
+    posterior = result.unit_variance != "unity" and result.variance_of_unit_weight is not None
+    return float(result.degrees_of_freedom) if posterior else math.inf
+
+
+def _tested(
+    camera: str, names: Sequence[str], statistic: float, freedom: float, scale: float, effect: float
+) -> TermsTest:
+    k = len(names)
+    probability = _probability(statistic / scale, k, freedom)
+    return TermsTest(camera, tuple(names), statistic, k, freedom, probability, effect)
+
+
+def _probability(value: float, k: int, freedom: float) -> float:
+    if math.isinf(freedom):
+        return _photocore.chi_square(value, k)
+    return _photocore.fisher(value / k, k, freedom) if freedom > 0 else math.nan
+
+
+def _check_same(name: str, one: Result, other_name: str, other: Result) -> None:
+    """Refuse models of other observations."""
+    what = None
+    if one.block.image_xy.shape != other.block.image_xy.shape:
+        what = "images"
+    elif not np.array_equal(one.block.image_xy, other.block.image_xy):
+        what = "image coordinates"
+    elif not np.array_equal(one.block.image_sd, other.block.image_sd):
+        what = "standard deviations of images"
+    elif not np.array_equal(one.used_images, other.used_images):
+        count = int((one.used_images != other.used_images).sum())
+        raise InputError(
+            f"{count} images are used by one of {name} and {other_name} only: adjust both without them"
+        )
+    if what:
+        raise InputError(f"{name} and {other_name} have other {what}: their sums of squares say nothing")
+
+
+def _count(result: Result) -> int:
+    return sum(len(each.estimated) for each in result.cameras)
+
+
+def _model(name: str, result: Result, known: bool) -> Model:
+    k, squares = _count(result), result.sums_of_squares.total
+    counted = _all_freedom(result)
+    if counted < 1:
+        raise InputError(f"{name} has no degrees of freedom")
+    n = counted + k
+    bic = (squares if known else n * math.log(squares / n)) + k * math.log(n)
+    differences = result.point_differences[(result.point_kinds == "check") & result.used_points]
+    finite = differences[np.isfinite(differences).all(axis=1)]
+    rms = float(np.sqrt((finite**2).mean())) if len(finite) >= CHECKS else math.nan
+    return Model(name, squares, counted, k, bic, math.nan if result.block.geographic else rms)
+
+
+def _all_freedom(result: Result) -> int:
+    """Return observations minus unknowns, whatever the unit variance is based on."""
+    if result.redundancies is not None:
+        return round(result.redundancies.total)
+    return round(result.degrees_of_freedom)
+
+
+def _is_within(small: Result, large: Result) -> bool:
+    """Whether a model has the cameras of another with some of its parameters held, where they started."""
+    if len(small.cameras) != len(large.cameras) or _count(small) >= _count(large):
+        return False
+    return all(
+        a.given.model == b.given.model and set(a.estimated) <= set(b.estimated)
+        for a, b in zip(small.cameras, large.cameras, strict=True)
+    )
+
+
+def _nested(
+    small: str, first: Result, large: str, second: Result, known: bool
+) -> tuple[str, str, float, int, float]:
+    omega = [each.sums_of_squares.total for each in (first, second)]
+    freedom = [_all_freedom(each) for each in (first, second)]
+    k = freedom[0] - freedom[1]
+    statistic = omega[0] - omega[1]
+    scale = 1.0 if known else omega[1] / freedom[1]
+    probability = _probability(max(statistic, 0.0) / scale, k, math.inf if known else freedom[1])
+    return small, large, statistic, k, probability
+
+
+check_arguments(globals(), ["compare", "score_test", "terms_test"])

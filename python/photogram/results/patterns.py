@@ -1,0 +1,238 @@
+"""Whether the residuals of a network show a pattern: over the frame, by photo, along the strip, over control.
+
+Outliers are clipped and a common factor of all standard deviations is taken out first, by the median of the
+test values: what is left of them would be taken for a pattern.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.results.network import AdjustedNetwork
+from photogram.statistics.distributions import LEVEL, bonferroni
+from photogram.statistics.evidence import MEDIAN
+from photogram.statistics.findings import Systematic
+from photogram.statistics.patterns import (
+    Fit,
+    frame_pattern,
+    group_patterns,
+    normality,
+    regression,
+)
+from photogram.statistics.reliability import TESTABLE
+
+__all__ = ["CameraImages", "patterns"]
+
+LEVEL_OF_PATTERNS = 0.001
+"""Patterns are looked for in many ways: only what is very unlikely by chance is told."""
+NOTABLE = 0.3
+"""Standard deviations: mean residuals below this harm nobody."""
+CLIPPED = 3.0
+"""Larger test values count as this one."""
+VISIBLE = 0.1
+"""Redundancy numbers of the coordinates whose distribution is looked at."""
+KURTOSIS = (-0.7, 1.0)
+"""Excess kurtosis that is remarked on beyond these."""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraImages:
+    """The images of one camera.
+
+    Attributes
+    ----------
+    name
+        Of the camera.
+    photos
+        (P,) which photos have it.
+    estimated
+        How many of its parameters are estimated.
+    """
+
+    name: str
+    photos: Bools
+    estimated: int
+
+
+def patterns(
+    result: AdjustedNetwork,
+    image_photos: Indices,
+    xy: Floats,
+    sd: Floats,
+    cameras: Iterable[CameraImages],
+    photos: Sequence[str],
+    unit: tuple[str, float],
+    axes: Sequence[str] = (),
+) -> list[Systematic]:
+    """Return the tests of patterns of a network, where there is enough to test.
+
+    Parameters
+    ----------
+    image_photos, xy, sd
+        (m,), (m, 2), (m, 2) of the images: photo, image coordinates, standard deviations.
+    cameras
+        With the photos of each.
+    photos
+        Names.
+    unit
+        Of residuals in the report, and what leads from image coordinates to it.
+    axes
+        What the coordinates of stations and points are called, the height last; none where they mean nothing
+        on the ground.
+    """
+    used = result.used_images & np.isfinite(result.redundancy).all(axis=1)
+    w = np.where(result.redundancy > TESTABLE, result.standardized, math.nan)[used]
+    if not np.isfinite(w).any():
+        return []
+    factor = float(np.nanmedian(np.abs(w))) / MEDIAN
+    if not factor > 0:
+        return []
+    # ~v = w sqrt(r), of w that are clipped; 0 where nothing is tested.
+    redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
+    residuals = np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy)
+    scale = factor * np.asarray(sd[used]).mean(axis=0) * unit[1]
+    found = [
+        _of_camera(each, image_photos[used], xy[used], residuals, redundancy, scale, unit[0])
+        for each in cameras
+    ]
+    found.append(_of_photos(image_photos[used], photos, xy[used], residuals, redundancy))
+    found.append(_distribution(result, used))
+    if axes:
+        found += [*_of_stations(result, axes), _of_heights(result)]
+    return [each for each in found if each is not None]
+
+
+def _of_camera(
+    camera: CameraImages,
+    image_photos: Indices,
+    xy: Floats,
+    residuals: Floats,
+    redundancy: Floats,
+    scale: Floats,
+    unit: str,
+) -> Systematic | None:
+    own = camera.photos[image_photos]
+    found = frame_pattern(xy[own], residuals[own], redundancy[own], camera.estimated)
+    if found is None:
+        return None
+    x, y = (each * size for each, size in zip(found.largest, scale.tolist(), strict=True))
+    sentence = (
+        f"the lens model of {camera.name} is incomplete: mean residuals over the frame have a root mean"
+        f" square of {found.rms:.2g} standard deviations, the largest {x:+.3g}, {y:+.3g} {unit} near"
+        f" x {found.at[0]:.4g}, y {found.at[1]:.4g}"
+    )
+    return Systematic(
+        name=f"pattern over the frame of {camera.name}",
+        sentence=sentence,
+        statistic="B",
+        distribution="chi2",
+        dof=(found.dof,),
+        value=found.statistic,
+        probability=found.probability,
+        level=LEVEL_OF_PATTERNS,
+        large=found.rms > NOTABLE,
+    )
+
+
+def _of_photos(
+    image_photos: Indices, photos: Sequence[str], xy: Floats, residuals: Floats, redundancy: Floats
+) -> Systematic | None:
+    statistics, probabilities = group_patterns(image_photos, len(photos), xy, residuals, redundancy)
+    if np.isnan(probabilities).all():
+        return None
+    worst, tested = int(np.nanargmin(probabilities)), int(np.isfinite(probabilities).sum())
+    return Systematic(
+        name=f"pattern by photo: {photos[worst]}",
+        sentence=f"the residuals of photo {photos[worst]} follow a shift or a linear form of x and y",
+        statistic="c'C^-1c",
+        distribution="chi2",
+        dof=(6.0,),
+        value=float(statistics[worst]),
+        probability=float(probabilities[worst]),
+        level=bonferroni(LEVEL, tested),
+        large=False,
+    )
+
+
+def _distribution(result: AdjustedNetwork, used: Bools) -> Systematic | None:
+    """Test whether residuals are normal, one value of each visible direction.
+
+    The coordinates of a point on two photos repeat each other: the one with most redundancy is taken.
+    """
+    redundancy, w = result.redundancy[used], result.standardized[used]
+    single = result.point_rays[result.image_points[used]] <= 2
+    seen = redundancy > VISIBLE
+    seen[single] &= redundancy[single] >= redundancy[single].max(axis=1, keepdims=True)
+    found = normality(w[seen])
+    if found is None:
+        return None
+    two, three = (100 * share for share in found.beyond)
+    tails = "heavier" if found.excess > 0 else "lighter"
+    return Systematic(
+        name="normality of image residuals",
+        sentence=f"image residuals have {tails} tails than normal (excess kurtosis {found.excess:.2g};"
+        f" {two:.2g} percent beyond 2 and {three:.2g} beyond 3 standard deviations, expected 4.6 and 0.27):"
+        " robust estimation, or weights by class",
+        statistic="A^2",
+        distribution="Anderson-Darling",
+        dof=(),
+        value=found.statistic,
+        probability=found.probability
+        if found.excess > KURTOSIS[1] or found.excess < KURTOSIS[0]
+        else max(found.probability, LEVEL_OF_PATTERNS),
+        level=LEVEL_OF_PATTERNS,
+        large=False,
+    )
+
+
+def _of_stations(result: AdjustedNetwork, names: Sequence[str]) -> list[Systematic | None]:
+    """Test whether observed positions drift along the order of the photos."""
+    w = np.where(result.photo_redundancy > TESTABLE, result.photo_standardized, math.nan)
+    order = np.linspace(-1.0, 1.0, len(w))
+    design = np.column_stack([np.ones(len(w)), order, order**2])
+    return [
+        _regressed(
+            f"drift of stations in {name}",
+            f"observed minus adjusted {name} of the stations drifts along the photos",
+            regression(w[:, axis], design),
+        )
+        for axis, name in enumerate(names)
+    ]
+
+
+def _of_heights(result: AdjustedNetwork) -> Systematic | None:
+    """Test whether the heights of control bend over the area."""
+    w = np.where(result.point_redundancy > TESTABLE, result.point_standardized, math.nan)[:, 2]
+    tested = np.isfinite(w)
+    if not tested.any():
+        return None
+    plan = result.point_positions[:, :2] - result.point_positions[tested, :2].mean(axis=0)
+    plan = plan / max(float(np.abs(plan[tested]).max()), 1e-300)
+    x, y = plan.T
+    design = np.column_stack([np.ones(len(w)), x, y, x * x, x * y, y * y])
+    return _regressed(
+        "bending of control heights",
+        "the heights of the control bend against the block: residuals follow a quadratic form of X and Y",
+        regression(w, design, tested),
+    )
+
+
+def _regressed(name: str, sentence: str, found: Fit | None) -> Systematic | None:
+    if found is None:
+        return None
+    return Systematic(
+        name=name,
+        sentence=f"{sentence}, by {found.rms:.2g} standard deviations in the mean",
+        statistic="F",
+        distribution="F",
+        dof=found.dof,
+        value=found.statistic,
+        probability=found.probability,
+        level=LEVEL_OF_PATTERNS,
+        large=False,
+    )

@@ -1,0 +1,374 @@
+"""Reliability of every observation of a network: which gross errors are found, and what others do.
+
+With R the cofactors of the residuals of unit weight, r = R_ii and lambda0 the noncentrality of the test
+(Baarda 1968):
+
+    MDB_i = sd_i sqrt(lambda0 / r_i)             the error that is found with the power of the test
+    sqrt(lambda0 (1 - r_i) / r_i)                it moves nothing by more than so many standard deviations
+
+For a group (x and y of an image, a control point) an error ~d is found where ~d' R_g ~d = lambda0 of its
+dimension: an ellipse, whose largest half-axis is sqrt(lambda0 / mu), mu the smallest redundancy of a
+direction that shows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
+from photogram.results.covariance import Covariances
+from photogram.results.network_trial import NetworkTrial
+from photogram.results.selection import Selection
+from photogram.statistics.distributions import lambda0
+from photogram.statistics.reliability import TESTABLE
+from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Inseparable", "Moved", "Reliability"]
+
+FEW = 50
+"""Degrees of freedom below which an estimated unit weight makes errors notably harder to find."""
+SEPARATED = 1.6448536269514722
+"""Of the normal distribution, 95 percent on one side."""
+SEARCHED = 100
+"""Observations of the largest norm whose effect on every unknown is looked into."""
+
+
+@dataclass(frozen=True)
+class Inseparable:
+    """Two groups of observations whose errors cannot be told apart.
+
+    Attributes
+    ----------
+    first, second
+        What they are called.
+    groups
+        Their numbers among all.
+    correlation
+        Largest canonical correlation of their residuals: an error of one moves the test of the other by this
+        share.
+    factor
+        How many minimal detectable errors an error must have to be attributed to the right one of the two in
+        95 of 100 cases; infinite where nothing tells them apart.
+    """
+
+    first: str
+    second: str
+    groups: tuple[int, int]
+    correlation: float
+    factor: float
+
+    def __str__(self) -> str:
+        return f"either {self.first} or {self.second} (correlation {self.correlation:.3f})"
+
+
+@dataclass(frozen=True)
+class Moved:
+    """The unknown that an undetected error moves most.
+
+    Attributes
+    ----------
+    observation, component
+        Whose minimal detectable error it is.
+    unknown
+        Kind, number and component of the unknown.
+    effect
+        By how much it moves, in its unit.
+    in_sd
+        The same in its standard deviations (a priori unit weight).
+    """
+
+    observation: str
+    component: str
+    unknown: tuple[str, int, int]
+    effect: float
+    in_sd: float
+
+
+class Reliability:
+    """The reliability of an adjusted network, observation by observation, from row blocks of R.
+
+    Arrays are over G groups of observations (`suspects`), or over their M rows, which stand one group after
+    the other; rows are in the units of the observations.
+
+    Parameters
+    ----------
+    trial
+        The network as it stands.
+    covariances
+        What answers for its covariances; None where there are none.
+    level, power
+        Of the test of one observation or group (alpha0 and beta0).
+    known
+        Whether the unit weight is known; otherwise it is estimated, and lambda0 is that of the F test.
+    """
+
+    def __init__(
+        self,
+        trial: NetworkTrial,
+        covariances: Callable[[], Covariances] | None,
+        *,
+        level: float,
+        power: float,
+        known: bool,
+    ) -> None:
+        self._trial, self._covariances = trial, covariances
+        self.level, self.power, self.known = level, power, known
+        self.standing: Standing = trial.stand()
+        self.tests: Tests = trial.tests()
+        self.suspects: Suspects = trial.suspects
+
+    @property
+    def sd(self) -> Floats:
+        """(M,) standard deviations a priori."""
+        return self._trial.deviations
+
+    @property
+    def redundancy(self) -> Floats:
+        """(M,) redundancy numbers: the share of an error that shows in its own residual."""
+        return self.tests.redundancy
+
+    def lambda0(self, dimension: int) -> float:
+        """Return the noncentrality of the test of a group of a dimension."""
+        freedom = math.inf if self.known else self.standing.degrees_of_freedom
+        return lambda0(self.level, self.power, dimension, freedom)
+
+    @cached_property
+    def _of_rank(self) -> Floats:
+        """(G,) noncentrality of the test of each group."""
+        found = np.full(len(self.suspects), math.nan)
+        for rank in np.unique(self.tests.rank[self.tests.rank > 0]).tolist():
+            found[self.tests.rank == rank] = self.lambda0(rank)
+        return found
+
+    def block(self, group: int) -> Floats:
+        """Return R of a group: (m, m), of unit weight; zero for what takes no part."""
+        return self._trial.own_block(group)
+
+    @property
+    def detectable(self) -> Floats:
+        """(M,) minimal detectable error of each row alone; infinite where it shows in no residual."""
+        return self._over(self.sd * math.sqrt(self.lambda0(1)), np.sqrt(_shown(self.redundancy)))
+
+    @property
+    def external(self) -> Floats:
+        """(M,) by how many standard deviations it moves anything at the most when it is not found."""
+        r = _shown(self.redundancy)
+        return self._over(np.sqrt(self.lambda0(1) * (1 - r)), np.sqrt(r))
+
+    @property
+    def group_detectable(self) -> Floats:
+        """(G,) largest half-axis of the minimal detectable error, in standard deviations; see `invisible`."""
+        return np.asarray(np.sqrt(self._of_rank / self.tests.least))
+
+    @property
+    def group_external(self) -> Floats:
+        """(G,) by how many standard deviations it moves anything at the most."""
+        least = np.minimum(self.tests.least, 1.0)
+        return np.asarray(np.sqrt(self._of_rank * (1 - least) / least))
+
+    @property
+    def invisible(self) -> Bools:
+        """(G,) whether an error in some direction shows in no residual at all."""
+        return np.asarray(self.tests.active & (self.tests.rank < np.diff(self.suspects.row_starts)))
+
+    @property
+    def untestable(self) -> Bools:
+        """(G,) whether no error is found by its own residual: too little redundancy in every direction."""
+        return np.asarray(self.tests.active & ~(self.tests.least > TESTABLE))
+
+    @staticmethod
+    def _over(numerator: Floats, denominator: Floats) -> Floats:
+        with np.errstate(divide="ignore"):
+            return np.asarray(numerator / denominator)
+
+    @cached_property
+    def _effects(self) -> Floats:
+        """(M, 9) what an error of one standard deviation does to its own point and photo."""
+        return self._trial.core.effects(list(range(len(self.suspects))))
+
+    @property
+    def own_point_effect(self) -> Floats:
+        """(M, 3) by how much the minimal detectable error of a row moves its own point; NaN without one."""
+        return np.asarray(self._effects[:, :3] * (self.detectable / self.sd)[:, np.newaxis])
+
+    @property
+    def own_photo_effect(self) -> Floats:
+        """(M, 6) the same of the pose of its own photo: position, omega, phi, kappa."""
+        return np.asarray(self._effects[:, 3:] * (self.detectable / self.sd)[:, np.newaxis])
+
+    def influence(self, selection: Selection) -> tuple[list[tuple[str, str, str]], Floats]:
+        """Return what minimal detectable errors do to chosen unknowns, each observation by itself.
+
+        One solution for each unknown serves all observations.
+
+        Parameters
+        ----------
+        selection
+            As for :meth:`photogram.Result.covariance`.
+
+        Returns
+        -------
+        What the k unknowns are, and (k, M) by how much each moves, in its unit, when the minimal detectable
+        error of a row is not found.
+
+        Raises
+        ------
+        InputError
+            A selection that is not there; a network without covariances on demand.
+        """
+        covariances = self._asked()
+        labels, found = covariances.influences(self._trial.core, selection, None)
+        return labels, np.asarray(found * (self.detectable / self.sd))
+
+    def influence_of(self, function: Callable[..., Any], unknowns: Selection) -> Floats:
+        """Return what minimal detectable errors do to a function of unknowns: (k, M) for its k values.
+
+        `function` and `unknowns` are those of :meth:`photogram.Result.propagate`.
+        """
+        _, found = self._asked().influences(self._trial.core, unknowns, function)
+        return np.asarray(found * (self.detectable / self.sd))
+
+    def _asked(self) -> Covariances:
+        if self._covariances is None:
+            raise InputError("this network has no covariances on demand")
+        return self._covariances()
+
+    def most_moved(self, count: int = SEARCHED) -> list[Moved]:
+        """Return the unknowns that undetected errors move most, the gravest first.
+
+        The largest effect on any unknown is at most `external`: rows are looked into in the order of this
+        norm, `count` of them at the most, until no other can do more.
+        """
+        testable = self.redundancy > TESTABLE
+        norm = np.where(testable & np.isfinite(self.external), self.external, -math.inf)
+        group_of = np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
+        best = 0.0
+        found: list[Moved] = []
+        for row in np.argsort(-norm, kind="stable")[:count].tolist():
+            if not norm[row] > best:
+                break
+            group = int(group_of[row])
+            own = self._trial.core.most_moved([group])[row - int(self.suspects.row_starts[group])]
+            kind, index, component, effect, in_sd = own
+            size = float(self.detectable[row] / self.sd[row])
+            best = max(best, size * in_sd)
+            name, row_name = self.suspects.name(group), self.suspects.row_name(row)
+            found.append(Moved(name, row_name, (kind, index, component), size * effect, size * in_sd))
+        return sorted(found, key=lambda moved: -moved.in_sd)
+
+    def inseparable(self, limit: float = 0.9) -> list[Inseparable]:
+        """Return pairs of observations on one point that cannot be told apart: images, and its control."""
+        points = np.unique(self.suspects.points[self.suspects.points >= 0]).tolist()
+        return [self._pair(*pair) for pair in self._trial.core.inseparable(points, limit)]
+
+    def partners(self, group: int, limit: float = 0.3) -> list[Inseparable]:
+        """Return all other groups whose tests are correlated with that of a group, the most first.
+
+        Exact: it takes a solution for each row of the group.
+
+        Parameters
+        ----------
+        group
+            Its number among the suspects.
+        limit
+            Of the correlation.
+        """
+        columns = self._trial.core.responses([group])
+        starts = self.suspects.row_starts
+        found = []
+        for other in np.flatnonzero(self.tests.active & (self.tests.rank > 0)).tolist():
+            rows = slice(int(starts[other]), int(starts[other + 1]))
+            if other != group and (np.abs(columns[:, rows]) > 0).any():
+                rho = self._trial.correlation(group, other, columns[:, rows])
+                if rho > limit:
+                    found.append(self._pair(group, other, rho))
+        return sorted(found, key=lambda pair: -pair.correlation)
+
+    def _pair(self, first: int, second: int, rho: float) -> Inseparable:
+        delta = math.sqrt(self.lambda0(1))
+        factor = math.inf if rho > 1 - 1e-9 else SEPARATED / delta * math.sqrt(2 / (1 - rho))
+        name = self.suspects.name
+        return Inseparable(name(first), name(second), (first, second), rho, max(factor, 1.0))
+
+    def row_groups(self) -> Indices:
+        """Return (M,) the group of each row."""
+        return np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
+
+    def table(self) -> pd.DataFrame:
+        """Return a data frame, a row for each observation, with its unit."""
+        import pandas as pd
+
+        suspects, groups = self.suspects, self.row_groups()
+        rows = range(len(groups))
+        names = [suspects.name(group) for group in range(len(suspects))]
+        return pd.DataFrame(
+            {
+                "kind": [suspects.kind(int(group)) for group in groups],
+                "name": [names[int(group)] for group in groups],
+                "component": [suspects.row_name(row) for row in rows],
+                "unit": [suspects.unit(row) for row in rows],
+                "sd": self.sd,
+                "redundancy": self.redundancy,
+                "detectable": self.detectable,
+                "external_sd": self.external,
+                "group_T": self.tests.statistic[groups],
+                "group_dimension": self.tests.rank[groups],
+                "group_error": self.tests.error,
+                "group_error_sd": self.tests.error_sd,
+                "group_detectable_sd": self.group_detectable[groups],
+                "group_external_sd": self.group_external[groups],
+            }
+        )
+
+    def lines(self) -> list[str]:
+        """Return lines for a report: of every kind the observation whose undetected error does most."""
+        weight = "known" if self.known else f"estimated with {self.standing.degrees_of_freedom} degrees"
+        lines = [
+            f"errors that are found in {100 * self.power:.0f} of 100 cases by tests of the level"
+            f" {self.level:g}, unit weight {weight}",
+            f"{'kind':<12}{'worst of it':<44}{'redundancy':>11}{'detectable':>20}{'moves up to sd':>15}",
+        ]
+        groups = self.row_groups()
+        testable = self.redundancy > TESTABLE
+        for kind, name in enumerate(self.suspects.kind_names):
+            own = testable & (self.suspects.kinds[groups] == kind)
+            if not own.any():
+                continue
+            row = int(np.where(own, self.external, -math.inf).argmax())
+            what = f"{self.suspects.row_name(row)} of {self.suspects.name(int(groups[row]))}"
+            size = f"{self.detectable[row]:.4g} {self.suspects.unit(row)}"
+            lines.append(
+                f"{name:<12}{what:<44}{self.redundancy[row]:>11.3f}{size:>20}{self.external[row]:>15.2f}"
+            )
+        count = int(self.untestable.sum())
+        if count:
+            lines.append(f"{count} groups are checked by no other observation, {self._named_untestable()}")
+        return lines
+
+    def _named_untestable(self) -> str:
+        first = np.flatnonzero(self.untestable)[:3].tolist()
+        return "such as " + ", ".join(self.suspects.name(group) for group in first)
+
+    def document(self) -> dict[str, Any]:
+        """Return what JSON documents have: every row with its unit."""
+        return {
+            "level": self.level,
+            "power": self.power,
+            "unit_weight": "known" if self.known else "unknown",
+            "observations": self.table().to_dict(orient="records"),
+        }
+
+
+def _shown(redundancy: Floats) -> Floats:
+    """Return redundancy numbers, zero where rounding is all there is of them."""
+    return np.where(redundancy < 1e-9, 0.0, np.minimum(redundancy, 1.0))

@@ -1,0 +1,206 @@
+"""A variance function of image coordinates, and the ways to show it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.io import json
+from photogram.io.writing import write_whole
+from photogram.results.group_sums import GroupSum
+from photogram.results.network import AdjustedNetwork
+from photogram.show.pictures import drawn, new_figure, open_frame
+from photogram.show.sections import composed, headline
+from photogram.show.ways import Shown, columns_of, document_of, picture_of, report_of
+from photogram.statistics.variance_function import FunctionEstimate
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+__all__ = ["Bin", "VarianceFunction", "draw_variance_function"]
+
+OUTSIDE = 0.025
+"""On each side of an interval."""
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Images of about the same radius.
+
+    Attributes
+    ----------
+    value
+        Their mean radius.
+    count, redundancy
+        Coordinates, and the sum of their redundancy numbers.
+    factor
+        Of the variance as their residuals have it: the function's, times q / r with its weights.
+    interval
+        In which it lies with 95 percent (Satterthwaite); NaN with too little redundancy.
+    """
+
+    value: float
+    count: int
+    redundancy: float
+    factor: float
+    interval: tuple[float, float]
+
+    @classmethod
+    def of(cls, each: GroupSum, value: float, factor: float) -> Self:
+        """Return the bin of a group, whose weights are those of the function."""
+        found, interval = math.nan, (math.nan, math.nan)
+        if each.test is not None:
+            found = factor * each.squares / each.redundancy
+            limits = [
+                _photocore.chi_square_quantile(OUTSIDE, each.freedom, upper=upper) / each.freedom
+                for upper in (True, False)
+            ]
+            interval = (found / limits[0], found / limits[1])
+        return cls(value, each.count, each.redundancy, found, interval)
+
+
+@dataclass(frozen=True, eq=False)
+class VarianceFunction(Shown):
+    """The variance of image coordinates as a function: sigma^2 = sd^2 (a^2 + b^2 (r / R)^2).
+
+    Attributes
+    ----------
+    name
+        Of what: `radius` or `value`.
+    largest
+        R, the largest of the images.
+    estimate
+        The coefficients (a^2, b^2) with their covariance.
+    bins
+        Quantiles of the radius.
+    network, result
+        The network with these weights, and its adjustment.
+    """
+
+    name: str
+    largest: float
+    estimate: FunctionEstimate
+    bins: tuple[Bin, ...]
+    network: Any
+    result: AdjustedNetwork
+
+    @property
+    def test_value(self) -> float:
+        """Of the growth: b^2 over its standard deviation."""
+        return float(self.estimate.coefficients[1] / self.estimate.sd[1])
+
+    @property
+    def probability(self) -> float:
+        """Of a growth as large where there is none: one side, since b^2 is not negative."""
+        return math.erfc(self.test_value / math.sqrt(2)) / 2
+
+    def factor(self, value: float) -> float:
+        """Return by what the given variance is multiplied at a radius."""
+        a, b = self.estimate.coefficients.tolist()
+        return float(a + b * (value / self.largest) ** 2)
+
+    def table(self) -> pd.DataFrame:
+        """Return the bins as a data frame."""
+        return self._table("bin")
+
+
+@columns_of.register(VarianceFunction)
+def _columns(found: VarianceFunction, what: str) -> dict[str, Any]:
+    """Mean of the bin, its redundancy, factors of the variance by residuals and by the function."""
+    del what
+    return {
+        found.name: [each.value for each in found.bins],
+        "coordinates": [each.count for each in found.bins],
+        "redundancy": [each.redundancy for each in found.bins],
+        "factor": [each.factor for each in found.bins],
+        "low": [each.interval[0] for each in found.bins],
+        "high": [each.interval[1] for each in found.bins],
+        "function": [found.factor(each.value) for each in found.bins],
+    }
+
+
+@document_of.register(VarianceFunction)
+def _document(found: VarianceFunction) -> bytes:
+    """Return the function as JSON (UTF-8)."""
+    columns = _columns(found, "bin")
+    return json.to_json(
+        {
+            "program": f"photogram {_photocore.__version__}",
+            "of": found.name,
+            "largest": found.largest,
+            "coefficients": found.estimate.coefficients.tolist(),
+            "covariance": found.estimate.covariance.tolist(),
+            "test_value": found.test_value,
+            "probability": found.probability,
+            "converged": found.estimate.converged,
+            "bins": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
+        }
+    )
+
+
+@report_of.register(VarianceFunction)
+def _report(found: VarianceFunction) -> str:
+    """Return the function and the bins as text."""
+    names = ("a^2", "b^2")
+    estimate = found.estimate
+    said = [f"variance = given variance x (a^2 + b^2 ({found.name} / {found.largest:.6g})^2)"]
+    said += [
+        f"{name} {value:>12.4f}   sd {sd:.4f}"
+        for name, value, sd in zip(names, estimate.coefficients, estimate.sd, strict=True)
+    ]
+    said.append(f"b^2 / sd {found.test_value:.2f}, probability {found.probability:.2g} where nothing grows")
+    if not estimate.converged:
+        said.insert(0, f"not converged after {estimate.steps} adjustments: do not use it")
+    lines = [
+        f"{found.name:>12}{'number':>8}{'redundancy':>12}{'factor':>10}{'from':>10}{'to':>10}{'function':>10}"
+    ]
+    for each in found.bins:
+        cells = "".join(
+            f"{cell:>10.3f}" if math.isfinite(cell) else f"{'-':>10}"
+            for cell in (each.factor, *each.interval, found.factor(each.value))
+        )
+        lines.append(f"{each.value:>12.4g}{each.count:>8}{each.redundancy:>12.2f}{cells}")
+    sections = [("Function", said), ("Quantiles: factor of the given variance", lines)]
+    return composed(headline("variance function"), sections)
+
+
+@picture_of.register(VarianceFunction)
+def _picture(found: VarianceFunction) -> bytes:
+    """Return the picture (PNG)."""
+    return drawn(_figure(found))
+
+
+def draw_variance_function(found: VarianceFunction, path: Path) -> None:
+    """Write the picture of a variance function, in the format that the name of the file asks for.
+
+    Raises
+    ------
+    InputError
+        A suffix that names no format.
+    """
+    write_whole({path: drawn(_figure(found), path)})
+
+
+def _figure(found: VarianceFunction) -> Figure:
+    """Draw the bins with their intervals, and the function."""
+    figure = new_figure(6.4, 4.0)
+    axes = figure.add_subplot()
+    x = np.array([each.value for each in found.bins])
+    y = np.array([each.factor for each in found.bins])
+    ends = np.array([each.interval for each in found.bins]).T
+    axes.errorbar(x, y, np.abs(ends - y), fmt="o", color="black", capsize=3, label="residuals, 95 percent")
+    line = np.linspace(0.0, found.largest, 100)
+    axes.plot(line, [found.factor(value) for value in line], color="tab:red", label="function")
+    axes.axhline(1.0, color="grey", linewidth=0.8, label="given variance")
+    axes.set_xlabel(found.name)
+    axes.set_ylabel("factor of the given variance")
+    axes.set_ylim(bottom=0.0)
+    axes.legend(frameon=False)
+    open_frame(axes)
+    return figure

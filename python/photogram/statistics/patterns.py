@@ -1,0 +1,254 @@
+"""What residuals should not show: tails, a pattern over the frame, a trend, a bend.
+
+All take standardized residuals ~v = (observed - computed) / sd and their redundancy numbers r. The residuals
+of an adjustment are correlated, ~v = R ~e: a sum over a group has the variance sum R_ij, of which sum r_i is
+the part on the diagonal. The other part is mostly negative, since a common shift of a group goes into the
+unknowns; tests that take the sum of r for the variance are conservative: they find less than they might.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Bools, Floats, Indices
+
+__all__ = ["Fit", "FramePattern", "Normality", "frame_pattern", "group_patterns", "normality", "regression"]
+
+MOST = 20_000
+"""Values whose distribution is looked at; of more every so many-th."""
+
+BINS = 5
+"""Of the frame in each direction."""
+
+FULL = 10.0
+"""Redundancy that a bin of the frame needs."""
+
+
+@dataclass(frozen=True)
+class Normality:
+    """How residuals are distributed.
+
+    Attributes
+    ----------
+    values
+        How many.
+    excess
+        Excess kurtosis; 0 of the normal distribution.
+    beyond
+        Shares of values beyond 2 and 3 standard deviations: normal are 0.0455 and 0.0027.
+    statistic
+        Anderson and Darling's A^2 with mean and variance estimated, corrected for the number (Stephens 1974).
+    probability
+        Of a value as large, of normal ones.
+    """
+
+    values: int
+    excess: float
+    beyond: tuple[float, float]
+    statistic: float
+    probability: float
+
+
+def normality(values: Floats) -> Normality | None:
+    """Test whether values are normal, of whatever mean and variance (Anderson and Darling 1954).
+
+    Residuals are mixtures of the errors of many observations and look more normal than these: acceptance
+    proves little where redundancy is low. None of less than 20 values, or equal ones.
+    """
+    z = np.sort(values[np.isfinite(values)])
+    z = z[:: max(1, -(-z.size // MOST))]
+    n = z.size
+    if n < 20 or not z.std(ddof=1) > 0:
+        return None
+    z = (z - z.mean()) / z.std(ddof=1)
+    below = np.clip(_normal(z), 1e-300, 1.0)
+    above = np.clip(_normal(-z), 1e-300, 1.0)
+    ranks = 2 * np.arange(1, n + 1) - 1
+    squared = -n - float(np.mean(ranks * (np.log(below) + np.log(above[::-1]))))
+    corrected = squared * (1 + 0.75 / n + 2.25 / n**2)
+    size = np.abs(z)
+    return Normality(
+        values=n,
+        excess=float((z**4).mean() / (z**2).mean() ** 2 - 3),
+        beyond=(float((size > 2).mean()), float((size > 3).mean())),
+        statistic=corrected,
+        probability=_of_anderson_darling(corrected),
+    )
+
+
+def _normal(z: Floats) -> Floats:
+    return np.array([0.5 * math.erfc(-each / math.sqrt(2)) for each in z.tolist()])
+
+
+def _of_anderson_darling(a: float) -> float:
+    """Return the p-value of the corrected A^2 (D'Agostino and Stephens 1986, table 4.9)."""
+    if a >= 0.6:
+        return math.exp(min(1.2937 - 5.709 * a + 0.0186 * a * a, 0.0)) if a < 13 else 0.0
+    if a > 0.34:
+        return math.exp(0.9177 - 4.279 * a - 1.38 * a * a)
+    if a > 0.2:
+        return 1 - math.exp(-8.318 + 42.796 * a - 59.938 * a * a)
+    return 1 - math.exp(-13.436 + 101.14 * a - 223.73 * a * a)
+
+
+@dataclass(frozen=True)
+class FramePattern:
+    """Mean residuals over the frame of a camera.
+
+    Attributes
+    ----------
+    statistic, dof
+        Sum over bins and axes of (sum of ~v)^2 / (sum of r), and its degrees of freedom (chi-square).
+    probability
+        Of a statistic as large without a pattern.
+    rms
+        Root mean square of the mean vectors of the bins, in standard deviations, x and y together.
+    largest
+        The largest mean vector of a bin, in standard deviations.
+    at
+        Mean image coordinates in that bin.
+    """
+
+    statistic: float
+    dof: float
+    probability: float
+    rms: float
+    largest: tuple[float, float]
+    at: tuple[float, float]
+
+
+def frame_pattern(
+    xy: Floats, residuals: Floats, redundancy: Floats, parameters: int = 0
+) -> FramePattern | None:
+    """Test whether the mean residuals in the bins of a frame are zero.
+
+    Parameters
+    ----------
+    xy
+        (m, 2) image coordinates, any unit.
+    residuals, redundancy
+        (m, 2) ~v, on the scale of the other residuals, and r.
+    parameters
+        Of the camera that are estimated: so many degrees of freedom less.
+
+    Returns
+    -------
+    None where no four bins of 5 x 5 have a redundancy of 10 in both axes.
+    """
+    if not len(xy):
+        return None
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    width = np.where(high > low, high - low, 1.0)
+    cells = np.minimum((BINS * (xy - low) / width).astype(np.int64), BINS - 1)
+    bins = cells[:, 0] * BINS + cells[:, 1]
+    sums, checked, places = (_summed(bins, each) for each in (residuals, redundancy, xy))
+    counts = np.bincount(bins, minlength=BINS**2)
+    full = (checked >= FULL).all(axis=1)
+    dof = 2.0 * int(np.count_nonzero(full)) - parameters
+    if np.count_nonzero(full) < 4 or dof < 1:
+        return None
+    statistic = float((sums[full] ** 2 / checked[full]).sum())
+    means = sums[full] / counts[full, np.newaxis]
+    worst = int((means**2).sum(axis=1).argmax())
+    at = (places[full] / counts[full, np.newaxis])[worst]
+    return FramePattern(
+        statistic=statistic,
+        dof=dof,
+        probability=_photocore.chi_square(statistic, dof),
+        rms=math.sqrt(float((means**2).sum(axis=1).mean())),
+        largest=(float(means[worst, 0]), float(means[worst, 1])),
+        at=(float(at[0]), float(at[1])),
+    )
+
+
+def _summed(groups: Indices, values: Floats) -> Floats:
+    return np.stack([np.bincount(groups, weights=column, minlength=BINS**2) for column in values.T], axis=1)
+
+
+def group_patterns(
+    groups: Indices, count: int, xy: Floats, residuals: Floats, redundancy: Floats
+) -> tuple[Floats, Floats]:
+    """Test of each group whether its residuals follow a shift and a linear form of the coordinates.
+
+    Of a photo: film or scanner, an axis that is not as assumed. With b = (1, x, y) centred and scaled it is
+    the score test c' C^-1 c, c = sum b ~v, C = sum r b b', in both axes: chi-square with six degrees of
+    freedom.
+
+    Parameters
+    ----------
+    groups, count
+        (m,) the group of each row, and how many there are.
+    xy, residuals, redundancy
+        (m, 2) as in :func:`frame_pattern`.
+
+    Returns
+    -------
+    (count,) statistics and p-values; NaN for groups with a redundancy below 10 in an axis.
+    """
+    numbers = np.bincount(groups, minlength=count)
+    means = np.stack([np.bincount(groups, weights=each, minlength=count) for each in xy.T], axis=1)
+    centred = xy - (means / np.maximum(numbers, 1)[:, np.newaxis])[groups]
+    spread = np.sqrt((centred**2).mean()) if len(xy) else 1.0
+    design = np.column_stack([np.ones(len(xy)), centred / (spread or 1.0)])
+    statistics, enough = np.zeros(count), np.ones(count, dtype=bool)
+    for axis in (0, 1):
+        score = np.stack(
+            [np.bincount(groups, weights=each * residuals[:, axis], minlength=count) for each in design.T],
+            axis=1,
+        )
+        products = np.einsum("mi,mj,m->mij", design, design, redundancy[:, axis]).reshape(-1, 9)
+        matrices = np.stack(
+            [np.bincount(groups, weights=each, minlength=count) for each in products.T], axis=1
+        ).reshape(-1, 3, 3)
+        enough &= matrices[:, 0, 0] >= FULL
+        matrices[~enough] = np.eye(3)
+        statistics += np.einsum("gi,gij,gj->g", score, np.linalg.pinv(matrices, hermitian=True), score)
+    statistics[~enough] = math.nan
+    return statistics, np.array([_photocore.chi_square(each, 6.0) for each in statistics.tolist()])
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A regression of test values on other figures.
+
+    Attributes
+    ----------
+    statistic, dof
+        F, and its degrees of freedom.
+    probability
+        Of a statistic as large without a dependence.
+    rms
+        Root mean square of the fitted values, in standard deviations.
+    """
+
+    statistic: float
+    dof: tuple[float, float]
+    probability: float
+    rms: float
+
+
+def regression(values: Floats, design: Floats, used: Bools | None = None) -> Fit | None:
+    """Test whether values depend on the k columns of a design: F with k and n - k degrees of freedom.
+
+    None with fewer than k + 5 values.
+    """
+    kept = np.isfinite(values) & (np.ones(len(values), dtype=bool) if used is None else used)
+    y, x = values[kept], design[kept]
+    if len(y) < x.shape[1] + 5:
+        return None
+    basis, triangle = np.linalg.qr(x)
+    first = int(np.count_nonzero(np.abs(np.diag(triangle)) > 1e-9 * np.abs(triangle).max()))
+    if first < x.shape[1]:
+        return None
+    along = basis.T @ y
+    explained, second = float(along @ along), float(len(y) - first)
+    left = float(y @ y) - explained
+    if not left > 0:
+        return None
+    statistic = (explained / first) / (left / second)
+    probability = _photocore.fisher(statistic, float(first), second)
+    return Fit(statistic, (float(first), second), probability, math.sqrt(explained / len(y)))

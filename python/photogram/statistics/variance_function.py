@@ -1,0 +1,145 @@
+"""Variances that depend on something: on the distance from the principal point, say.
+
+Within a group the variance is sd^2 theta_i with theta_i = x_i^T beta, x_i = (1, u_i, ...) and u_i the square
+of the radius over the largest: sigma^2 = a^2 + b^2 r^2. With the residuals ~v in standard deviations and the
+redundancy numbers r_i of an adjustment with the present theta, ~v_i^2 is regressed on r_i x_i / theta_i with
+the weights 1 / r_i, beta not negative; then the network is adjusted anew, until beta stands. The fixed point
+solves
+
+    sum_i (~v_i^2 - r_i) x_i / theta_i = 0,
+
+the derivative of the restricted likelihood; its information is 1/2 sum_ij R_ij^2 x_i x_j^T over
+theta_i theta_j. The first regression alone is badly biased, because neighbours share their errors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+
+__all__ = ["FunctionEstimate", "Residuals", "estimate_function", "nonnegative"]
+
+LEAST = 1e-6
+"""A redundancy number below this takes no part."""
+CLOSE = 0.01
+"""Steps end when no coefficient moves by more than this part of its standard deviation."""
+
+
+class Residuals(Protocol):
+    """What an adjustment leaves of k observations with given variances."""
+
+    @property
+    def squares(self) -> Floats:
+        """(k,) squares of residuals in standard deviations."""
+
+    @property
+    def redundancy(self) -> Floats:
+        """(k,) redundancy numbers."""
+
+    def information(self, terms: Floats) -> Floats:
+        """Return (t, t) sums of R_ij^2 c_i c_j^T over the (k, t) terms c, none of them negative."""
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionEstimate:
+    """Coefficients of a variance function.
+
+    Attributes
+    ----------
+    coefficients, sd
+        (t,) of the terms, in the given variances, with their standard deviations.
+    covariance
+        (t, t).
+    first
+        (t,) those of the first regression, which are biased.
+    factors
+        (k,) theta of every observation.
+    converged
+        Whether the fixed point was reached.
+    steps
+        How many adjustments it took.
+    """
+
+    coefficients: Floats
+    sd: Floats
+    covariance: Floats
+    first: Floats
+    factors: Floats
+    converged: bool
+    steps: int
+
+
+def nonnegative(normal: Floats, right: Floats) -> Floats:
+    """Solve normal equations of few unknowns, none of which may be negative (least squares)."""
+    count = len(right)
+    best, lowest = np.zeros(count), math.inf
+    for chosen in range(1, 1 << count):
+        rows = np.array([k for k in range(count) if chosen >> k & 1])
+        found = np.linalg.lstsq(normal[np.ix_(rows, rows)], right[rows], rcond=None)[0]
+        value = float(-right[rows] @ found)
+        if (found >= 0).all() and value < lowest:
+            best, lowest = np.zeros(count), value
+            best[rows] = found
+    return best
+
+
+def estimate_function(
+    adjust: Callable[[Floats], Residuals], terms: Floats, *, max_steps: int = 30
+) -> FunctionEstimate:
+    """Estimate a variance function.
+
+    Parameters
+    ----------
+    adjust
+        Tells what an adjustment with (k,) factors of the variances leaves; called first with ones.
+    terms
+        (k, t) x, not negative; the first is 1.
+    max_steps
+        Adjustments at the most.
+    """
+    factors = np.ones(len(terms))
+    state = adjust(factors)
+    beta: Floats = np.zeros(terms.shape[1])
+    first: Floats | None = None
+    for step in range(1, max_steps + 1):
+        r = state.redundancy
+        used = np.isfinite(state.squares) & (r > LEAST)
+        c = terms[used] / factors[used, np.newaxis]
+        normal = (c * r[used, np.newaxis]).T @ c
+        scale = 1.0 / np.sqrt(np.diag(normal))
+        found = scale * nonnegative(normal * np.outer(scale, scale), scale * (c.T @ state.squares[used]))
+        first = found if first is None else first
+        # Twice the sum of R_ij^2 on the diagonal alone would be this: steps end by less than the deviation.
+        deviations = np.sqrt(2.0) * scale
+        moved = np.abs(found - beta)
+        beta, factors = found, terms @ found
+        if not (factors > 0).all():
+            factors = np.maximum(factors, 1e-4 * float(factors.max()))
+        state = adjust(factors)
+        if (moved < CLOSE * deviations).all():
+            return _finished(state, terms, beta, first, factors, step, converged=True)
+    return _finished(
+        state, terms, beta, first if first is not None else beta, factors, max_steps, converged=False
+    )
+
+
+def _finished(
+    state: Residuals,
+    terms: Floats,
+    beta: Floats,
+    first: Floats,
+    factors: Floats,
+    steps: int,
+    *,
+    converged: bool,
+) -> FunctionEstimate:
+    information = state.information(terms / factors[:, np.newaxis]) / 2
+    covariance: Floats = np.asarray(np.linalg.pinv(information), dtype=np.float64)
+    sd: Floats = np.asarray(np.sqrt(np.diag(covariance)))
+    return FunctionEstimate(beta, sd, covariance, first, factors, converged, steps)

@@ -1,0 +1,84 @@
+"""Control as a whole against the free model: its Omega is what the control adds to that of the adjustment."""
+
+import numpy as np
+import pytest
+
+from photogram import adjust, check, simulate
+from photogram.checks.adjusting import Adjuster
+from photogram.checks.control_sets import doubtful, explain, free_model
+from photogram.checks.robust import mad_sd
+
+BLOCK = simulate(
+    strips=3, photos_per_strip=6, points_per_photo=40, control_spacing=2, control_sd=0.05, seed=11
+).block
+ADJUSTER = Adjuster({"threads": 1})
+
+
+def changed(factors):
+    return BLOCK.replace(point_positions=BLOCK.point_positions * factors)
+
+
+def test_omega_is_what_control_adds_to_the_sum_of_squares():
+    model = free_model(BLOCK, ADJUSTER)
+    free = BLOCK.replace(point_sd=np.inf)
+    whole = adjust(BLOCK, threads=1).sums_of_squares.total
+    without = adjust(free, threads=1)
+    # The covariance of the model has the robust spread of its residuals.
+    size = max(mad_sd(without.standardized), 1.0)
+    added = whole - without.sums_of_squares.total
+    assert added / size**2 <= model.omega() <= added
+    assert model.degrees_of_freedom == np.isfinite(BLOCK.point_sd).sum() - 7
+
+
+@pytest.mark.parametrize(
+    ("factors", "kind"),
+    [
+        ([1, 1, 1 / 0.3048], "feet in heights"),
+        ([1 / 0.3048, 1, 1], "feet in X"),
+        ([1, 1 / 0.3048, 1], "feet in Y"),
+        ([1 / 0.3048, 1 / 0.3048, 1], "feet in X and Y"),
+    ],
+)
+def test_a_mistake_in_all_control_is_explained(factors, kind):
+    block = changed(factors)
+    assert doubtful(ADJUSTER.tried(block), "control")
+    found = explain(free_model(block, ADJUSTER))
+    assert (found.kind, found.judged.accepted) == (kind, True)
+    np.testing.assert_allclose(
+        found.change(block).point_positions[np.isfinite(block.point_sd).all(axis=1)],
+        BLOCK.point_positions[np.isfinite(block.point_sd).all(axis=1)],
+    )
+
+
+def test_good_control_is_neither_doubted_nor_explained():
+    assert not doubtful(ADJUSTER.tried(BLOCK), "control")
+    assert explain(free_model(BLOCK, ADJUSTER)) is None
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_single_wrong_points_are_no_mistake_of_all(axis):
+    positions = BLOCK.point_positions.copy()
+    point = int(np.flatnonzero(np.isfinite(BLOCK.point_sd).all(axis=1))[3])
+    positions[point, axis] += 300.0
+    assert explain(free_model(BLOCK.replace(point_positions=positions), ADJUSTER)) is None
+
+
+def test_two_exchanged_points_are_no_mirror_image():
+    full = np.flatnonzero(np.isfinite(BLOCK.point_sd).all(axis=1))
+    for one, other in ((0, -1), (1, 2)):
+        positions = BLOCK.point_positions.copy()
+        positions[full[[one, other]]] = positions[full[[other, one]]]
+        assert explain(free_model(BLOCK.replace(point_positions=positions), ADJUSTER)) is None
+
+
+def test_a_blunder_beside_the_mistake_is_named_too():
+    block = changed([1, 1, 1 / 0.3048])
+    rays = np.bincount(block.image_points)
+    row = int(np.flatnonzero(rays[block.image_points] >= 4)[9])
+    xy = block.image_xy.copy()
+    xy[row, 1] += 1.0
+    found = check(block.replace(image_xy=xy))
+    kinds = {each.kind: each for each in found.grave}
+    assert {*kinds} in ({"control-set", "blunder"}, {"control-set", "gross-error"})
+    (other,) = {*kinds} - {"control-set"}
+    assert kinds[other].points == [block.point_ids[block.image_points[row]]]

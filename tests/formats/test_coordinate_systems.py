@@ -1,0 +1,126 @@
+"""Coordinate reference systems: in from any, adjusted in a cartesian frame, back with covariances."""
+
+import shutil
+import warnings
+
+import numpy as np
+import pytest
+from test_plain_project import EXAMPLE, change, written
+
+from photogram import InputError, adjust, formats
+from photogram.formats.project import Frame
+
+pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
+crs = pytest.importorskip("photogram.formats.crs")
+
+FRAME = Frame("topocentric", "EPSG:4979", (47.38, 8.54, 450.0))
+PIPELINE = (
+    "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=cart +ellps=WGS84"
+    " +step +proj=topocentric +ellps=WGS84 +lon_0=8.54 +lat_0=47.38 +h_0=450"
+)
+
+
+def test_the_frame_is_that_of_projs_own_pipeline():
+    random = np.random.default_rng(2)
+    places = np.column_stack(
+        [8.54 + random.normal(0, 0.05, 50), 47.38 + random.normal(0, 0.05, 50), random.uniform(300, 900, 50)]
+    )
+    found, _, remarks = crs.to_frame("EPSG:4979", places, np.zeros((50, 3, 3)), FRAME)
+    theirs = np.column_stack(pyproj.Transformer.from_pipeline(PIPELINE).transform(*places.T))
+    np.testing.assert_allclose(found, theirs, atol=2e-9)
+    assert remarks == []
+
+
+@pytest.mark.parametrize(
+    "name", ["EPSG:4979", "EPSG:32632", "EPSG:4978", "ENU:47.4,8.5,400", "EPSG:2056", "EPSG:31467"]
+)
+def test_there_and_back(name):
+    random = np.random.default_rng(3)
+    local = random.normal(0, 400, (20, 3))
+    root = random.normal(0, 0.01, (20, 3, 3))
+    covariances = root @ root.transpose(0, 2, 1)
+    out, turned = crs.from_frame(name, local, covariances, FRAME)
+    back, again, _ = crs.to_frame(name, out, turned, FRAME)
+    # Systems on another datum go through a transformation whose inverse is iterated.
+    np.testing.assert_allclose(back, local, atol=1e-3 if name in ("EPSG:2056", "EPSG:31467") else 5e-9)
+    np.testing.assert_allclose(again, covariances, atol=2e-9)
+    np.testing.assert_allclose(
+        np.trace(turned, axis1=1, axis2=2), np.trace(covariances, axis1=1, axis2=2), rtol=1e-12
+    )
+
+
+def test_covariances_of_a_projected_system_are_along_its_grid():
+    place = np.array([[465254.6, 5247458.8, 448.4]])
+    along_north = np.diag([0.0, 1.0, 0.0])[np.newaxis]
+    _, turned, remarks = crs.to_frame("EPSG:32632", place, along_north, FRAME)
+    east, north = np.sqrt(turned[0, 0, 0]), np.sqrt(turned[0, 1, 1])
+    # gamma = atan(tan(lon - lon0) sin lat): -0.338 degrees at 0.46 degrees west of the central meridian.
+    assert np.degrees(np.arctan2(east, north)) == pytest.approx(0.3388, abs=2e-3)
+    assert remarks == ["EPSG:32632 says nothing of heights: they are taken as ellipsoidal"]
+
+
+def test_axes_are_easting_first_whatever_an_authority_says():
+    found, _, _ = crs.to_frame("EPSG:4326", np.array([[8.54, 47.38, 450.0]]), np.zeros((1, 3, 3)), FRAME)
+    np.testing.assert_allclose(found, 0, atol=1e-8)
+    gauss = np.array([[3465254.6, 5249000.0, 448.4]])
+    near, _, remarks = crs.to_frame("EPSG:31467", gauss, np.zeros((1, 3, 3)), FRAME)
+    assert np.linalg.norm(near) < 2000
+    assert any("northing first" in each for each in remarks)
+
+
+def test_heights_for_which_a_grid_is_missing_are_refused():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        available = pyproj.transformer.TransformerGroup(
+            "EPSG:4326+5773", "EPSG:4979", always_xy=True
+        ).best_available
+    if available:
+        pytest.skip("the grid of EGM96 is installed")
+    with pytest.raises(InputError, match="need the grid of a geoid"):
+        crs.to_frame("EPSG:4326+5773", np.array([[8.54, 47.38, 400.0]]), np.zeros((1, 3, 3)), FRAME)
+
+
+def test_control_in_a_projected_system_adjusts_to_the_same_block(tmp_path):
+    plain = formats.read(EXAMPLE)
+    place = shutil.copytree(EXAMPLE, tmp_path / "utm")
+    change(place / "project.toml", "[frame]", '[frame]\nkind = "topocentric"\norigin = [47.38, 8.54, 450.0]')
+    change(
+        place / "project.toml",
+        "[adjust]",
+        '[control]\ncrs = "EPSG:32632"\n[gnss]\ncrs = "EPSG:4979"\n[adjust]',
+    )
+    for table, name in (("control", "EPSG:32632"), ("gnss", "EPSG:4979")):
+        lines = (place / f"{table}.csv").read_text().splitlines()
+        rows = [line.split(",") for line in lines if not line.startswith("#")]
+        values = np.array([row[1:4] for row in rows[1:]], dtype=float)
+        out, _ = crs.from_frame(name, values, np.zeros((len(values), 3, 3)), FRAME)
+        body = [
+            ",".join([row[0], *map(repr, own), *row[4:]])
+            for row, own in zip(rows[1:], out.tolist(), strict=True)
+        ]
+        (place / f"{table}.csv").write_text("\n".join([",".join(rows[0]), *body, ""]))
+    project = formats.read(place)
+    assert project.frame.origin == FRAME.origin
+    one, two = adjust(plain.block), adjust(project.block)
+    order = [project.block.point_ids.index(name) for name in plain.block.point_ids]
+    np.testing.assert_allclose(two.point_positions[order], one.point_positions, atol=1e-6)
+    np.testing.assert_allclose(two.point_sd[order], one.point_sd, rtol=1e-5)
+    # Without an origin one is chosen, and written with the adjusted project.
+    text = (
+        (place / "project.toml")
+        .read_text()
+        .replace('kind = "topocentric"\norigin = [47.38, 8.54, 450.0]', "")
+    )
+    (place / "project.toml").write_text(text)
+    chosen = formats.read(place)
+    assert chosen.frame.kind == "topocentric"
+    assert chosen.frame.origin is not None
+    again = formats.read(written(chosen, tmp_path / "again"))
+    assert again.frame == chosen.frame
+
+
+def test_a_system_that_there_is_not_is_refused_with_the_table(tmp_path):
+    place = shutil.copytree(EXAMPLE, tmp_path / "own")
+    change(place / "project.toml", "[adjust]", '[control]\ncrs = "EPSG:1"\n[adjust]')
+    with pytest.raises(InputError, match=r"control\.csv.*'EPSG:1' is no coordinate reference system"):
+        formats.read(place)

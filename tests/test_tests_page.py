@@ -1,0 +1,23 @@
+"""The page of tests: its figures are those of the command."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_figures_of_the_page_are_those_of_the_command():
+    command = [sys.executable, str(ROOT / "docs" / "regenerate.py"), "--check", "tests.md"]
+    assert subprocess.run(command, check=False).returncode == 0
+
+
+def test_the_table_of_the_verdict_has_every_code():
+
+    sources = (ROOT / "python" / "photogram" / "statistics").glob("[ve]*.py")
+    text = "".join(path.read_text() for path in sources)
+    codes = set(re.findall(r'_Line\(\s*"([a-z-]+)"', text)) | {"accepted", "not-tested"}
+    table = (ROOT / "docs" / "command-line.md").read_text()
+    assert len(codes) == 16
+    assert all(f"`{code}`" in table for code in codes), codes

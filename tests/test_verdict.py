@@ -1,0 +1,295 @@
+"""The verdict: the first condition that fits gives the headline and the exit code."""
+
+import json
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from photogram import adjust, resect
+from photogram.geometry import project
+from photogram.show.sections import verdict_section
+from photogram.simulation import simulate
+from photogram.statistics import Findings, Removed, global_test, group_tests, verdict
+from photogram.statistics.findings import GroupFactor, Systematic, by_t, by_w, of_groups
+from photogram.statistics.outliers import Observations
+from photogram.statistics.verdict import worst
+
+F = 81
+
+
+def named(index):
+    return f"{'xy'[index[1]]} of point {index[0]}"
+
+
+def good(seed=1, factor=1.0):
+    return factor * np.random.default_rng(seed).normal(size=(120, 2))
+
+
+def findings(w, variance=1.0, **more):
+    kinds = [by_w(Observations("image coordinates", w, named))]
+    test = global_test(variance * F, F)
+    return Findings(
+        **{"status": "converged", "observations": kinds, "degrees_of_freedom": F, "global_test": test} | more
+    )
+
+
+def pattern(probability=1e-9, *, large=True):
+    return Systematic("over the frame", "the lens", "B", "chi2", (40.0,), 99.0, probability, 0.001, large)
+
+
+def component(factor, significant=True):
+    return GroupFactor("strip 1", factor, (0.9 * factor, 1.1 * factor), significant)
+
+
+with_blunder = good()
+with_blunder[7, 1] = 9.0
+
+CASES = {
+    "accepted": (findings(good()), 0, False, "Accepted: the residuals agree"),
+    "not tested": (findings(good(), global_test=None), 0, False, "Not tested as a whole (no a-priori unit"),
+    "not converged": (findings(good(), status="diverged"), 3, False, "Not converged (diverged)"),
+    "undetermined": (findings(good(), undetermined=["kappa of photo 3"]), 3, False, "Unknowns that no"),
+    "hint": (findings(with_blunder, 2.0, hints=["probably feet"]), 4, False, "Probably feet"),
+    "stars": (findings(good(), doubtful=["exposure 2"]), 4, False, "The identification of stars is doubtful"),
+    "blunder": (findings(with_blunder, 2.0), 4, False, "Gross errors likely: 1) y of point 7 (w = 9)"),
+    "removed": (findings(good(), snooped=Removed([{"name": "a"}])), 0, False, "Usable after removal of 1"),
+    "too much": (findings(good(), snooped=Removed([{"name": "a"}], images=0.06)), 4, False, "Too much had"),
+    "control": (findings(good(), snooped=Removed([{"name": "a"}], control=0.4)), 4, False, "Too much had"),
+    "factor": (findings(good(factor=2.0), 4.0), 0, True, "Weights too optimistic: standard deviations are"),
+    "far": (findings(good(factor=200.0), 4e4), 4, False, "Weights too optimistic"),
+    "group": (findings(good(), components=[component(2.0)]), 0, True, "Standard deviations are wrong: those"),
+    "far group": (findings(good(), components=[component(4.0)]), 4, True, "Standard deviations are wrong"),
+    "uniform": (findings(good(), components=[component(1.1, False)]), 0, False, "Accepted"),
+    "model": (findings(good(factor=2), 4.0, systematic=[pattern()]), 4, False, "The model is likely wrong"),
+    "small pattern": (findings(good(), systematic=[pattern(large=False)]), 0, False, "Accepted"),
+    "chance": (findings(good(), systematic=[pattern(0.01)]), 0, False, "Accepted"),
+    "no freedom": (findings(good()[:0], degrees_of_freedom=0, global_test=None), 0, True, "Nothing is"),
+    "unexplained": (findings(good(), 2.0), 0, True, "Residuals are 1.41 (95 percent: 1.23 to 1.67) times"),
+    "far unexplained": (findings(good(), 16.0), 4, True, "Residuals are 4 "),
+    "look": (findings(with_blunder, 1.1), 0, True, "Accepted, but look at: 1) y of point 7 (w = 9)"),
+    "low": (findings(good(factor=0.5), 0.25), 0, False, "Weights too pessimistic"),
+    "spoiled": (findings(good(), spoiled="it changes"), 4, False, "Gross errors: it changes"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_conditions(case):
+    found, code, warning, headline = CASES[case]
+    made = verdict(found)
+    assert made.headline.startswith(headline)
+    assert (made.exit, made.exit_code()) == (code, code)
+    assert made.exit_code(strict=True) == (4 if warning and not code else code)
+    assert made.warning >= warning
+    assert made.usable == (code == 0)
+
+
+def test_a_variance_of_thousands_is_never_without_problems():
+    """Whatever else is known or not."""
+    for w in (good(), good(factor=189.0), with_blunder, np.full((120, 2), math.nan)):
+        for more in ({}, {"snooped": Removed([])}, {"systematic": [pattern()]}, {"computed": False}):
+            made = verdict(findings(w, 35_820.0, **more))
+            assert made.exit == 4, (made.headline, more)
+
+
+def test_what_does_not_give_the_headline_follows():
+    found = findings(with_blunder, 2.0, hints=["probably feet"], systematic=[pattern()], remarks=["a remark"])
+    made = verdict(found)
+    assert made.code == "hint"
+    assert made.lines[0].startswith("Gross errors likely")
+    assert any("The model is likely wrong" in line for line in made.lines)
+    assert made.lines[-1] == "a remark"
+
+
+def test_gross_errors_beside_a_common_factor():
+    """A blunder among standard deviations that are all too small; and these alone, which have none."""
+    w = good(factor=2.0)
+    w[3, 0] = 30.0
+    assert verdict(findings(w, 12.0)).code == "gross-errors"
+    # A blunder among few: the factor is that of the others.
+    few = np.array([[0.3, -1.2], [0.8, 9.0], [-0.5, 1.1]])
+    made = findings(few, global_test=global_test(84.0, 4), degrees_of_freedom=4)
+    assert verdict(made).code == "gross-errors"
+    assert any("only gross disagreement" in line for line in verdict(made).lines)
+    alike = findings(few * [1.0, 0.4], global_test=global_test(4 * 4.5, 4), degrees_of_freedom=4)
+    assert verdict(alike).code == "weights"
+
+
+def test_a_few_gross_errors_that_spoil_everything_are_no_model():
+    """A control point wrong by 500 m bends the block: all residuals show it, a few of them most of it."""
+    w = good(factor=5.0)
+    w[:3] *= 60.0
+    few = findings(w, 400.0, systematic=[pattern()])
+    assert verdict(few).code == "gross-errors"
+    assert any("The model is likely wrong" in line for line in verdict(few).lines)
+    w[:3] = good(factor=5.0)[:3]
+    w[0, 0] = 30.0
+    assert verdict(findings(w, 27.0, systematic=[pattern()])).code == "model"
+
+
+def test_the_order_is_that_of_the_probabilities():
+    w = good()
+    w[5, 0], w[9, 1], w[2, 0] = -7.0, 40.0, 6.0
+    text = verdict(findings(w, 22.0)).headline
+    assert text.index("y of point 9") < text.index("x of point 5") < text.index("x of point 2")
+
+
+def test_groups_and_singles_are_tested_together():
+    blocks = np.tile(0.4 * np.eye(2), (30, 1, 1))
+    v = np.random.default_rng(3).normal(size=(30, 2)) * math.sqrt(0.4)
+    v[11] = [4.0, -4.0]
+    groups = of_groups("images", group_tests(blocks, v), lambda index: f"image {index[0]}")
+    single = by_w(Observations("control", good()[:4], named))
+    made = verdict(findings(good(), 2.0, observations=[groups, single]))
+    largest = {test.name.partition(":")[0]: test for test in made.tests}
+    assert largest["images"].statistic == "T"
+    assert largest["images"].dof == (2.0,)
+    assert not largest["images"].accepted
+    assert largest["images"].tests == largest["control"].tests == 38
+    assert made.headline == "Gross errors likely: 1) image 11 (T = 80)"
+
+
+def test_the_level_is_shared_and_stated():
+    made = verdict(findings(good()))
+    single = made.tests[1]
+    assert single.level == pytest.approx(0.05 / 240)
+    assert single.limits == (pytest.approx(-3.7089, abs=1e-3), pytest.approx(3.7089, abs=1e-3))
+    assert any("w (Baarda; the unit weight is known)" in line for line in made.lines)
+    by_others = findings(good(), observations=[by_t(Observations("images", good(), named), F, F)])
+    assert any("externally studentized" in line for line in verdict(by_others).lines)
+
+
+def test_one_observation_that_makes_up_everything_is_found():
+    """Internally studentized it would be the root of 8, 2.83: below 3 whatever its size."""
+    w = np.zeros((15, 1))
+    w[4] = 1000.0
+    tested = by_t(Observations("stations", w, lambda index: f"station {index[0]}"), 1e6, 8)
+    made = verdict(findings(w, observations=[tested], global_test=None, degrees_of_freedom=8))
+    assert made.headline.startswith(
+        "Not tested as a whole (no a-priori unit weight), but look at: 1) station 4"
+    )
+    assert made.warning
+
+
+def test_no_probability_is_lost():
+    w = good()
+    w[0, 0] = 400.0
+    made = verdict(findings(w, 2000.0))
+    assert made.tests[1].p == 0.0
+    assert made.tests[1].log10_p == pytest.approx(-(400**2) / 2 / math.log(10), rel=1e-3)
+    assert math.isfinite(made.tests[0].log10_p)
+    title, lines = verdict_section(made)
+    assert title == "Verdict"
+    assert any("1e-34746" in line and "rejected" in line for line in lines)
+
+
+def test_the_worst_of_several_results():
+    verdicts = {
+        code: verdict(CASES[name][0]) for name, code in (("accepted", 0), ("blunder", 4), ("undetermined", 3))
+    }
+    assert worst(verdicts.values()) == 3
+    assert worst([verdicts[0], verdicts[4]]) == 4
+    assert worst([]) == 0
+    assert worst([verdict(CASES["look"][0])], strict=True) == 4
+
+
+def test_global_test_against_another_adjustment():
+    test = global_test(30.0, 10, reference_dof=20)
+    # F of 10 and 20 degrees of freedom: 2.774 and 1 / 3.419 in the tables at 2.5 percent.
+    assert test.limits == pytest.approx((1 / 3.4185, 2.7737), rel=1e-4)
+    assert test.rejected_high
+    assert test.probability_above + test.probability_below == pytest.approx(1.0)
+    low, high = test.interval
+    assert low**2 * test.limits[1] == pytest.approx(3.0)
+    assert high**2 * test.limits[0] == pytest.approx(3.0)
+    distribution = verdict(findings(good(), global_test=test)).tests[0]
+    assert (distribution.distribution, distribution.dof) == ("F", (10.0, 20.0))
+
+
+@pytest.fixture(scope="module")
+def simulated():
+    return simulate(strips=2, photos_per_strip=4, seed=5).block
+
+
+def test_a_good_block(simulated):
+    result = adjust(simulated)
+    assert result.verdict.code == "accepted"
+    assert {test.name.partition(":")[0] for test in result.verdict.tests} >= {
+        "global", "image coordinates", "components of control",
+        "pattern over the frame of the camera", "normality of image residuals",
+    }  # fmt: skip
+    document = json.loads(result.to_json())["verdict"]
+    assert document["code"] == "accepted"
+    assert set(document) == {
+        "code",
+        "headline",
+        "exit",
+        "warning",
+        "lines",
+        "tests",
+        "removed",
+        "rivals",
+        "hints",
+    }
+    assert document["tests"][0]["name"] == "global"
+    assert all(
+        {"p", "level", "tests", "limits", "accepted", "dof"} <= set(test) for test in document["tests"]
+    )
+    assert result.report().index("Verdict") < result.report().index("Problems")
+    assert pickle.loads(pickle.dumps(result.verdict)) == result.verdict
+
+
+def test_a_block_with_a_blunder_and_one_with_bad_weights(simulated):
+    xy = simulated.image_xy.copy()
+    image = int(np.argmax(adjust(simulated).redundancy[:, 0]))
+    xy[image, 0] += 0.2
+    wrong = adjust(simulated.replace(image_xy=xy)).verdict
+    assert wrong.code == "gross-errors"
+    photo = simulated.photo_ids[simulated.image_photos[image]]
+    point = simulated.point_ids[simulated.image_points[image]]
+    assert wrong.headline.startswith(f"Gross errors likely: 1) x of point {point} on photo {photo} (w = ")
+    optimistic = adjust(simulated.replace(image_sd=simulated.image_sd / 2)).verdict
+    assert (optimistic.code, optimistic.exit, optimistic.warning) == ("weights", 0, True)
+    assert " 1.9" in optimistic.headline or " 2.0" in optimistic.headline
+    assert adjust(simulated.replace(image_sd=simulated.image_sd / 8)).verdict.exit == 4
+
+
+def test_a_lens_that_is_not_modelled(simulated):
+    """Waves of 20 micrometres over the frame, twice the standard deviation: no camera follows them."""
+    xy = simulated.image_xy
+    made = adjust(simulated.replace(image_xy=xy + 0.020 * np.sin(xy[:, ::-1] / 30))).verdict
+    assert made.code == "model", made.headline
+    assert made.exit == 4
+    assert "the lens model of the camera is incomplete" in made.headline
+    assert " um near x " in made.headline
+
+
+def test_a_robust_loss_has_no_global_test(simulated):
+    made = adjust(simulated, loss="huber").verdict
+    assert made.headline.startswith("Not tested as a whole (a robust loss changes the weights)")
+
+
+def photo(noise):
+    ground = np.array(
+        [[0.0, 0, 10], [800, 50, 20], [750, 900, 0], [30, 820, 40], [400, 420, 5], [200, 700, 30]]
+    )
+
+    pose = np.array([390.0, 430.0, 1500.0]), np.array([0.02, -0.03, 1.5])
+    xy = project(ground, *(np.tile(each, (6, 1)) for each in pose), np.full(6, -152.0))
+    return ground, xy + noise
+
+
+def test_a_resection():
+    rng = np.random.default_rng(8)
+    ground, xy = photo(0.005 * rng.normal(size=(6, 2)))
+    result = resect(ground, xy, -152.0, image_sd=0.005, object_sd=0.05)
+    assert result.verdict.code == "accepted"
+    assert [test.name.partition(":")[0] for test in result.verdict.tests] == [
+        "global", "image coordinates", "components of control",
+    ]  # fmt: skip
+    xy[4, 1] += 0.5
+    wrong = resect(ground, xy, -152.0, image_sd=0.005, object_sd=0.05, point_ids=list("ABCDEF")).verdict
+    assert wrong.code == "gross-errors"
+    assert "of point E" in wrong.headline
+    assert resect(ground[:3], xy[:3], -152.0).verdict.code == "uncontrolled"
