@@ -6,7 +6,7 @@ import pytest
 import photogram
 from photogram import Camera, adjust
 
-WORDS = "principal distance and flying height of all photos"
+WORDS = "(principal distance and "
 
 
 def block(relief, seed, start=-152.7, free=("c",)):
@@ -56,4 +56,5 @@ def test_a_block_with_some_relief_converges_from_anywhere_in_few_steps(seed):
 
 def test_what_is_weak_is_named_where_the_iterations_run_out():
     result = adjust(block(1.0, 1, free=("c", "xp", "yp")), max_iterations=12)
-    assert result.converged or any("hardly determine" in str(each) for each in result.messages)
+    said = " ".join(str(each) for each in result.messages)
+    assert result.converged or "hardly determine" in said or "undetermined" in said

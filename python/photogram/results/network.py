@@ -197,7 +197,10 @@ class AdjustedNetwork(Shown, ABC):
     @property
     def used_images(self) -> NDArray[np.bool_]:
         """(m,) whether an image took part."""
-        return np.asarray(self.used_points[self.image_points])
+        taken: NDArray[np.bool_] = (np.asarray(self.used_points[self.image_points])) & np.isfinite(
+            self.residuals
+        ).all(axis=1)
+        return taken
 
     @property
     def converged(self) -> bool:
