@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.formats.colmap.binary import read_binary, write_binary
+from photogram.formats.colmap.binary import read_binary, binary_files
 from photogram.formats.colmap.content import Camera, Images, Model, Points
 from photogram.io.delimited import read_columns
 from photogram.io.places import Place
@@ -55,7 +55,7 @@ def main(records: int) -> None:
         (place / "images.csv").write_text("\n".join(["photo,point,column,row", *lines, ""]))
         timed(f"CSV, {records} records", lambda: table(place / "images.csv"))
         _parquet(place / "images.parquet", photos, points, xy)
-        for name, content in write_binary(_model(photos, points, xy)).items():
+        for name, content in binary_files(_model(photos, points, xy)).items():
             (place / name).write_bytes(content)
         timed("COLMAP, binary", lambda: read_binary(place))
 

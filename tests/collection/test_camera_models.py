@@ -109,7 +109,7 @@ def random_cameras(rng):
         for parameter, power in parameters:
             if parameter in ("alpha", "beta", "omega"):
                 values.append(rng.uniform(0.6, 0.9))
-            elif parameter in ("c", "f", "fx", "fy", "w", "h", "b"):
+            elif parameter in ("c", "f", "fx", "fy", "w", "h", "b", "hx", "hy"):
                 values.append(rng.uniform(900.0, 1400.0))
             elif power == 1:
                 values.append(rng.uniform(-5.0, 5.0))

@@ -36,7 +36,8 @@ def test_damaged_inputs_end_in_good_order(tmp_path):
     assert ended.returncode == 0, ended.stdout + ended.stderr
     outcomes = [json.loads(line)[0] for line in (tmp_path / "0.log").read_text().splitlines()]
     assert len(outcomes) == INPUTS
-    assert sum(outcome.get("reached", False) for outcome in outcomes) > INPUTS / 2
+    # Half of a million do, give or take 2 % of so many.
+    assert sum(outcome.get("reached", False) for outcome in outcomes) > 0.48 * INPUTS
     assert {outcome["format"] for outcome in outcomes} == set(SOUND)
     assert {outcome["ending"] for outcome in outcomes} == set(ENDINGS) - {"failed"}
 

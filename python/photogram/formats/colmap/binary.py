@@ -24,7 +24,7 @@ from photogram.formats.colmap.content import (
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
 
-__all__ = ["read_binary", "write_binary"]
+__all__ = ["read_binary", "binary_files"]
 
 _Made = TypeVar("_Made")
 _SENSORS = {0: CAMERA, 1: IMU}
@@ -233,7 +233,7 @@ def _frame(reader: _Reader) -> Frame:
     return Frame(number, rig, pose, tuple(data), place)
 
 
-def write_binary(model: Model) -> dict[str, bytes]:
+def binary_files(model: Model) -> dict[str, bytes]:
     """Return the files of a model."""
     names = {name: number for number, (name, _) in enumerate(MODELS)}
     cameras = [

@@ -25,7 +25,7 @@ from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 
-__all__ = ["read_text", "write_text"]
+__all__ = ["read_text", "text_files"]
 
 _EMPTY = 2**64 - 1
 _HEADS = {
@@ -226,7 +226,7 @@ def _frame(words: _Words) -> Frame:
     return Frame(number, rig, pose, tuple(data), words.place)
 
 
-def write_text(model: Model) -> dict[str, bytes]:
+def text_files(model: Model) -> dict[str, bytes]:
     """Return the files of a model; names have underscores for blanks, at which COLMAP ends them."""
     images, points = model.images, model.points
     ends = np.cumsum(images.counts)

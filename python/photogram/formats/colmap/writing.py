@@ -11,7 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.colmap.binary import write_binary
+from photogram.formats.colmap.binary import binary_files
 from photogram.formats.colmap.content import (
     CAMERA,
     MODELS,
@@ -24,7 +24,7 @@ from photogram.formats.colmap.content import (
     Pose,
     Rig,
 )
-from photogram.formats.colmap.text import write_text
+from photogram.formats.colmap.text import text_files
 from photogram.formats.images import sizes_of, to_corner
 from photogram.formats.intersection import complete_positions
 from photogram.formats.lenses import lens_of
@@ -80,13 +80,13 @@ def write(project: Project) -> Mapping[str, bytes]:
         Cameras of other models than those of COLMAP, pictures of unknown size, geographic coordinates.
     """
     made = _made(project)
-    return {**write_binary(made.model), **names_file(made.points)}
+    return {**binary_files(made.model), **names_file(made.points)}
 
 
 def write_as_text(project: Project) -> Mapping[str, bytes]:
     """Return the text files of a project; see :func:`write`."""
     made = _made(project)
-    return {**write_text(made.model), **names_file(made.points)}
+    return {**text_files(made.model), **names_file(made.points)}
 
 
 @dataclass(frozen=True)

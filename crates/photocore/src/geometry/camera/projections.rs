@@ -113,7 +113,7 @@ impl RayProjection for Equisolid {
     fn ray([a, b]: [f64; 2], _: [f64; 2]) -> Option<[f64; 3]> {
         let quarter = 0.25 * (a * a + b * b);
         let cosine = (1.0 - quarter).sqrt();
-        (quarter <= 1.0).then(|| [cosine * a, cosine * b, 1.0 - 2.0 * quarter])
+        (quarter <= 1.0).then_some([cosine * a, cosine * b, 1.0 - 2.0 * quarter])
     }
 
     /// All angles up to pi are seen.
