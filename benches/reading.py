@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.formats.colmap.binary import read_binary, binary_files
+from photogram.formats.colmap.binary import binary_files, read_binary
 from photogram.formats.colmap.content import Camera, Images, Model, Points
 from photogram.io.delimited import read_columns
 from photogram.io.places import Place

@@ -27,7 +27,7 @@ PACKAGES = (
 )
 MADE_BY_THE_LIBRARY = {
     "photogram": "Cleaned FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection"
-    " Result Simulation VarianceComponents VarianceFunction",
+    " Result Simulation Snooped VarianceComponents VarianceFunction",
     "photogram.absolute_orientation": "Orientation",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
@@ -142,6 +142,7 @@ def good(tmp_path_factory):
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},
             "adjust": {"block": block},
             "check": {"network": block},
+            "snoop": {"block": block},
             "first_values": {"block": block},
             "camera_from": {"path": star_camera, "name": "stars", "weighted": True},
             "clean": {"network": block},
@@ -278,7 +279,9 @@ def good(tmp_path_factory):
                 "degrees_of_freedom": 3,
             },
             "Problem": {name: getattr(problem, name) for name in stellar.Problem.__dataclass_fields__},
+            "Effects": {"refraction": False},
             "Site": {"latitude": 0.5},
+            "SkyCamera": {"values": np.r_[9000.0, 9000.0, np.zeros(7)], "covariance": np.zeros((9, 9))},
             "calibrate": {"problem": problem},
             "default_parameters": {"principal_distance": 0.3},
             "refraction": {"zenith_distances": [0.5]},

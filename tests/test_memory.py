@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import resource
-import sys
 from pathlib import Path
 
 import pytest
@@ -127,8 +126,7 @@ def test_a_block_that_does_not_fit_is_refused(monkeypatch):
 
 def test_a_collection_that_does_not_fit_is_refused(monkeypatch):
     collection = simulate_collection(photos=4, points=20).collection
-    # The function has the name of its module.
-    monkeypatch.setattr(sys.modules["photogram.collection.adjust"], "available_memory", lambda: 1 << 20)
+    monkeypatch.setattr("photogram.collection.core.available_memory", lambda: 1 << 20)
     with pytest.raises(OutOfMemoryError, match=r"of memory, and 1\.0 MiB are free"):
         adjust_collection(collection)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from functools import singledispatch
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -34,10 +34,9 @@ from photogram.statistics.distributions import LEVEL
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
 from photogram.statistics.snooping.suspects import LostSupportError, Out
 
-__all__ = ["block_trial", "settings_of", "snoop"]
+__all__ = ["block_trial", "of_network", "settings_of", "snoop"]
 
 
-@singledispatch
 def snoop(
     block: Any,
     *,
@@ -80,7 +79,7 @@ def snoop(
     max_rounds
         Rounds at the most.
     unit_variance, threads
-        See :func:`photogram.adjust`.
+        See :func:`photogram.adjust`; the unit variance of collections is `constrained`.
     progress
         Told of the adjustments before and after.
 
@@ -97,7 +96,24 @@ def snoop(
     KeyboardInterrupt
         Ctrl-C.
     """
-    raise InputError(f"snoop takes a Block or a Collection, not {type(block).__name__}")
+    return of_network(
+        block,
+        level=level,
+        fdr=fdr,
+        unit_weight=unit_weight,
+        robust=robust,
+        parts=parts,
+        max_rounds=max_rounds,
+        unit_variance=unit_variance,
+        threads=threads,
+        progress=progress,
+    )
+
+
+@singledispatch
+def of_network(network: object, **options: Any) -> Snooped:
+    """Take gross errors out of a network of any class; see :func:`snoop`."""
+    raise InputError(f"snoop takes a Block or a Collection, not {type(network).__name__}")
 
 
 def settings_of(
@@ -129,7 +145,7 @@ def settings_of(
     )
 
 
-@snoop.register
+@of_network.register
 def _snoop_block(
     block: Block,
     *,
@@ -147,6 +163,7 @@ def _snoop_block(
     check_cameras(block)
     settings = settings_of(level, fdr, unit_weight, robust, max_rounds)
     truth_value("parts", parts)
+    one_of("unit_variance", unit_variance, get_args(UnitVariance))
 
     def adjusted(given: Block, **options: Any) -> Result:
         return adjust(given, unit_variance=unit_variance, threads=threads, progress=progress, **options)

@@ -116,10 +116,10 @@ def collection(
     if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
         raise typer.BadParameter("names a directory; adjusted.txt goes there", param_hint="--out")
     with job:
-        import photogram
         from photogram.collection import AdjustedCollection, adjust, to_bytes
         from photogram.collection.formats import recognised
         from photogram.collection.report import summary
+        from photogram.collection.snooping import snoop_collection
 
         if problem is None:
             problem = job.packaged(*EXAMPLE)
@@ -143,7 +143,7 @@ def collection(
                 "progress": shown(status, "cost", 0.5) if status is not None else None,
             }
             if snoop:
-                log = photogram.snoop(photos, level=level, fdr=fdr, unit_weight=unit_weight.value, **options)
+                log = snoop_collection(photos, level=level, fdr=fdr, unit_weight=unit_weight.value, **options)
                 if not isinstance(log.result, AdjustedCollection):
                     raise TypeError("a collection gives the result of a collection")
                 result = log.result

@@ -10,7 +10,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, core_threads
-from photogram.adjustment.snooping import settings_of, snoop
+from photogram.adjustment.snooping import of_network, settings_of
+from photogram.arguments.arrays import one_of, truth_value
 from photogram.arguments.types import Indices
 from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
@@ -33,16 +34,17 @@ from photogram.statistics.distributions import LEVEL
 from photogram.statistics.snooping.snooping import snooped
 from photogram.statistics.snooping.suspects import LostSupportError, Out, Suspects
 
-__all__ = ["collection_trial"]
+__all__ = ["collection_trial", "snoop_collection"]
 
 ROUGH, EXACT = 1e-7, 1e-12
 """A step that lowers the sum of squares by less than this share ends a round; where R of all rows is used."""
 
 
-@snoop.register
-def _snoop_collection(
+@of_network.register
+def snoop_collection(
     collection: Collection,
     *,
+    unit_variance: str = "constrained",
     level: float = LEVEL,
     fdr: float | None = None,
     unit_weight: str = "known",
@@ -53,6 +55,9 @@ def _snoop_collection(
     progress: Callable[[Progress], None] | None = None,
     **options: Any,
 ) -> Snooped:
+    """Take gross errors out of a collection: `photogram.snoop` with the options of its adjustment."""
+    one_of("unit_variance", unit_variance, ("constrained",))
+    truth_value("parts", parts)
     settings = settings_of(level, fdr, unit_weight, robust, max_rounds)
     first = adjust(collection, covariance=False, threads=threads, progress=progress, **options)
     trial = collection_trial(first, threads, parts=parts)

@@ -213,4 +213,4 @@ def _decimals(patterns: Sequence[Pattern]) -> int:
 
 
 def _fixed(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}" if math.isfinite(value) else "-"
+    return f"{value:z.{decimals}f}" if math.isfinite(value) else "-"

@@ -326,7 +326,8 @@ def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int])
 def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
     """Return the estimated terms of a lens as they are kept or left out together.
 
-    Radial terms one by one, the highest power first; all others by their letter (P1 and P2, B1 and B2).
+    Terms of the radial series one by one, the highest power first; all others by their letter (P1 and P2,
+    B1 and B2).
     """
     radial, others = [], dict[str, list[str]]()
     for k in camera.estimated:

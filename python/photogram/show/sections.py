@@ -45,7 +45,7 @@ def _test_lines(test: Test) -> list[str]:
         limits = f"to {high:.4g}"
     else:
         limits = f"{low:.4g} to {high:.4g}"
-    p = f"{test.p:.2g}" if test.p > 1e-99 else f"1e{test.log10_p:.0f}"
+    p = f"{test.p:.2g}" if test.p > 1e-99 else "< 1e-99"
     figures = (
         f"{f'{test.statistic} = {test.value:.4g}':>14}{limits:>20}{p:>10}{test.level:>10.2g}{test.tests:>8}"
         f"{'' if test.accepted else '  rejected'}"

@@ -137,13 +137,17 @@ impl<'a, M: Model> Run<'a, '_, M> {
             if damping == 0.0 {
                 control.in_valley = change <= VALLEY;
             }
+            // Full steps that have led here say that the linearized equations are worth following.
+            let led = self.iterations.iter().any(|iteration| iteration.damping == 0.0);
             if damping == 0.0
+                && led
                 && control.in_valley
                 && control.along < MOST_ALONG
                 && let Some((values, sum)) = self.along_valley(&unknowns, &step, change, control.best)?
             {
                 control.best = sum;
                 control.along += 1;
+                self.weak = moved.unwrap_or_default();
                 self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &values)?;
                 return self.form(values, 0.0).map(ControlFlow::Continue);
             }
