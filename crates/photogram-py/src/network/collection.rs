@@ -8,7 +8,7 @@ use photocore::network::{Camera, Network, NetworkError as Failure, Options, Phot
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::block_network::{BlockCovariances, factored};
+use super::covariances::{BlockCovariances, factored};
 use super::solution::CollectionSolution;
 use super::state::BlockState;
 use super::trial::NetworkTrial;

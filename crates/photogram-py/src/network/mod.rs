@@ -3,6 +3,7 @@
 mod block;
 mod block_network;
 mod collection;
+mod covariances;
 mod first_values;
 mod solution;
 mod state;

@@ -6,7 +6,7 @@ use photocore::network::{Moved, NetworkError as Failure, Out, Standing, Subject,
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::block_network::{BlockCovariances, OfRow, of_rows};
+use super::covariances::{BlockCovariances, OfRow, of_rows};
 use crate::arrays::table;
 use crate::options::named_loss;
 use crate::solution::status_name;
