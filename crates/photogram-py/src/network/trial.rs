@@ -60,6 +60,9 @@ fn subject(subject: Subject) -> (u8, i64) {
     (kind, index as i64)
 }
 
+/// The unknown that is moved most: its kind, index and component, by how much, and that in its standard deviation.
+type MovedRow = (&'static str, usize, usize, f64, f64);
+
 #[pymethods]
 impl NetworkTrial {
     #[getter]
@@ -190,11 +193,7 @@ impl NetworkTrial {
         PyArray1::from_vec(py, columns).reshape([count, rows])
     }
 
-    fn most_moved(
-        &self,
-        py: Python<'_>,
-        suspects: Vec<usize>,
-    ) -> PyResult<Vec<(&'static str, usize, usize, f64, f64)>> {
+    fn most_moved(&self, py: Python<'_>, suspects: Vec<usize>) -> PyResult<Vec<MovedRow>> {
         let found = watched(py, self.workers(), None, |pool, _| self.trial.most_moved(&suspects, pool))?;
         let row = |moved: Moved| {
             let (kind, index) = match moved.of {
