@@ -143,21 +143,14 @@ impl<M> Problem<M> {
     pub fn is_weighted(&self, unknown: usize) -> bool {
         self.sd[unknown] > 0.0 && self.sd[unknown].is_finite()
     }
-
-    /// Square of (observed - computed) / standard deviation of an unknown; zero unless it is weighted.
-    fn prior_square(&self, unknown: usize, value: f64) -> f64 {
-        if self.is_weighted(unknown) {
-            ((self.prior[unknown] - value) / self.sd[unknown]).powi(2)
-        } else {
-            0.0
-        }
-    }
 }
 
 impl<M: Model> Problem<M> {
     /// Weighted sum of squares of observed minus computed unknowns, of some of them.
     pub fn prior_sum_of_squares(&self, values: &[f64], of: Range<usize>) -> f64 {
-        let plain = |range: Range<usize>| range.map(|i| self.prior_square(i, values[i])).sum::<f64>();
+        let square = |i: usize| ((self.prior[i] - values[i]) / self.sd[i]).powi(2);
+        // Free unknowns are many: they are passed over, not added as zeros.
+        let plain = |range: Range<usize>| range.filter(|&i| self.is_weighted(i)).map(square).sum::<f64>();
         let (mut sum, mut from) = (0.0, of.start);
         for own in self.weighted(values).iter().filter(|own| of.contains(&own.first)) {
             sum += plain(from..own.first) + own.constant.iter().map(|value| value * value).sum::<f64>();
