@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.fuzz.dense_network import compare, equations
-from tests.fuzz.equations import Dense
-from tests.fuzz.lenses import BACKWARD, FORWARD
-from tests.fuzz.networks import DATUMS, KINDS, MODELS, random_network
 
+from fuzz.dense_network import compare, equations
+from fuzz.equations import Dense
+from fuzz.lenses import BACKWARD, FORWARD
+from fuzz.networks import DATUMS, KINDS, MODELS, random_network
 from photogram import adjust
 
 SEED = 5
