@@ -6,7 +6,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from photogram.cli.console import print_remark, print_sections
@@ -177,6 +176,8 @@ def adjust(
 
 def _started(project: Project) -> tuple[Block, list[str]]:
     """Return the block with poses for all its photos, and what is to be said about them."""
+    import numpy as np
+
     from photogram import first_values
 
     block = project.block

@@ -7,12 +7,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from photogram.cli.job import Job, Reads
 
 if TYPE_CHECKING:
+    from photogram.arguments.types import Indices
     from photogram.formats import Project
     from photogram.show.sections import Section
 
@@ -168,6 +168,8 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
 
 def described(project: Project) -> list[Section]:
     """Return what was read, as titled sections."""
+    import numpy as np
+
     from photogram.formats.plain.writing import known_cameras
     from photogram.formats.self_check import agreement, doubts
 
@@ -226,7 +228,9 @@ def described(project: Project) -> list[Section]:
 _MANY = 10
 
 
-def _ray_counts(rays: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[tuple[int, int]]:
+def _ray_counts(rays: Indices) -> list[tuple[int, int]]:
     """Return how many points have one, two, ... rays."""
+    import numpy as np
+
     counts = np.bincount(np.minimum(rays[rays > 0], _MANY), minlength=_MANY + 1)
     return [(k, int(count)) for k, count in enumerate(counts.tolist()) if count]
