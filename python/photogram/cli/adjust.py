@@ -23,19 +23,11 @@ from photogram.cli.options import (
 from photogram.cli.progress import shown
 from photogram.cli.projects import (
     EXAMPLE,
+    NOTHING,
     Additions,
-    Angles,
-    CamerasFile,
-    ControlCrs,
-    ControlFile,
-    Deviations,
-    FormatName,
-    ImagesFile,
-    Model,
-    NamesFile,
-    PixelOrigin,
     described,
     read_project,
+    with_additions,
 )
 
 if TYPE_CHECKING:
@@ -63,6 +55,7 @@ class LossName(StrEnum):
 
 
 @with_job
+@with_additions()
 def adjust(
     job: Job,
     path: Annotated[
@@ -70,7 +63,7 @@ def adjust(
         Reads.FILE,
         typer.Argument(
             metavar="PATH",
-            help="A project: a folder or file of any format that `photogram convert --help` lists.",
+            help="A project: a folder or file of any format that docs/formats.md lists.",
             show_default=False,
         ),
     ] = None,
@@ -86,16 +79,7 @@ def adjust(
         ),
     ] = None,
     json: JsonFile = None,
-    file_format: FormatName = None,
-    control: ControlFile = None,
-    control_crs: ControlCrs = None,
-    images: ImagesFile = None,
-    names: NamesFile = None,
-    camera: CamerasFile = None,
-    sd: Deviations = None,
-    pixel_origin: PixelOrigin = None,
-    model: Model = None,
-    angles: Angles = None,
+    added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
         typer.Option(
@@ -139,9 +123,6 @@ def adjust(
         from photogram import Result
         from photogram.formats.additions import self_calibrated
 
-        added = Additions(
-            file_format, control, control_crs, images, names, camera, sd, pixel_origin, model, angles
-        )
         project = read_project(job, path, added)
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)

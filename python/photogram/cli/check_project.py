@@ -11,40 +11,18 @@ from rich.markup import escape
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
 from photogram.cli.job import Job, Reads, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
-from photogram.cli.projects import (
-    Additions,
-    Angles,
-    CamerasFile,
-    ControlCrs,
-    ControlFile,
-    Deviations,
-    FormatName,
-    ImagesFile,
-    Model,
-    NamesFile,
-    PixelOrigin,
-    described,
-    read_project,
-)
+from photogram.cli.projects import NOTHING, Additions, described, read_project, with_additions
 
 __all__ = ["check_project"]
 
 
 @with_job
+@with_additions()
 def check_project(
     job: Job,
     path: Annotated[Path, Reads.FILE, typer.Argument(metavar="PATH", help="A project: a folder or file.")],
     json: JsonFile = None,
-    file_format: FormatName = None,
-    control: ControlFile = None,
-    control_crs: ControlCrs = None,
-    images: ImagesFile = None,
-    names: NamesFile = None,
-    camera: CamerasFile = None,
-    sd: Deviations = None,
-    pixel_origin: PixelOrigin = None,
-    model: Model = None,
-    angles: Angles = None,
+    added: Additions = NOTHING,
     threads: Threads = None,
     quiet: Quiet = False,
 ) -> None:
@@ -55,13 +33,7 @@ def check_project(
     with job:
         from photogram import check
 
-        project = read_project(
-            job,
-            path,
-            Additions(
-                file_format, control, control_crs, images, names, camera, sd, pixel_origin, model, angles
-            ),
-        )
+        project = read_project(job, path, added)
         if not quiet:
             print_sections(described(project), "`photogram info`")
         with job.status("checking"):

@@ -10,26 +10,13 @@ import typer
 from photogram.cli.console import print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import Quiet
-from photogram.cli.projects import (
-    Additions,
-    Angles,
-    CamerasFile,
-    ControlCrs,
-    ControlFile,
-    Deviations,
-    FormatName,
-    ImagesFile,
-    Model,
-    NamesFile,
-    PixelOrigin,
-    described,
-    read_project,
-)
+from photogram.cli.projects import NOTHING, Additions, described, read_project, with_additions
 
 __all__ = ["convert"]
 
 
 @with_job
+@with_additions()
 def convert(
     job: Job,
     path: Annotated[Path, Reads.FILE, typer.Argument(metavar="IN", help="A project: a folder or file.")],
@@ -45,29 +32,14 @@ def convert(
             help="The format to write, by its name: docs/formats.md lists them.",
         ),
     ] = "plain",
-    file_format: FormatName = None,
-    control: ControlFile = None,
-    control_crs: ControlCrs = None,
-    images: ImagesFile = None,
-    names: NamesFile = None,
-    camera: CamerasFile = None,
-    sd: Deviations = None,
-    pixel_origin: PixelOrigin = None,
-    model: Model = None,
-    angles: Angles = None,
+    added: Additions = NOTHING,
     quiet: Quiet = False,
 ) -> None:
     """Write a project in another format, and say what that has no place for."""
     with job:
         from photogram.formats import cannot_hold, to_files
 
-        project = read_project(
-            job,
-            path,
-            Additions(
-                file_format, control, control_crs, images, names, camera, sd, pixel_origin, model, angles
-            ),
-        )
+        project = read_project(job, path, added)
         lost = cannot_hold(project, to)
         files = {out / name: content for name, content in to_files(project, to).items()}
         sections = [*described(project), ("Lost, as the format has no place for it", lost or ["nothing"])]

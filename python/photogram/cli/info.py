@@ -10,47 +10,25 @@ import typer
 from photogram.cli.console import print_sections
 from photogram.cli.job import Job, Reads, with_job
 from photogram.cli.options import JsonFile, Quiet
-from photogram.cli.projects import (
-    Additions,
-    Angles,
-    CamerasFile,
-    ControlCrs,
-    ControlFile,
-    Deviations,
-    FormatName,
-    Model,
-    PixelOrigin,
-    described,
-    read_project,
-)
+from photogram.cli.projects import NOTHING, Additions, described, read_project, with_additions
 
 __all__ = ["info"]
 
 
 @with_job
+@with_additions("images", "names")
 def info(
     job: Job,
     path: Annotated[Path, Reads.FILE, typer.Argument(metavar="PATH", help="A project: a folder or file.")],
     json: JsonFile = None,
-    file_format: FormatName = None,
-    control: ControlFile = None,
-    control_crs: ControlCrs = None,
-    camera: CamerasFile = None,
-    sd: Deviations = None,
-    pixel_origin: PixelOrigin = None,
-    model: Model = None,
-    angles: Angles = None,
+    added: Additions = NOTHING,
     quiet: Quiet = False,
 ) -> None:
     """Say what lies at a path without adjusting it: sizes, cameras, rays, units, frame, what lacks."""
     with job:
         from photogram.io.json import to_json
 
-        project = read_project(
-            job,
-            path,
-            Additions(file_format, control, control_crs, None, None, camera, sd, pixel_origin, model, angles),
-        )
+        project = read_project(job, path, added)
         sections = described(project)
         job.finish(
             {} if json is None else {json: to_json(dict(sections))},

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import wraps
+from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,24 +19,7 @@ if TYPE_CHECKING:
     from photogram.formats import Project
     from photogram.show.sections import Section
 
-__all__ = [
-    "EXAMPLE",
-    "Additions",
-    "AngleName",
-    "Angles",
-    "CamerasFile",
-    "ControlCrs",
-    "ControlFile",
-    "Deviations",
-    "FormatName",
-    "ImagesFile",
-    "Model",
-    "NamesFile",
-    "OriginName",
-    "PixelOrigin",
-    "described",
-    "read_project",
-]
+__all__ = ["EXAMPLE", "NOTHING", "Additions", "described", "read_project", "with_additions"]
 
 EXAMPLE = ("project",)
 """The packaged example, a directory of photogram.examples."""
@@ -125,18 +111,44 @@ Angles = Annotated[
 
 @dataclass(frozen=True)
 class Additions:
-    """What a user adds to a project."""
+    """What a user adds to a project, with the options that say it; see :func:`with_additions`."""
 
-    file_format: str | None = None
-    control: Path | None = None
-    control_crs: str | None = None
-    images: Path | None = None
-    names: Path | None = None
-    camera: Path | None = None
-    sd: list[str] | None = None
-    pixel_origin: OriginName | None = None
-    model: int | None = None
-    angles: AngleName | None = None
+    file_format: FormatName = None
+    control: ControlFile = None
+    control_crs: ControlCrs = None
+    images: ImagesFile = None
+    names: NamesFile = None
+    camera: CamerasFile = None
+    sd: Deviations = None
+    pixel_origin: PixelOrigin = None
+    model: Model = None
+    angles: Angles = None
+
+
+NOTHING = Additions()
+
+
+def with_additions(*omitted: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the options of :class:`Additions`, but for some, in place of its parameter `added`."""
+    options = [
+        each for each in signature(Additions, eval_str=True).parameters.values() if each.name not in omitted
+    ]
+
+    def decorated(command: Callable[..., None]) -> Callable[..., None]:
+        own = signature(command, eval_str=True)
+        parameters = [
+            each for one in own.parameters.values() for each in (options if one.name == "added" else [one])
+        ]
+
+        @wraps(command)
+        def with_them(**values: Any) -> None:
+            added = {each.name: values.pop(each.name) for each in options if each.name in values}
+            command(added=Additions(**added), **values)
+
+        with_them.__dict__["__signature__"] = own.replace(parameters=parameters)
+        return with_them
+
+    return decorated
 
 
 def read_project(job: Job, path: Path, added: Additions) -> Project:
