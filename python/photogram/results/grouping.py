@@ -254,13 +254,17 @@ def _numbered(of: Observables, labels: _Labelled) -> Grouping:
     """Give the groups numbers: those of images first."""
     numbers: dict[str, int] = {"": -1}
 
+    def enter(found: list[str]) -> None:
+        for label in dict.fromkeys(found):
+            numbers.setdefault(label, len(numbers) - 1)
+
     def number(part: _Labels, used: Bools | None = None) -> Indices:
-        flat = part.ravel() if used is None else np.where(used, part, "").ravel()
-        found = [numbers.setdefault(label, len(numbers) - 1) for label in flat.tolist()]
-        return np.array(found, dtype=np.int64).reshape(part.shape)
+        flat = (part.ravel() if used is None else np.where(used, part, "").ravel()).tolist()
+        enter(flat)
+        return np.fromiter(map(numbers.__getitem__, flat), np.int64, len(flat)).reshape(part.shape)
 
     # In the order of the photos, whatever that of the images is.
-    number(labels.images[np.argsort(of.image_photos, kind="stable")])
+    enter(labels.images[np.argsort(of.image_photos, kind="stable")].ravel().tolist())
     images = number(labels.images)
     of_images = len(numbers) - 1
     points, photos = number(labels.points, of.point_observed), number(labels.photos, of.photo_observed)

@@ -105,16 +105,17 @@ def weakest_photos(result: Result, count: int = WORST) -> list[WeakestPhoto]:
     """
     cofactors = result.photo_cofactors[:, :6, :6]
     images = np.bincount(result.block.image_photos[result.used_images], minlength=len(result.block.photo_ids))
-    found = []
-    for row, matrix in enumerate(cofactors):
-        free = np.diag(matrix) > 0
-        if not images[row] or not np.isfinite(matrix).all() or not free.any():
-            continue
-        own = matrix[np.ix_(free, free)]
-        sd = np.sqrt(np.diag(own))
-        condition = float(_condition((own / np.outer(sd, sd))[np.newaxis])[0])
-        found.append(WeakestPhoto(result.block.photo_ids[row], condition, int(images[row])))
-    return sorted(found, key=lambda photo: -photo.condition)[:count]
+    variances = np.diagonal(cofactors, axis1=1, axis2=2)
+    known = (images > 0) & np.isfinite(cofactors).all(axis=(1, 2)) & (variances > 0).any(axis=1)
+    rows, sd = np.flatnonzero(known), np.sqrt(np.where(variances > 0, variances, 1.0))[known]
+    scaled = cofactors[known] / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :])
+    # The eigenvalue 1 of a fixed unknown lies between the others, whose mean is 1.
+    scaled[:, range(6), range(6)] = 1.0
+    condition = _condition(scaled)
+    return [
+        WeakestPhoto(result.block.photo_ids[rows[each]], float(condition[each]), int(images[rows[each]]))
+        for each in np.argsort(-condition, kind="stable")[:count].tolist()
+    ]
 
 
 def weakest_lines(result: Result) -> list[str]:
