@@ -163,6 +163,14 @@ class NetworkTrial:
             found.append(self._without_out(*own) if own[0] else self._alone(group))
         return found
 
+    def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
+        """Return, for points that are out, all groups there with residuals and R as if they took part.
+
+        Empty for points that observations beside images touch, and for those whose rays do not determine
+        them.
+        """
+        return self.core.on_points(list(points), gone=True)
+
     def _without_out(
         self, groups: list[int], residuals: Floats, response: Floats
     ) -> tuple[list[int], Floats, Floats]:
@@ -191,14 +199,21 @@ class NetworkTrial:
         response[:, out] = 0.0
         return np.where(out, 0.0, residuals), response
 
-    def resist(self, scale: float) -> Floats:
-        """Adjust by Huber's loss, then by Cauchy's from there: (G,) lengths of residuals of unit weight."""
-        self._asked(self.core.resist, "huber", HUBER * scale, iterations=ROBUST_ITERATIONS, progress=None)
-        weights = self._asked(
-            self.core.resist, "cauchy", CAUCHY * scale, iterations=ROBUST_ITERATIONS, progress=None
-        )
-        # Its weight is 1 / (1 + (size / scale)^2).
-        return np.asarray(CAUCHY * scale * np.sqrt(np.maximum(1.0 / np.maximum(weights, 1e-12) - 1.0, 0.0)))
+    def resist(self, scale: float) -> Floats | None:
+        """Adjust by Huber's loss, then by Cauchy's from there: (G,) lengths of residuals of unit weight.
+
+        None where either diverges; the next trial then begins where the last good one has ended.
+        """
+        weights: Floats | None = None
+        for loss, limit in (("huber", HUBER), ("cauchy", CAUCHY)):
+            weights = self._asked(
+                self.core.resist, loss, limit * scale, iterations=ROBUST_ITERATIONS, progress=None
+            )
+            if weights is None:
+                return None
+        # The weight of Cauchy's loss is 1 / (1 + (size / scale)^2).
+        least = np.maximum(np.asarray(weights), 1e-12)
+        return np.asarray(CAUCHY * scale * np.sqrt(np.maximum(1.0 / least - 1.0, 0.0)))
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
         """Return points left with too few rays, and photos left without support, when a group is out."""

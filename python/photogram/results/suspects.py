@@ -38,8 +38,9 @@ def block_suspects(block: Block, core: _photocore.NetworkTrial, *, parts: bool =
     return _Named(block, core, parts).suspects()
 
 
-ROUGH = 1.0
-"""Standard deviations: a step that moves no unknown by more is the last of a round."""
+ROUGH = 2.0
+"""Standard deviations: a step after which the next would move no unknown by more is the last of a round. The
+rounds that follow start there, and the last takes nothing out: what it decides on is as good as exact."""
 EXACT = 1e-7
 """The same where R of all rows is used: a small network."""
 

@@ -231,10 +231,18 @@ class Trial(Protocol):
         """Return residuals of unit weight (M,) and R (M, M) of all rows; zero for those that are out."""
         ...
 
-    def resist(self, scale: float) -> Floats:
+    def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
+        """Return, for points that are out, all groups there with residuals and R as if they took part.
+
+        Each point by itself, against what the others determine; empty where that is not known.
+        """
+        ...
+
+    def resist(self, scale: float) -> Floats | None:
         """Adjust robustly, errors beyond some `scale` standard deviations losing weight.
 
-        Returns (G,) the lengths of the residuals of unit weight; zero for what no loss is applied to.
+        Returns (G,) the lengths of the residuals of unit weight, zero for what no loss is applied to; None
+        where that leads nowhere, and nothing has changed.
         """
         ...
 
