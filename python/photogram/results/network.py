@@ -5,22 +5,25 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Self
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram import _photocore
 from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.results.iteration import Iteration
+from photogram.results.reliability import Reliability
+from photogram.results.reliability_summary import ReliabilitySummary, reliability_summary
 from photogram.show.ways import Shown
 from photogram.statistics.reliability import standardized
+from photogram.statistics.snooping.suspects import LostSupportError
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from photogram import _photocore
 
 __all__ = ["AdjustedNetwork", "Observed"]
 
@@ -121,6 +124,9 @@ class AdjustedNetwork(Shown, ABC):
     formations: int
     seconds: Mapping[str, float]
 
+    KNOWN: ClassVar[bool] = True
+    """Whether standard deviations are given, so that the unit weight is known."""
+
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
@@ -134,6 +140,33 @@ class AdjustedNetwork(Shown, ABC):
         found["iterations"] = [Iteration(*row) for row in solution.iterations]
         same = {each.name: getattr(solution, each.name) for each in fields(cls) if each.name not in found}
         return cls(**found, **same)
+
+    @property
+    def geographic(self) -> bool:
+        """Whether plan coordinates are angles."""
+        return False
+
+    @abstractmethod
+    def reliability(
+        self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
+    ) -> Reliability:
+        """Return which gross errors of every observation are found, and what others do."""
+
+    @cached_property
+    def reliability_summary(self) -> ReliabilitySummary | None:
+        """What the report says of reliability, with the tests of all groups of observations.
+
+        None where there are no redundancy numbers, or the adjustment has not converged or has a loss.
+        """
+        computed = bool(np.isfinite(self.redundancy[self.used_images]).all())
+        if not (computed and self.converged and self.loss is None and self.degrees_of_freedom > 0):
+            return None
+        try:
+            found = self.reliability(unit_weight="known" if self.KNOWN else "unknown")
+        except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
+            # Everything else stands; a network that rounding makes singular here has said so before.
+            return None
+        return reliability_summary(found, heights=self.geographic)
 
     @property
     @abstractmethod

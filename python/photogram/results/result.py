@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -29,7 +28,7 @@ from photogram.results.datum import (
 )
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.reliability import Reliability
+from photogram.results.reliability import Reliability, reliability_of
 from photogram.results.selection import Adjusted, Selection, photo_components, point_components
 from photogram.results.suspects import network_trial
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
@@ -221,11 +220,9 @@ class Result(AdjustedNetwork):
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
-        one_of("unit_weight", unit_weight, ("known", "unknown"))
         core = block_network(self.block, self.options).trial(self.state, threads=0)
         trial = network_trial(self.block, core)
-        known = unit_weight == "known"
-        return Reliability(trial, self.covariances, level=level, power=power, known=known)
+        return reliability_of(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
 
     def in_datum(self, datum: InnerConstraints) -> Self:
         """Return the result in another datum, without adjusting again (S-transformation, docs/datum.md).
@@ -287,6 +284,11 @@ class Result(AdjustedNetwork):
         table = super()._table(what)
         table.attrs["datum"] = str(self.datum)
         return table
+
+    @property
+    def geographic(self) -> bool:
+        """Whether plan coordinates are angles."""
+        return self.block.geographic
 
     @property
     def image_points(self) -> Indices:

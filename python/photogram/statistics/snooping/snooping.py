@@ -209,9 +209,7 @@ class _Snooping:
 
     def _testable(self) -> Bools:
         """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
-        redundancy = np.nan_to_num(self.tests.redundancy)
-        largest = np.maximum.reduceat(redundancy, self.suspects.row_starts[:-1])
-        return np.asarray(self.tests.active & (self.tests.rank > 0) & (largest > TESTABLE))
+        return self.tests.testable(self.suspects.row_starts)
 
     def _scales(self) -> tuple[dict[str, float], Floats]:
         """Return robust factors k by kind where standard deviations are too optimistic, and k^2 by group."""

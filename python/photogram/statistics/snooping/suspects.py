@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["LostSupportError", "Out", "Prediction", "Standing", "Suspects", "Tests", "Trial"]
 
@@ -162,6 +163,11 @@ class Tests:
     redundancy: Floats
     error: Floats
     error_sd: Floats
+
+    def testable(self, row_starts: Indices) -> Bools:
+        """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
+        largest = np.maximum.reduceat(np.nan_to_num(self.redundancy), row_starts[:-1])
+        return np.asarray(self.active & (self.rank > 0) & (largest > TESTABLE))
 
 
 @dataclass(frozen=True)
