@@ -29,6 +29,7 @@ FORMATS: dict[str, Format] = {
         "pixels",
         "patb",
         "bingo",
+        "dbat",
         "giant",
     )
 }

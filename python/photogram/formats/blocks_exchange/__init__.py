@@ -13,7 +13,7 @@ __all__ = ["FORMAT"]
 
 
 def _recognises(path: Path) -> bool:
-    return path.is_file() and root_of(path) == "BlocksExchange"
+    return path.is_file() and root_of(path)[0] == "BlocksExchange"
 
 
 FORMAT = Format(
