@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from photogram.formats.agisoft.reading import TITLE, read
+from photogram.formats.agisoft.writing import cannot_hold, write
 from photogram.formats.format import Format
 from photogram.formats.xml_stream import root_of
 
@@ -22,4 +23,6 @@ FORMAT = Format(
     title=TITLE,
     recognises=_recognises,
     read=read,
+    write=write,
+    cannot_hold=cannot_hold,
 )
