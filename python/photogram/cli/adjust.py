@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import print_remark, print_sections
-from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.options import (
     JsonFile,
     Ordering,
@@ -22,10 +22,12 @@ from photogram.cli.options import (
 )
 from photogram.cli.progress import shown
 from photogram.cli.projects import (
-    EXAMPLE,
     NOTHING,
     Additions,
+    Example,
+    ProjectPath,
     described,
+    project_path,
     read_project,
     with_additions,
 )
@@ -58,18 +60,8 @@ class LossName(StrEnum):
 @with_additions()
 def adjust(
     job: Job,
-    path: Annotated[
-        Path | None,
-        Reads.FILE,
-        typer.Argument(
-            metavar="PATH",
-            help="A project: a folder or file of any format that docs/formats.md lists.",
-            show_default=False,
-        ),
-    ] = None,
-    example: Annotated[
-        bool, typer.Option("--example", help="Adjust the packaged example instead, that of `photogram new`.")
-    ] = False,
+    path: ProjectPath = None,
+    example: Example = False,
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
@@ -115,9 +107,7 @@ def adjust(
     observations with their standard deviations, redundancy numbers and test values, and the adjusted project
     go to --out.
     """
-    if example:
-        path = job.packaged(*EXAMPLE)
-    assert path is not None
+    path = project_path(job, path)
     target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
     with job:
         from photogram import Result

@@ -2,7 +2,7 @@
 
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Frame, Options, Project
-from photogram.formats.registry import FORMATS, cannot_hold, read, recognised, to_files
+from photogram.formats.registry import FORMATS, cannot_hold, read, recognised, target, to_files
 
 __all__ = [
     "FORMATS",
@@ -14,5 +14,6 @@ __all__ = [
     "cannot_hold",
     "read",
     "recognised",
+    "target",
     "to_files",
 ]

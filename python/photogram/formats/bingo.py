@@ -170,5 +170,6 @@ FORMAT = Format(
     recognises=lambda path: (path / IMAGES).is_file() if path.is_dir() else path.name.lower() == IMAGES,
     read=read,
     write=write,
+    files=(IMAGES,),
     cannot_hold=cannot_hold,
 )

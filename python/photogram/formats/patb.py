@@ -206,5 +206,11 @@ def _oriented(project: Project, reduced: ReducedImages, numbers: Mapping[str, in
 
 
 FORMAT = Format(
-    name="patb", title=TITLE, recognises=_recognises, read=read, write=write, cannot_hold=cannot_hold
+    name="patb",
+    title=TITLE,
+    recognises=_recognises,
+    read=read,
+    write=write,
+    files=(f"block{IMAGES}", f"*{IMAGES}"),
+    cannot_hold=cannot_hold,
 )

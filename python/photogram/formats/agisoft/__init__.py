@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from photogram.formats.agisoft.reading import TITLE, read
-from photogram.formats.agisoft.writing import cannot_hold, write
+from photogram.formats.agisoft.writing import FILE, cannot_hold, write
 from photogram.formats.format import Format
 from photogram.formats.xml_stream import root_of
 
@@ -24,5 +24,6 @@ FORMAT = Format(
     recognises=_recognises,
     read=read,
     write=write,
+    files=(FILE, "*.xml"),
     cannot_hold=cannot_hold,
 )
