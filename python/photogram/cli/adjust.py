@@ -14,9 +14,11 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     Quiet,
     Strict,
     Threads,
+    as_data,
     default_out,
     out_option,
 )
@@ -79,6 +81,7 @@ def adjust(
         ),
     ] = None,
     json: JsonFile = None,
+    parquet: ParquetFolder = None,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -150,6 +153,7 @@ def adjust(
         job.finish(
             {target / name: content for name, content in files.items()},
             {} if json is None else {json: result.to_json()},
+            as_data(result, parquet),
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )

@@ -16,6 +16,7 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -23,6 +24,7 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     default_out,
     out_option,
 )
@@ -68,6 +70,7 @@ def giant(
         ),
     ] = None,
     json: JsonFile = None,
+    parquet: ParquetFolder = None,
     listing: Annotated[
         Path | None,
         Writes.FILE,
@@ -186,6 +189,7 @@ def giant(
         job.finish(
             written,
             documents,
+            as_data(result, parquet),
             summary=lambda: print_sections(
                 [
                     *(log.sections() if log else []),

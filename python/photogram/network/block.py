@@ -98,8 +98,7 @@ class Block:
     mounts
         Which photos are on a frame with others, and in which pose (:mod:`photogram.network.rigs`).
     frame
-        Where on the earth the coordinates are, for who takes results to maps and other systems: the adjustment
-        does not ask.
+        Where on the earth the coordinates are, for maps and other systems; the adjustment does not ask.
 
     Raises
     ------
@@ -134,7 +133,7 @@ class Block:
     cameras: Sequence[Camera] = ()
     photo_cameras: Indices | None = None
     mounts: Sequence[Mount] = ()
-    frame: Frame = Frame()
+    frame: Frame = field(default_factory=Frame)
 
     def __post_init__(self) -> None:
         for name in ("photo_ids", "point_ids"):
