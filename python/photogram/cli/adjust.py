@@ -82,6 +82,15 @@ def adjust(
     ] = None,
     json: JsonFile = None,
     parquet: ParquetFolder = None,
+    crs: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CRS",
+            help="Write photos, points and control in this coordinate reference system, too, with"
+            " covariances in metres east, north, up: to `in_crs/` of --out (EPSG:25832, ENU:lat,lon,h ...).",
+            show_default=False,
+        ),
+    ] = None,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -132,6 +141,10 @@ def adjust(
         sections = described(project)
         if not quiet:
             print_sections(sections, "`photogram info`")
+        if crs is not None:
+            from photogram.formats.placing import check_place
+
+            check_place(project.block, crs)
         block, remarks = _started(project)
         for remark in remarks:
             if not quiet:
@@ -146,6 +159,11 @@ def adjust(
         else:
             result = _adjusted(job, project, block, datum, loss, ordering, threads)
         files = _files(project, result, sections)
+        if crs is not None:
+            from photogram.formats.placing import placed, placed_files
+
+            found = placed_files(placed(result, crs))
+            files |= {f"in_crs/{name}": content for name, content in found.items()}
         if removed is not None:
             files["removed.csv"] = removed.table().to_csv(index=False).encode()
             files["report.txt"] += removed.report().encode()
