@@ -197,8 +197,9 @@ def shift_tables(place, shift):
 
 def test_control_of_a_map_without_a_name_is_told_too(run, tmp_path):
     place = shutil.copytree(EXAMPLE, tmp_path / "quarry")
-    (place / "gnss.csv").unlink()
     shutil.copytree(place, tmp_path / "moved")
+    for name in ("gnss", "distances"):  # so that the model is free, and is carried onto control
+        (place / f"{name}.csv").unlink()
     shift_tables(tmp_path / "moved", [465000.0, 5247000.0, 0.0])
     shutil.move(tmp_path / "moved" / "control.csv", tmp_path / "control.csv")
     (place / "control.csv").unlink()
