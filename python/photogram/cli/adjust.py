@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +11,7 @@ import typer
 
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.maps import CloudFile, Crs, MapFile, check_maps, drawn_maps
 from photogram.cli.options import (
     JsonFile,
     Ordering,
@@ -82,15 +84,9 @@ def adjust(
     ] = None,
     json: JsonFile = None,
     parquet: ParquetFolder = None,
-    crs: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CRS",
-            help="Write photos, points and control in this coordinate reference system, too, with"
-            " covariances in metres east, north, up: to `in_crs/` of --out (EPSG:25832, ENU:lat,lon,h ...).",
-            show_default=False,
-        ),
-    ] = None,
+    crs: Crs = None,
+    map: MapFile = None,  # noqa: A002  # as the option is called
+    ply: CloudFile = None,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -135,6 +131,7 @@ def adjust(
         from photogram import Result
         from photogram.formats.additions import self_calibrated
 
+        check_maps(map)
         project = read_project(job, path, added)
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
@@ -172,6 +169,7 @@ def adjust(
             {target / name: content for name, content in files.items()},
             {} if json is None else {json: result.to_json()},
             as_data(result, parquet),
+            drawn_maps(result, map, ply, crs, _sizes(project), quiet=quiet),
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )
@@ -261,6 +259,11 @@ def _files(project: Project, result: Result, sections: list[tuple[str, list[str]
         if beside is not None:
             files |= {f"adjusted-{own}/{name}": content for name, content in beside(after, result).items()}
     return files
+
+
+def _sizes(project: Project) -> Sequence[tuple[float, float] | None]:
+    """Return the sizes of pictures where images are in pixels, as they are."""
+    return project.sizes if project.block.image_unit == "px" else ()
 
 
 def _same_format(project: Project, name: str) -> dict[str, bytes]:

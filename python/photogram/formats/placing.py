@@ -15,7 +15,7 @@ from photogram.io.csv_text import csv_text
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.frame import Frame
-from photogram.network.geometry import lengths_of_units
+from photogram.network.geometry import Spheroid, lengths_of_units
 from photogram.results.ellipses import metric_covariances
 from photogram.results.result import Result
 
@@ -23,6 +23,8 @@ __all__ = ["Placed", "check_place", "frame_of", "placed", "placed_files"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
+DEGREE = 180.0 / np.pi
+"""Of a radian."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,18 @@ class Placed:
         if self.attitudes.step_covariances is None:
             return self.attitudes.values(kind), np.full((len(self.photos), 3), np.nan)
         return self.attitudes.values(kind), self.attitudes.standard_deviations(kind)
+
+    def carried(self, xyz: Floats) -> Floats:
+        """Return (n, 3) other positions of the block in the system."""
+        return _carried(self.result.block, self.crs, frame_of(self.result.block), xyz)[0]
+
+    def moved(self, places: Floats, steps: Floats) -> Floats:
+        """Return (n, 3) places of the system moved by (n, 3) steps to the east, north and up, metres."""
+        if self.names[0] != "longitude":
+            return places + steps
+        known = np.column_stack([np.radians(places[:, :2]), places[:, 2]])
+        lengths = lengths_of_units(known, self.result.block.spheroid or Spheroid.wgs84())
+        return places + steps / lengths * [DEGREE, DEGREE, 1.0]
 
     def residuals(self) -> tuple[Indices, Floats]:
         """Return rows among all points, and (c, 3) residuals of control, observed minus adjusted: metres.
@@ -142,13 +156,8 @@ def placed(result: Result, crs: str = "") -> Placed:
     covariances = metric_covariances(result, photos=True), metric_covariances(result)[rows]
     places = result.photo_positions, result.point_positions[rows]
     frame = check_place(block, crs)
-    if not crs:
-        found = [(xyz, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))) for xyz in places]
-        names, units = ("x", "y", "z"), (block.linear_unit,) * 3
-    else:
-        found = [to_system(crs, xyz, frame) for xyz in places]
-        names, units = axes_of(crs)
-    (photos, photo_turns), (points, point_turns) = found
+    (photos, photo_turns), (points, point_turns) = (_carried(block, crs, frame, xyz) for xyz in places)
+    names, units = axes_of(crs) if crs else _own_axes(block)
     turned = [
         turns @ own @ turns.transpose(0, 2, 1)
         for turns, own in zip((photo_turns, point_turns), covariances, strict=True)
@@ -204,6 +213,20 @@ def placed_files(found: Placed) -> dict[str, bytes]:
         f"datum: {found.result.datum}",
     ]
     return {name: csv_text(columns, comments) for name, columns in tables.items()}
+
+
+def _carried(block: Block, crs: str, frame: Frame, xyz: Floats) -> tuple[Floats, Floats]:
+    """Return positions of a block in a system, and what turns vectors; without one they stay as they are."""
+    if crs:
+        return to_system(crs, xyz, frame)
+    degrees = np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if block.geographic else xyz
+    return degrees, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
+
+
+def _own_axes(block: Block) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
+    if block.geographic:
+        return ("longitude", "latitude", "height"), ("deg", "deg", block.linear_unit)
+    return ("x", "y", "z"), (block.linear_unit,) * 3
 
 
 def _positions(names: Sequence[str], xyz: Floats, covariances: Floats) -> dict[str, Any]:
