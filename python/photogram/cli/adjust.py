@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,14 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import print_remark, print_sections
-from photogram.cli.job import Job, Writes, with_job
+from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.maps import CloudFile, Crs, MapFile, check_maps, drawn_maps
 from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     Quiet,
     Strict,
     Threads,
+    as_data,
     default_out,
     out_option,
 )
@@ -71,6 +75,10 @@ def adjust(
         ),
     ] = None,
     json: JsonFile = None,
+    parquet: ParquetFolder = None,
+    crs: Crs = None,
+    map: MapFile = None,  # noqa: A002  # as the option is called
+    ply: CloudFile = None,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -113,12 +121,17 @@ def adjust(
         from photogram import Result
         from photogram.formats.additions import self_calibrated
 
+        check_maps(map)
         project = read_project(job, path, added)
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
         sections = described(project)
         if not quiet:
             print_sections(sections, "`photogram info`")
+        if crs is not None:
+            from photogram.formats.placing import check_place
+
+            check_place(project.block, crs)
         block, remarks = _started(project)
         for remark in remarks:
             if not quiet:
@@ -133,6 +146,11 @@ def adjust(
         else:
             result = _adjusted(job, project, block, datum, loss, ordering, threads)
         files = _files(project, result, sections)
+        if crs is not None:
+            from photogram.formats.placing import placed, placed_files
+
+            found = placed_files(placed(result, crs))
+            files |= {f"in_crs/{name}": content for name, content in found.items()}
         if removed is not None:
             files["removed.csv"] = removed.table().to_csv(index=False).encode()
             files["report.txt"] += removed.report().encode()
@@ -140,6 +158,8 @@ def adjust(
         job.finish(
             {target / name: content for name, content in files.items()},
             {} if json is None else {json: result.to_json()},
+            as_data(result, parquet),
+            drawn_maps(result, map, ply, crs, _sizes(project), quiet=quiet),
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )
@@ -229,6 +249,11 @@ def _files(project: Project, result: Result, sections: list[tuple[str, list[str]
         if beside is not None:
             files |= {f"adjusted-{own}/{name}": content for name, content in beside(after, result).items()}
     return files
+
+
+def _sizes(project: Project) -> Sequence[tuple[float, float] | None]:
+    """Return the sizes of pictures where images are in pixels, as they are."""
+    return project.sizes if project.block.image_unit == "px" else ()
 
 
 def _same_format(project: Project, name: str) -> dict[str, bytes]:

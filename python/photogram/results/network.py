@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -12,9 +14,10 @@ from numpy.typing import NDArray
 
 from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats, Indices
+from photogram.io.writing import write_whole
 from photogram.messages import Message
 from photogram.results.iteration import Iteration
-from photogram.show.ways import Shown
+from photogram.show.ways import Shown, files_of
 from photogram.statistics.reliability import standardized
 
 if TYPE_CHECKING:
@@ -231,6 +234,21 @@ class AdjustedNetwork(Shown, ABC):
     def point_sd(self) -> Floats:
         """(n, 3) standard deviations."""
         return standard_deviations(self.point_covariances)
+
+    def to_parquet(self, directory: str | PathLike[str]) -> None:
+        """Write the result as data: tables in Parquet, from which `photogram.read_result` makes it again.
+
+        `docs/results.md` lists files and columns. Either all files are there in the end or none has changed.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            pyarrow is not installed.
+        OSError
+            A file cannot be written.
+        """
+        folder = Path(directory)
+        write_whole({folder / name: content for name, content in files_of(self).items()})
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""
