@@ -14,12 +14,16 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Strict,
     Threads,
     default_out,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.projects import (
     EXAMPLE,
@@ -79,6 +83,8 @@ def adjust(
         ),
     ] = None,
     json: JsonFile = None,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -123,6 +129,7 @@ def adjust(
         from photogram import Result
         from photogram.formats.additions import self_calibrated
 
+        pictures = Pictures(job, plots, plot_format, target)
         project = read_project(job, path, added)
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
@@ -148,7 +155,7 @@ def adjust(
             files["report.txt"] += removed.report().encode()
         taken = [] if removed is None else removed.sections()
         job.finish(
-            {target / name: content for name, content in files.items()},
+            {**{target / name: content for name, content in files.items()}, **pictures.of(result)},
             {} if json is None else {json: result.to_json()},
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
