@@ -15,6 +15,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_cameras, photo_indices
+from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation, observation_rows
 from photogram.network.refraction import Refraction, metres_per_unit
@@ -96,6 +97,9 @@ class Block:
         One for all photos; None where there is one camera, or one for each photo.
     mounts
         Which photos are on a frame with others, and in which pose (:mod:`photogram.network.rigs`).
+    frame
+        Where on the earth the coordinates are, for who takes results to maps and other systems: the adjustment
+        does not ask.
 
     Raises
     ------
@@ -130,6 +134,7 @@ class Block:
     cameras: Sequence[Camera] = ()
     photo_cameras: Indices | None = None
     mounts: Sequence[Mount] = ()
+    frame: Frame = Frame()
 
     def __post_init__(self) -> None:
         for name in ("photo_ids", "point_ids"):
@@ -240,6 +245,8 @@ class Block:
         self._set("photo_to_ground", truth_value("photo_to_ground", self.photo_to_ground))
         if self.spheroid is not None and not isinstance(self.spheroid, Spheroid):
             raise InputError(f"spheroid is a Spheroid or None, not {shown(self.spheroid)}")
+        if not isinstance(self.frame, Frame):
+            raise InputError(f"frame is a Frame, not {shown(self.frame)}")
         if self.refraction is not None:
             if not isinstance(self.refraction, Refraction):
                 raise InputError(f"refraction is a Refraction or None, not {shown(self.refraction)}")
@@ -428,6 +435,12 @@ class Block:
         if unknown := changes.keys() - values.keys():
             raise InputError(f"a block has no {', '.join(sorted(unknown))}")
         return type(self)(**{**values, **changes})
+
+    def in_frame(self, frame: Frame) -> Self:
+        """Return the block with another frame; the coordinates are the same."""
+        own = copy.copy(self)
+        own._set("frame", frame)
+        return own
 
     def kept(self) -> Self:
         """Return the block as a result keeps it: with lists of names of its own, the arrays shared."""
