@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.variance_function import variance_function
     from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
+    from photogram.formats.results import read_result
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
     from photogram.network.block import Block
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from photogram.network.simulation import Simulation, simulate
     from photogram.planning import Plan, plan
     from photogram.results.components import VarianceComponents
+    from photogram.results.differences import Differences, differences
     from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
     from photogram.results.model_tests import compare, score_test, terms_test
@@ -47,6 +49,7 @@ __all__ = [
     "Block",
     "Camera",
     "Cleaned",
+    "Differences",
     "FirstValues",
     "GroupSums",
     "InnerConstraints",
@@ -75,6 +78,7 @@ __all__ = [
     "check",
     "clean",
     "compare",
+    "differences",
     "eliminate_terms",
     "first_values",
     "group_sums",
@@ -82,6 +86,7 @@ __all__ = [
     "orient",
     "plan",
     "predict",
+    "read_result",
     "resect",
     "score_test",
     "simulate",
@@ -99,6 +104,7 @@ _HOMES = {
     "Camera": "network.cameras",
     "VarianceComponents": "results.components",
     "VarianceFunction": "results.variance_function",
+    "Differences": "results.differences",
     "FirstValues": "adjustment.first_values",
     "GroupSums": "results.group_sums",
     "InnerConstraints": "network.datum",
@@ -126,6 +132,7 @@ _HOMES = {
     "Cleaned": "adjustment.cleaning",
     "clean": "adjustment.cleaning",
     "compare": "results.model_tests",
+    "differences": "results.differences",
     "eliminate_terms": "adjustment.elimination",
     "score_test": "results.model_tests",
     "terms_test": "results.model_tests",
@@ -135,6 +142,7 @@ _HOMES = {
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",
+    "read_result": "formats.results",
     "resect": "adjustment.resection",
     "simulate": "network.simulation",
     "snoop": "adjustment.snooping",

@@ -14,12 +14,14 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     PictureFormat,
     PlotFormat,
     Plots,
     Quiet,
     Strict,
     Threads,
+    as_data,
     default_out,
     out_option,
 )
@@ -85,6 +87,7 @@ def adjust(
     json: JsonFile = None,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
+    parquet: ParquetFolder = None,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -157,6 +160,7 @@ def adjust(
         job.finish(
             {**{target / name: content for name, content in files.items()}, **pictures.of(result)},
             {} if json is None else {json: result.to_json()},
+            as_data(result, parquet),
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )

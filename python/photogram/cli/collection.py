@@ -15,6 +15,7 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     PictureFormat,
     PlotFormat,
     Plots,
@@ -25,6 +26,7 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     out_option,
 )
 from photogram.cli.pictures import Pictures
@@ -82,6 +84,7 @@ def collection(
     json: JsonFile = None,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
+    parquet: ParquetFolder = None,
     loss: Annotated[
         Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")
     ] = Loss.SQUARES,
@@ -176,6 +179,7 @@ def collection(
         whole = (section for section in sections if section[1])
         job.finish(
             written,
+            as_data(result, parquet),
             summary=lambda: print_sections(whole, "the report"),
             code=(estimates or told).verdict.exit_code(strict=strict),
         )

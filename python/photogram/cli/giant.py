@@ -16,6 +16,7 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     PictureFormat,
     PlotFormat,
     Plots,
@@ -26,6 +27,7 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     default_out,
     out_option,
 )
@@ -74,6 +76,7 @@ def giant(
     json: JsonFile = None,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
+    parquet: ParquetFolder = None,
     listing: Annotated[
         Path | None,
         Writes.FILE,
@@ -194,6 +197,7 @@ def giant(
         job.finish(
             written,
             documents,
+            as_data(result, parquet),
             summary=lambda: print_sections(
                 [
                     *(log.sections() if log else []),

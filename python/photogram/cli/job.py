@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from rich.status import Status
 
-    from photogram.io.writing import OutputSet
+    from photogram.io.writing import Content, OutputSet
 
 __all__ = ["Former", "Job", "Reads", "Writes", "roles", "with_job"]
 
@@ -131,7 +131,7 @@ class Job:
         self._outputs += [path for path in files if path not in self._outputs]
         self._check()
 
-    def write(self, *results: Mapping[Path, bytes]) -> None:
+    def write(self, *results: Mapping[Path, Content]) -> None:
         """Write results: all of them or none, none over an input, and no two to one place.
 
         Those whose names a user chose are given apart from those that have names of their own.
@@ -143,7 +143,7 @@ class Job:
                     outputs.write(path, content)
 
     def finish(
-        self, *results: Mapping[Path, bytes], summary: Callable[[], None] | None = None, code: int = 0
+        self, *results: Mapping[Path, Content], summary: Callable[[], None] | None = None, code: int = 0
     ) -> None:
         """Write the results, as :meth:`write` does, then show what they are, and end.
 

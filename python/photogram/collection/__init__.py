@@ -8,6 +8,7 @@ from photogram.collection import (  # noqa: F401  (the ways to show a result, an
     findings,
     pictured,
     report,
+    saved,
     snooping,
     tables,
 )

@@ -126,10 +126,17 @@ class Collection(Valued, Brief):
     def _model(self) -> tuple[str, list[tuple[str, int]], int, str, str]:
         return dict(_photocore.camera_models())[self.camera]
 
+    @staticmethod
+    def parameters_of(camera: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Return names and units of the k parameters of a photo with a camera of this model."""
+        powers = dict(_photocore.camera_models())[camera][1]
+        units = ("rad",) * 3 + ("",) * 3 + tuple("px" if power == 1 else "" for _, power in powers)
+        return (*POSE, *(name for name, _ in powers)), units
+
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the k parameters of a photo."""
-        return (*POSE, *(name for name, _ in self._model[1]))
+        return self.parameters_of(self.camera)[0]
 
     @property
     def _constant(self) -> NDArray[np.bool_]:
@@ -139,8 +146,7 @@ class Collection(Valued, Brief):
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the k parameters: `rad`, `px`; none for numbers and for lengths in the object space."""
-        powers = (power for _, power in self._model[1])
-        return ("rad",) * 3 + ("",) * 3 + tuple("px" if power == 1 else "" for power in powers)
+        return self.parameters_of(self.camera)[1]
 
     @property
     def formula(self) -> str:

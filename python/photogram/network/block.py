@@ -109,8 +109,7 @@ class Block(Valued, Brief):
     mounts
         Which photos are on a frame with others, and in which pose (:mod:`photogram.network.rigs`).
     frame
-        Where on the earth the coordinates are, for who takes results to maps and other systems: the adjustment
-        does not ask.
+        Where on the earth the coordinates are, for maps and other systems; the adjustment does not ask.
 
     Raises
     ------
@@ -145,7 +144,7 @@ class Block(Valued, Brief):
     cameras: Sequence[Camera] = ()
     photo_cameras: Indices | None = None
     mounts: Sequence[Mount] = ()
-    frame: Frame = Frame()
+    frame: Frame = field(default_factory=Frame)
 
     if TYPE_CHECKING:
         # What checkers of types are told: more can be given than what the fields then hold.

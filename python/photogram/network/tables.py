@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import names, shaped, shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.messages import listed
 from photogram.network.cameras import Camera, photo_indices
 from photogram.network.geometry import Spheroid
 
@@ -49,9 +50,9 @@ def table_arguments(
 ) -> dict[str, Any]:
     """Return arguments of a block from tables; :meth:`photogram.Block.from_tables` says what these have."""
     axes = RECTANGULAR_COLUMNS if spheroid is None else GEOGRAPHIC_COLUMNS
-    photo_ids = _ids(photos, "photos", "photo", axes[0])
+    photo_ids = _photo_ids(photos)
     image_point_names = _name_column(images, "images", "point")
-    control_ids = _ids(points, "points", "point", axes[0]) if points is not None else []
+    control_ids = _name_column(points, "points", "point") if points is not None else []
     control_ids = different("points", control_ids)
     point_ids = list(dict.fromkeys([*control_ids, *image_point_names]))
 
@@ -128,11 +129,11 @@ def _rows(table: Table, table_name: str) -> int:
     return len(column)
 
 
-def _ids(table: Table, table_name: str, name: str, other: str) -> list[str]:
-    """Return a column of names; without it numbers from 0, where another column says how many."""
-    if not _has(table, table_name, name) and _has(table, table_name, other):
-        return numbered(_rows(table, table_name))
-    return _name_column(table, table_name, name)
+def _photo_ids(photos: Table) -> list[str]:
+    """Return the column of names; without it numbers from 0."""
+    if _has(photos, "photos", "photo"):
+        return _name_column(photos, "photos", "photo")
+    return numbered(_rows(photos, "photos"))
 
 
 def _name_column(table: Table, table_name: str, name: str) -> list[str]:
@@ -184,6 +185,7 @@ def _lookup(kind: str, ids: Sequence[str], images: Sequence[str]) -> Indices:
     try:
         return np.array([index[name] for name in images], dtype=np.int64)
     except KeyError as error:
+        numbers = f": they are {listed(list(ids), 3)}" if ids and ids[0] == "0" else ""
         raise InputError(
-            f"images names the {kind} {error.args[0]!r}, which the {kind}s do not list"
+            f"images names the {kind} {error.args[0]!r}, which the {kind}s do not list{numbers}"
         ) from None

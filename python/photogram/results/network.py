@@ -6,6 +6,8 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -14,10 +16,11 @@ from numpy.typing import NDArray
 from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.io.writing import write_whole
 from photogram.messages import Message
 from photogram.results.iteration import Iteration
 from photogram.show.brief import Brief, Rows
-from photogram.show.ways import Shown
+from photogram.show.ways import Shown, files_of
 from photogram.statistics.reliability import standardized
 
 if TYPE_CHECKING:
@@ -149,10 +152,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
             ("status", f"{self.status}, {len(self.iterations)} iterations"),
             ("photos", f"{len(self.photo_cofactors):,}"),
             ("points", f"{int(self.used_points.sum()):,} of {len(self.point_rays):,} took part"),
-            (
-                "images",
-                f"{int(used.sum()):,} of {len(used):,} took part, rms {rms[0]:.3g}, {rms[1]:.3g} {self._image_unit}",
-            ),
+            ("images", f"{int(used.sum()):,} of {len(used):,} took part"),
+            ("residuals", f"rms {rms[0]:.3g}, {rms[1]:.3g} {self._image_unit}"),
             ("freedom", f"{self.degrees_of_freedom:,.6g}"),
             ("sigma0", "a priori: there are no degrees of freedom" if s0 is None else f"{math.sqrt(s0):.4g}"),
         ]
@@ -288,6 +289,21 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         from photogram.plots import Plots
 
         return Plots(self)
+
+    def to_parquet(self, directory: str | PathLike[str]) -> None:
+        """Write the result as data: tables in Parquet, from which `photogram.read_result` makes it again.
+
+        `docs/results.md` lists files and columns. Either all files are there in the end or none has changed.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            pyarrow is not installed.
+        OSError
+            A file cannot be written.
+        """
+        folder = Path(directory)
+        write_whole({folder / name: content for name, content in files_of(self).items()})
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""

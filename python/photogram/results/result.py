@@ -235,6 +235,21 @@ class Result(AdjustedNetwork):
         known = unit_weight == "known"
         return Reliability(trial, self.covariances, level=level, power=power, known=known)
 
+    def restarted(self) -> Block:
+        """Return the block as it was given, but with free photos and cameras where the adjustment has ended.
+
+        What was observed or held is as it was given.
+        `photogram.adjust(result.restarted())` goes on from there: with other options, or with other weights,
+        after :meth:`photogram.Block.replace`.
+        """
+        block = self.block
+        free = {name: np.isinf(getattr(block, f"photo_{name}_sd")) for name in ("position", "attitude")}
+        return block.replace(
+            cameras=[each.restarted() for each in self.cameras] or block.cameras,
+            photo_positions=np.where(free["position"], self.photo_positions, block.photo_positions),
+            photo_attitudes=np.where(free["attitude"], self.photo_attitudes, block.photo_attitudes),
+        )
+
     def in_datum(self, datum: InnerConstraints) -> Self:
         """Return the result in another datum, without adjusting again (S-transformation, docs/datum.md).
 
