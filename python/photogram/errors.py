@@ -20,7 +20,8 @@ class PhotogramError(Exception):
 
 def _again(kind: type[PhotogramError], arguments: tuple[Any, ...], held: dict[str, Any]) -> PhotogramError:
     """Make an exception anew of what it holds."""
-    error = kind.__new__(kind, *arguments)
+    # Of a MemoryError that is an error of ours first, too, the base makes the object.
+    error = BaseException.__new__(kind, *arguments)
     error.__dict__.update(held)
     return error
 
