@@ -94,7 +94,7 @@ def view_of_plan(axes: Axes, plan: Plan) -> tuple[int, int, int]:
 
 
 def _frame(axes: Axes, plan: Plan, seen: tuple[int, int, int], limits: Floats) -> None:
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", anchor="NW")
     axes.set_xlim(*limits[:, 0])
     axes.set_ylim(*limits[:, 1])
     unit = f", {plan.unit}" if plan.unit else ""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.show.style import ink, styled
+from photogram.show.style import faint, ink, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,6 +70,9 @@ def panels(
             found = np.atleast_1d(np.asarray(ax, dtype=object)).ravel().tolist()
         if len(found) < rows * columns:
             raise InputError(f"the picture has {rows * columns} panels, but ax is {len(found)} axes")
+        for axes in found[: rows * columns]:
+            # Ticks are made when they are drawn, outside of this context.
+            axes.tick_params(color=faint, labelsize=8.0, labelcolor=ink)
         yield found[: rows * columns]
 
 

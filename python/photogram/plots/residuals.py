@@ -89,7 +89,7 @@ def frame(axes: Axes, images: Images, edges: Floats) -> None:
     """Give axes the frame of a camera: equal scales, room around it, y as the camera counts it."""
     low, high = edges
     margin = 0.06 * float((high - low).max())
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", anchor="NW")
     axes.set_xlim(low[0] - margin, high[0] + margin)
     up = (low[1] - margin, high[1] + margin)
     axes.set_ylim(*(up[::-1] if images.down else up))
