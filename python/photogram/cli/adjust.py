@@ -10,13 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import print_remark, print_sections
-from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.maps import CloudFile, Crs, MapFile, check_maps, drawn_maps
 from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
     ParquetFolder,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Strict,
     Threads,
@@ -24,6 +27,7 @@ from photogram.cli.options import (
     default_out,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.projects import (
     NOTHING,
@@ -75,6 +79,8 @@ def adjust(
         ),
     ] = None,
     json: JsonFile = None,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     parquet: ParquetFolder = None,
     crs: Crs = None,
     map: MapFile = None,  # noqa: A002  # as the option is called
@@ -122,6 +128,7 @@ def adjust(
         from photogram.formats.additions import self_calibrated
 
         check_maps(map)
+        pictures = Pictures(job, plots, plot_format, target)
         project = read_project(job, path, added)
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
@@ -156,7 +163,7 @@ def adjust(
             files["report.txt"] += removed.report().encode()
         taken = [] if removed is None else removed.sections()
         job.finish(
-            {target / name: content for name, content in files.items()},
+            {**{target / name: content for name, content in files.items()}, **pictures.of(result)},
             {} if json is None else {json: result.to_json()},
             as_data(result, parquet),
             drawn_maps(result, map, ply, crs, _sizes(project), quiet=quiet),
