@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import print_remark, print_sections
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
     JsonFile,
@@ -74,11 +75,14 @@ def adjust(
         Path | None,
         Writes.DIRECTORY,
         out_option(
-            "Directory for report.txt, the tables of the result, and the adjusted project in `adjusted/`."
+            "Directory for report.html, report.txt, the tables of the result, and the adjusted project in"
+            " `adjusted/`."
             " Default: PATH-adjusted."
         ),
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -119,9 +123,11 @@ def adjust(
         path = job.packaged(*EXAMPLE)
     assert path is not None
     target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
+    place = html_place(html, no_html, target)
     with job:
         from photogram import Result
         from photogram.formats.additions import self_calibrated
+        from photogram.show.ways import page_of
 
         project = read_project(job, path, added)
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
@@ -147,8 +153,9 @@ def adjust(
             files["removed.csv"] = removed.table().to_csv(index=False).encode()
             files["report.txt"] += removed.report().encode()
         taken = [] if removed is None else removed.sections()
+        page = html_files(job, "adjust", place, html is not None, lambda: page_of(removed or result))
         job.finish(
-            {target / name: content for name, content in files.items()},
+            {target / name: content for name, content in files.items()} | page,
             {} if json is None else {json: result.to_json()},
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
