@@ -27,7 +27,7 @@ class Browser:
 
     @contextmanager
     def opened(self, path: Path, width: int = WIDTHS[0], *, script: bool = True) -> Iterator:
-        """Open a report; when done with it, there must have been no complaint, and nothing asked of a network."""
+        """Open a report; there must be no complaint, and nothing asked of a network."""
         context = self.chromium.new_context(
             viewport={"width": width, "height": 1000}, java_script_enabled=script, offline=True
         )

@@ -13,7 +13,19 @@ from photogram import InnerConstraints, adjust, simulate
 from photogram.adjustment.snooping import snoop
 from photogram.cli import html as cli_html
 
-BLOCK = ["Verdict", "How much", "how good", "Redundancy", "Tests", "Worst observations", "Control points", "Photos", "Points", "Iterations", "Reproducibility"]
+BLOCK = [
+    "Verdict",
+    "How much",
+    "how good",
+    "Redundancy",
+    "Tests",
+    "Worst observations",
+    "Control points",
+    "Photos",
+    "Points",
+    "Iterations",
+    "Reproducibility",
+]
 COMMANDS = {
     "adjust --example": ("example-adjusted", [*BLOCK, "Check points", "Other observations", "Cameras"]),
     "adjust --example --self-calibrate f,k1 --snoop": (
@@ -31,7 +43,7 @@ COMMANDS = {
 
 def joined(names):
     """Return names as they stand in the list above: one has a comma."""
-    return {name for name in ", ".join(names).replace("How much, how good", "How much; how good").split(", ")}
+    return set(", ".join(names).replace("How much, how good", "How much; how good").split(", "))
 
 
 @pytest.fixture(scope="module")
@@ -161,6 +173,7 @@ class Tables(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
+        """Begin a table, a row or a cell."""
         if tag == "table":
             self.tables.append([])
         elif tag == "tr":
@@ -169,6 +182,7 @@ class Tables(HTMLParser):
             self._cell = ""
 
     def handle_endtag(self, tag):
+        """Keep what a cell has."""
         if tag in ("td", "th"):
             self.tables[-1][-1].append(self._cell.strip())
         elif tag == "caption":
@@ -177,6 +191,7 @@ class Tables(HTMLParser):
             self._cell = None
 
     def handle_data(self, data):
+        """Take the text of a cell."""
         if self._cell is not None:
             self._cell += data
 
@@ -200,7 +215,9 @@ def test_figures_of_the_page_are_those_of_the_result():
     assert len(rows) == 3 * len(table)
     difference, sd = head.index("Adjusted - known m"), head.index("sd adjusted m")
     for row in rows:
-        assert float(row[difference]) == pytest.approx(table.loc[row[0], f"d_{row[1]}"], abs=6e-4)
+        assert float(row[difference]) == pytest.approx(
+            table.loc[row[0], f"d_{row[1]}"], abs=0.06 * float(row[sd])
+        )
         assert float(row[sd]) == pytest.approx(table.loc[row[0], f"sd_{row[1]}"], rel=6e-3)
     _, rows = Tables(section(text, "iterations")).of("Iterations")
     assert [int(row[0]) for row in rows] == list(range(len(result.iterations) + 1))
@@ -248,7 +265,7 @@ def test_large_blocks_have_the_worst_only_and_say_so():
     block = simulate(strips=6, photos_per_strip=40, points_per_photo=12, image_sd=0.01, seed=2).block
     result = adjust(block)
     text = result.to_html().decode()
-    head, rows = Tables(section(text, "photos")).of("Positions")
+    _, rows = Tables(section(text, "photos")).of("Positions")
     assert 50 < len(rows) < 200
     assert re.search(rf"{len(rows)} of {len(block.photo_ids)}: those that other tables name", text)
     named = {row[1] for row in Tables(section(text, "worst")).of("Worst observations")[1]} - {""}
@@ -297,7 +314,10 @@ def test_without_the_extra_there_is_a_remark_and_an_error_only_where_it_was_aske
 
 
 def test_help_and_import_do_without_what_draws():
-    code = "import sys, photogram.cli.commands, photogram; print(sorted({'jinja2', 'matplotlib'} & set(sys.modules)))"
+    code = (
+        "import sys, photogram.cli.commands, photogram;"
+        " print(sorted({'jinja2', 'matplotlib'} & set(sys.modules)))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
 

@@ -15,12 +15,16 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Strict,
     Threads,
     default_out,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.projects import (
     EXAMPLE,
@@ -83,6 +87,8 @@ def adjust(
     json: JsonFile = None,
     html: HtmlFile = None,
     no_html: NoHtml = False,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -129,6 +135,7 @@ def adjust(
         from photogram.formats.additions import self_calibrated
         from photogram.show.ways import page_of
 
+        pictures = Pictures(job, plots, plot_format, target)
         project = read_project(job, path, added)
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
@@ -155,7 +162,7 @@ def adjust(
         taken = [] if removed is None else removed.sections()
         page = html_files(job, "adjust", place, html is not None, lambda: page_of(removed or result))
         job.finish(
-            {target / name: content for name, content in files.items()} | page,
+            {target / name: content for name, content in files.items()} | pictures.of(result) | page,
             {} if json is None else {json: result.to_json()},
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),

@@ -17,6 +17,9 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -26,6 +29,7 @@ from photogram.cli.options import (
     UnitWeight,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -81,6 +85,8 @@ def collection(
     json: JsonFile = None,
     html: HtmlFile = None,
     no_html: NoHtml = False,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     loss: Annotated[
         Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")
     ] = Loss.SQUARES,
@@ -137,6 +143,7 @@ def collection(
             names.append(out / COMPONENTS)
         place = html_place(html, no_html, out)
         job.writes(*names, *([place] if place else []))
+        pictures = Pictures(job, plots, plot_format, out)
         photos = photos.replace(image_sd=sd)
         if snoop and (loss is not Loss.SQUARES or components):
             raise typer.BadParameter("not with a robust loss, nor with --components", param_hint="--snoop")
@@ -158,7 +165,7 @@ def collection(
                 result = adjust(photos, loss=_LOSSES[loss], scale=scale, covariance=covariance, **options)
         told = log or result
         estimates = estimated(job, photos, components, threads)
-        written = {}
+        written = pictures.of(result)
         if names:
             written[names[0]] = told.report().encode()
             written[names[1]] = to_bytes(result.adjusted(), packing, found.name)

@@ -17,6 +17,9 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -27,6 +30,7 @@ from photogram.cli.options import (
     default_out,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
@@ -71,6 +75,8 @@ def giant(
     json: JsonFile = None,
     html: HtmlFile = None,
     no_html: NoHtml = False,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     listing: Annotated[
         Path | None,
         Writes.FILE,
@@ -160,6 +166,7 @@ def giant(
         place = html_place(html, no_html, out)
         others = [*([out / COMPONENTS] if components else []), *([place] if place else [])]
         job.writes(*(out / name for name in RESULTS), *others)
+        pictures = Pictures(job, plots, plot_format, out)
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         block = _refracted(
@@ -182,6 +189,7 @@ def giant(
         found = estimated(job, block, components, threads)
         if found is not None:
             written[out / COMPONENTS] = found.report().encode()
+        written |= pictures.of(result)
         documents = html_files(job, "giant", place, html is not None, lambda: page_of(log or result))
         if json is not None:
             documents[json] = (log or result).to_json()

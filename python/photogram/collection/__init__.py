@@ -7,6 +7,7 @@ from photogram.collection import (  # noqa: F401  (the ways to show a result, an
     document,
     findings,
     html,
+    pictured,
     report,
     snooping,
     tables,

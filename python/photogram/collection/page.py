@@ -7,7 +7,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.findings import names
 from photogram.collection.report import problems_of
@@ -31,6 +30,7 @@ from photogram.show.page import (
     Drawing,
     Fact,
     Facts,
+    Layers,
     Page,
     Part,
     Row,
@@ -215,31 +215,31 @@ def _photos_section(result: AdjustedCollection, named: Iterable[int]) -> Section
     )
     order = np.argsort(-np.nan_to_num(rms, nan=-1.0), kind="stable")
     rows, every = chosen_rows(count, named, [order])
-    body: list[Row] = []
-    for row in rows.tolist():
-        deviations: Floats = result.photo_sd[row]
-        body.append(
-            [
-                Cell(str(row), id=f"photo-{row}"),
-                int(result.photo_images[row]),
-                float(rms[row]),
-                *map(float, result.photo_parameters[row]),
-            ]
-        )
-        if np.isfinite(deviations).all():
-            body.append(["sd", None, None, *map(float, deviations)])
-    columns = [
-        Column("Photo", text=True),
-        Column("Images", decimals=0),
-        Column("rms of residuals", "px", decimals=2),
-        *(Column(name, unit, figures=6) for name, unit in zip(given.parameters, given.units, strict=True)),
-    ]
     note = (
         ""
         if every
         else f"{len(rows)} of {count}: those that other tables name, and those of the largest residuals."
     )
-    return Section("photos", "Photos", [Table("Photos", columns, body, note)])
+    units = [Column(name, unit, figures=6) for name, unit in zip(given.parameters, given.units, strict=True)]
+    small = [Column(name, unit, figures=3) for name, unit in zip(given.parameters, given.units, strict=True)]
+    values: list[Row] = [
+        [Cell(str(row), id=f"photo-{row}"), *map(float, result.photo_parameters[row])]
+        for row in rows.tolist()
+    ]
+    deviations: list[Row] = [[str(row), *map(float, result.photo_sd[row])] for row in rows.tolist()]
+    fit: list[Row] = [[str(row), int(result.photo_images[row]), float(rms[row])] for row in rows.tolist()]
+    name = Column("Photo", text=True)
+    tables = [
+        Table("Parameters", [name, *units], values, note),
+        Table("Standard deviations", [name, *small], deviations, note),
+        Table(
+            "Fit of images",
+            [name, Column("Images", decimals=0), Column("rms of residuals", "px", decimals=3)],
+            fit,
+            note,
+        ),
+    ]
+    return Section("photos", "Photos", [Layers("photos-layers", tables)])
 
 
 def _points_section(result: AdjustedCollection, named: Iterable[int]) -> Section:

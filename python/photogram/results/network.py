@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from photogram import _photocore
+    from photogram.plots import Plots
 
 __all__ = ["AdjustedNetwork", "Observed"]
 
@@ -231,6 +232,13 @@ class AdjustedNetwork(Shown, ABC):
     def point_sd(self) -> Floats:
         """(n, 3) standard deviations."""
         return standard_deviations(self.point_covariances)
+
+    @property
+    def plot(self) -> Plots:
+        """Pictures: `plot.network()`, `.residuals()`, `.redundancy()`, `.tests()` ... (docs/pictures.md)."""
+        from photogram.plots import Plots
+
+        return Plots(self)
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""

@@ -10,8 +10,6 @@ from photogram.show.page import Drawing, Picture
 
 __all__ = ["inlined"]
 
-VECTORS = 4000
-"""Things in a picture up to which it is drawn as vectors: beyond, dots are smaller and open faster."""
 LARGEST = 600_000
 """Bytes of a picture of vectors at most: one that has more after all becomes dots."""
 DPI = 170
@@ -34,12 +32,10 @@ def inlined(drawing: Drawing) -> Picture | None:
         if figure is None:
             return None
         width, height = figure.get_size_inches()
-        markup = ""
-        if drawing.elements <= VECTORS:
-            content = io.StringIO()
-            figure.savefig(content, format="svg", metadata={"Date": None, "Creator": None})
-            markup = _embedded(content.getvalue(), drawing, width)
-        if not markup or len(markup) > LARGEST:
+        content = io.StringIO()
+        figure.savefig(content, format="svg", metadata={"Date": None, "Creator": None})
+        markup = _embedded(content.getvalue(), drawing, width)
+        if len(markup) > LARGEST:
             dots = io.BytesIO()
             figure.savefig(dots, format="png", dpi=DPI, metadata={"Software": None})
             data = base64.b64encode(dots.getvalue()).decode()

@@ -166,15 +166,12 @@ class Drawing:
         A word for switching, and what is to be seen.
     draw
         Makes the matplotlib figure; None where there is nothing to draw.
-    elements
-        About how many things are in it: few are drawn as vectors, many as dots.
     """
 
     name: str
     title: str
     caption: str
     draw: Callable[[], Figure | None]
-    elements: int = 0
     kind: str = field(default="drawing", init=False)
 
 

@@ -287,8 +287,10 @@ def _redundancy_table(result: Result) -> Table | None:
         Column("Weighted sum of squares", decimals=2),
         Column("Factor of sd", decimals=3),
     )
-    note = "The factor is the root of sum over redundancy: what standard deviations of the kind would"
-    " have to be multiplied by to agree, if the others are right."
+    note = (
+        "The factor is the root of sum over redundancy: what standard deviations of the kind would have to be"
+        " multiplied by to agree, if the others are right."
+    )
     return Table("Redundancy by kind of observation", columns, rows, note)
 
 

@@ -119,8 +119,8 @@ def worst_table(result: AdjustedNetwork, images: Images, limit: float | None) ->
         Column(f"Test value {statistic}", decimals=2),
     )
     said = "" if limit is None else f" Beyond {limit:.2f} the test of a single observation rejects."
-    note = f"The {len(rows)} of the largest test values.{said} Residuals of other kinds stand in their"
-    " own tables."
+    others = " Residuals of other kinds stand in their own tables."
+    note = f"The {len(rows)} of the largest test values.{said}{others}"
     return Table("Worst observations", columns, rows, note)
 
 
