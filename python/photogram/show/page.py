@@ -43,7 +43,7 @@ __all__ = [
 Tone = Literal["", "good", "look", "bad"]
 """How a thing is to be taken: no colour stands without words that say the same."""
 
-MOST_DECIMALS = 9
+MOST_DECIMALS = 12
 """Of a fixed-point column."""
 
 

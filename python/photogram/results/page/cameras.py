@@ -5,9 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from photogram.results.calibration import Calibration, ParameterTest, calibrations
 from photogram.results.result import Result
-from photogram.show.page import Cell, Column, Drawing, Fact, Facts, Layers, Part, Remarks, Section, Table
+from photogram.show.page import (
+    Cell,
+    Column,
+    Drawing,
+    Fact,
+    Facts,
+    Layers,
+    Part,
+    Remarks,
+    Row,
+    Section,
+    Table,
+    decimals_of,
+    fixed,
+)
 
 __all__ = ["cameras_section"]
 
@@ -59,24 +75,27 @@ def _parameters(result: Result, found: Calibration) -> Table:
     law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
     columns = (
         Column("Parameter", text=True),
-        Column("Unit", text=True),
-        Column("Given", figures=8),
+        Column("Given"),
         Column("sd given", figures=3),
-        Column("Adjusted", figures=8),
+        Column("Adjusted"),
         Column("sd adjusted", figures=3),
-        Column("Change", figures=3),
-        Column(f"Test value t ({law})", decimals=2),
+        Column("Change"),
+        Column("t", law, decimals=2),
         Column("p", decimals=4),
-        Column("Correlation with all others R", decimals=5),
+        Column("R", "with all others", decimals=4),
         Column("Outcome", text=True),
     )
     rows = [_parameter(each) for each in found.parameters]
     camera = found.camera
-    note = f"{camera.camera.model}, {camera.camera.direction}; {camera.photos} photos, {camera.images} images"
+    note = (
+        f"{camera.camera.model}, {camera.camera.direction}; {camera.photos} photos, {camera.images} images."
+        " t tests terms of the lens against zero, the others against the given value; R is the multiple"
+        " correlation with all other unknowns: near 1 nothing tells the parameter from them."
+    )
     return Table(camera.name, columns, rows, note)
 
 
-def _parameter(each: ParameterTest) -> list[Cell | str | float | None]:
+def _parameter(each: ParameterTest) -> Row:
     outcome = "significant" if each.significant else "not significant"
     if not each.is_lens:
         outcome = "differs from the given value" if each.significant else "as given"
@@ -85,23 +104,26 @@ def _parameter(each: ParameterTest) -> list[Cell | str | float | None]:
         notes.append("not separable")
     if each.from_prior:
         notes.append("from its prior")
-    tone = "look" if not each.separable or each.contradicts else ""
+    decimals = min(decimals_of(np.array([each.sd])) + 1, 15)
+
+    def written(value: float) -> Cell:
+        return Cell(fixed(value, decimals) if math.isfinite(value) else value, sorts=value)
+
     return [
-        each.name,
-        each.unit,
-        each.given,
+        f"{each.name}, {each.unit}" if each.unit else each.name,
+        written(each.given),
         "free" if math.isinf(each.given_sd) else each.given_sd,
-        each.value,
+        written(each.value),
         each.sd,
-        each.change,
+        written(each.change),
         each.test_value,
         each.probability,
         each.multiple_correlation,
-        Cell(", ".join(notes), tone="look") if tone else ", ".join(notes),
+        Cell(", ".join(notes), tone="look" if not each.separable or each.contradicts else ""),
     ]
 
 
-def _groups(found: Calibration) -> list[list[Cell | str | float | None]]:
+def _groups(found: Calibration) -> list[Row]:
     return [
         [
             found.camera.name,

@@ -385,14 +385,12 @@ def points_section(result: Result, named: Iterable[int]) -> Section:
         *frame.deviations(few),
         Column("Largest over smallest sd", figures=3),
     ]
+    few_of = f"{len(rows)} of {len(used)}: those that other tables name, those of the largest sd"
     note = (
-        ""
-        if every
-        else f"{len(rows)} of {len(used)}: those that other tables name, those of the largest standard"
-        " deviations, and the weakest. The table of points has all."
+        f"{'' if every else few_of + ', and the weakest. The table of points has all. '}"
+        "The ratio of the standard deviations, in any directions, stands at the weakest ten:"
+        " above 10,000 rays are nearly parallel."
     )
-    note = f"{note} The ratio of the standard deviations, in any directions, stands at the weakest ten:"
-    " above 10,000 rays are nearly parallel.".strip()
     return Section("points", "Points", [Table("Points", columns, body, note)] if body else [], _datum(result))
 
 

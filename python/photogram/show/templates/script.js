@@ -45,6 +45,7 @@ for (const group of document.querySelectorAll(".layers")) {
     button.addEventListener("click", () => show(layer));
     bar.append(button);
   }
+  group.classList.add("switched");
   group.prepend(bar);
   show(layers[0]);
 }
