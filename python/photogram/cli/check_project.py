@@ -9,6 +9,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
+from photogram.cli.html import HtmlFile, html_files
 from photogram.cli.job import Job, Reads, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
 from photogram.cli.projects import NOTHING, Additions, described, read_project, with_additions
@@ -22,6 +23,7 @@ def check_project(
     job: Job,
     path: Annotated[Path, Reads.FILE, typer.Argument(metavar="PATH", help="A project: a folder or file.")],
     json: JsonFile = None,
+    html: HtmlFile = None,
     added: Additions = NOTHING,
     threads: Threads = None,
     quiet: Quiet = False,
@@ -32,6 +34,7 @@ def check_project(
     """
     with job:
         from photogram import check
+        from photogram.show.ways import page_of
 
         project = read_project(job, path, added)
         if not quiet:
@@ -40,6 +43,7 @@ def check_project(
             found = check(project.block, threads=threads)
         job.finish(
             {} if json is None else {json: found.to_json()},
+            html_files(job, "check", html, True, lambda: page_of(found)),
             summary=lambda: output.print(escape(found.report()), end=""),
             code=NOT_CONVERGED if found.grave else 0,
         )

@@ -29,7 +29,7 @@ HtmlFile = Annotated[
         "--html",
         metavar="FILE",
         help="Where the report for the browser goes (needs photogram[report]). Default: report.html in the"
-        " directory of results.",
+        " directory of results, if there is one.",
         show_default=False,
     ),
 ]

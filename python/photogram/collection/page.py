@@ -23,7 +23,7 @@ from photogram.results.page.parts import (
 )
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import chosen_rows
-from photogram.show.judgement import advice
+from photogram.show.judgement import advice, judged
 from photogram.show.page import (
     Cell,
     Column,
@@ -71,7 +71,7 @@ def collection_page(result: AdjustedCollection) -> Page:
     return Page(
         what="Adjustment of a collection of photos",
         title="",
-        verdicts=[("", result.verdict)],
+        judgements=[judged(result.verdict)],
         advice=_advice(result),
         highlights=_highlights(result),
         sections=sections,

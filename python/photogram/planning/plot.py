@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import PhotogramError
 from photogram.show.pictures import new_figure
+from photogram.show.style import ORDERED
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -79,6 +80,7 @@ def _panel(axes: Axes, pattern: Pattern, heights: Floats) -> PathCollection:
         vmin=heights.min(),
         vmax=heights.max(),
         linewidths=0,
+        cmap=ORDERED,
     )
     axes.plot(*pattern.photo_plan.T, "+", color="0.4", markersize=4, label="photo")
     held = np.isfinite(pattern.block.point_sd) & pattern.result.used_points[:, np.newaxis]

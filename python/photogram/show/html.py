@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from photogram import _photocore
 from photogram.show.inline import inlined
-from photogram.show.page import Cell, Column, Drawing, Layers, Page, Part, Section, Table, tone_of
+from photogram.show.page import Cell, Column, Drawing, Layers, Page, Part, Section, Table
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
 __all__ = ["page_html"]
-
-MARKS = {"good": "Usable", "look": "Usable, but look first", "bad": "Not to be used as it is"}
-"""What stands above a verdict: colours alone say nothing."""
 
 
 def page_html(page: Page) -> bytes:
@@ -43,11 +41,9 @@ def page_html(page: Page) -> bytes:
         if isinstance(cell, Cell) and cell.id
     }
     text = environment.get_template("report.html").render(
-        page=page,
+        page=replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title)),
         sections=sections,
         version=_photocore.__version__,
-        marks=MARKS,
-        tone_of=tone_of,
         attributes=_attributes,
         content=lambda column, cell: _content(column, cell, known),
         style=_source("style.css"),

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from photogram.show.page import Cell, Column, Table
+from photogram.show.page import Cell, Column, Judgement, Table, Tone
 
 if TYPE_CHECKING:
     from photogram.statistics.evidence import Test
     from photogram.statistics.verdict import Verdict
 
-__all__ = ["advice", "verdict_table"]
+__all__ = ["advice", "judged", "verdict_table"]
+
+MARKS: dict[Tone, str] = {
+    "good": "Usable",
+    "look": "Usable, but look first",
+    "bad": "Not to be used as it is",
+}
+"""What stands above a verdict: colours alone say nothing."""
 
 LEAST = 1e-99
 """Smaller probabilities are not told apart."""
@@ -95,6 +102,12 @@ def advice(
     words = {"check": check or "look at the input", "snoop": snoop, "calibrate": calibrate}
     found = [each.format(**words) for each in _NEXT.get(verdict.code, ())]
     return [each for each in (*found, *others) if each]
+
+
+def judged(verdict: Verdict, on: str = "") -> Judgement:
+    """Return a verdict as it stands on a page."""
+    tone: Tone = "bad" if verdict.exit else "look" if verdict.warning else "good"
+    return Judgement(MARKS[tone], verdict.headline, verdict.lines, tone, on)
 
 
 def verdict_table(verdict: Verdict, of: str = "") -> Table:

@@ -17,15 +17,15 @@ from photogram.arguments.types import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from photogram.statistics.verdict import Verdict
-
 __all__ = [
     "Cell",
     "Column",
     "Drawing",
     "Fact",
     "Facts",
+    "Judgement",
     "Layers",
+    "Lines",
     "Page",
     "Part",
     "Picture",
@@ -37,7 +37,6 @@ __all__ = [
     "decimals_of",
     "fixed",
     "significant",
-    "tone_of",
 ]
 
 Tone = Literal["", "good", "look", "bad"]
@@ -200,6 +199,14 @@ class Layers:
 
 
 @dataclass(frozen=True)
+class Lines:
+    """Lines of text whose columns stand below each other."""
+
+    lines: Sequence[str]
+    kind: str = field(default="lines", init=False)
+
+
+@dataclass(frozen=True)
 class Text:
     """A paragraph."""
 
@@ -216,7 +223,7 @@ class Remarks:
     kind: str = field(default="remarks", init=False)
 
 
-Part = Table | Facts | Drawing | Picture | Layers | Text | Remarks
+Part = Table | Facts | Drawing | Picture | Layers | Lines | Text | Remarks
 
 
 @dataclass(frozen=True)
@@ -230,6 +237,29 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Judgement:
+    """What stands on top of a page: whether the result can be used.
+
+    Attributes
+    ----------
+    mark
+        In few words.
+    headline, lines
+        A sentence, and others.
+    tone
+        How it is to be taken.
+    on
+        What it is on, where a page has several.
+    """
+
+    mark: str
+    headline: str
+    lines: Sequence[str] = ()
+    tone: Tone = ""
+    on: str = ""
+
+
+@dataclass(frozen=True)
 class Page:
     """A report.
 
@@ -237,8 +267,8 @@ class Page:
     ----------
     what, title
         What was done, and the name of the job.
-    verdicts
-        With what they are on, where there are several.
+    judgements
+        One, or one for each thing that was adjusted.
     advice
         What to do next, in sentences.
     highlights
@@ -251,7 +281,7 @@ class Page:
 
     what: str
     title: str
-    verdicts: Sequence[tuple[str, Verdict]]
+    judgements: Sequence[Judgement]
     advice: Sequence[str]
     highlights: Sequence[Fact]
     sections: Sequence[Section]
@@ -293,8 +323,3 @@ def decimals_of(deviations: Floats, figures: int = 2) -> int:
     if not known.size:
         return 4
     return int(np.clip(figures - 1 - math.floor(math.log10(float(np.median(known)))), 0, MOST_DECIMALS))
-
-
-def tone_of(verdict: Verdict) -> Tone:
-    """Return how a verdict is to be taken."""
-    return "bad" if verdict.exit else "look" if verdict.warning else "good"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -35,7 +34,7 @@ from photogram.results.page.tables import (
 from photogram.results.report import image_unit, problems_of
 from photogram.results.result import Result
 from photogram.results.unknowns import unknown_lines
-from photogram.show.judgement import advice
+from photogram.show.judgement import advice, judged
 from photogram.show.page import Column, Drawing, Fact, Facts, Page, Part, Section, Table, significant
 from photogram.statistics.reliability import TESTABLE
 
@@ -71,8 +70,8 @@ def block_page(result: Result) -> Page:
     ]
     return Page(
         what="Adjustment of a block of photos",
-        title=re.sub(r"\s*\.{4,}\s*", " – ", block.title),
-        verdicts=[("", result.verdict)],
+        title=block.title,
+        judgements=[judged(result.verdict)],
         advice=_advice(result),
         highlights=_highlights(result),
         sections=sections,

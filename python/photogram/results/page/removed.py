@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from photogram.results.snooped import Snooped
-from photogram.show.judgement import advice
+from photogram.show.judgement import advice, judged
 from photogram.show.page import Cell, Column, Fact, Page, Part, Remarks, Section, Table
 from photogram.show.ways import page_of
 from photogram.statistics.snooping.log import Removal
@@ -20,7 +20,7 @@ def snooped_page(found: Snooped) -> Page:
     own = advice(found.verdict, check="`photogram check` (`photogram.check`)")
     return replace(
         page,
-        verdicts=[("", found.verdict)],
+        judgements=[judged(found.verdict)],
         advice=[*own, *(each for each in page.advice if each not in own and "--snoop" not in each)],
         highlights=[gone, *page.highlights],
         sections=[_log(found), *page.sections],
