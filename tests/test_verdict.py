@@ -257,7 +257,7 @@ def test_a_block_with_a_blunder_and_one_with_bad_weights(simulated):
 
 
 def test_an_image_is_tested_with_both_its_coordinates(simulated):
-    """T of the verdict is what the sum of squares falls by without the image, of as many dimensions as show."""
+    """T is what the sum of squares falls by without the image, of as many dimensions as show."""
     result = adjust(simulated)
     largest = next(test for test in result.verdict.tests if test.name.startswith("images: "))
     summary = result.reliability_summary

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["AdjustedCollection"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AdjustedCollection(AdjustedNetwork):
     """An adjusted collection; the arrays that every network has are those of `AdjustedNetwork`.
 
@@ -55,6 +55,14 @@ class AdjustedCollection(AdjustedNetwork):
     state: _photocore.BlockState
 
     KNOWN: ClassVar[bool] = False
+
+    @property
+    def _what(self) -> str:
+        return "collection"
+
+    @property
+    def _image_unit(self) -> str:
+        return "px"
 
     @property
     def cost(self) -> float:

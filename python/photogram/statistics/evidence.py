@@ -166,8 +166,8 @@ class Evidence:
     def _common(self, robust: float) -> float:
         """Return the common factor of all standard deviations beside which observations are tested.
 
-        Where the median says that there is one, and all residuals together say about the same, these do: they are
-        more, and the median of a few hundred may be off by a tenth.
+        Where the median says that there is one, and all residuals together say about the same, these decide:
+        the median of a few hundred may be off by a tenth.
         """
         alike = NOTABLE_FACTOR <= robust <= self.factor <= NOTABLE_FACTOR * robust
         return self.factor if alike else max(robust, 1.0)
