@@ -34,6 +34,7 @@ def block_findings(result: Result) -> Findings:
         computed=has_redundancy(result),
         systematic=_patterns(result),
         remarks=unseen(result),
+        hints=result.hints,
         snoop="--snoop (photogram.snoop)",
     )
 

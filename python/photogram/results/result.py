@@ -120,6 +120,9 @@ class Result(AdjustedNetwork):
         What coordinates and standard deviations refer to.
     options, state
         How the core adjusted the block, and where that ended: what covariances are computed from.
+    hints
+        Mistakes in conventions (units, axes, signs, angles) that would explain why images do not fit, as
+        sentences; see :func:`photogram.hints`. They head the verdict.
     """
 
     block: Block
@@ -138,6 +141,7 @@ class Result(AdjustedNetwork):
     datum: ResultDatum
     options: CoreOptions
     state: _photocore.BlockState
+    hints: tuple[str, ...] = ()
 
     @classmethod
     def from_solution(
@@ -157,6 +161,7 @@ class Result(AdjustedNetwork):
             block=block.kept(),
             messages=messages,
             loss=options.loss,
+            hints=(),
             options=options,
             datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),

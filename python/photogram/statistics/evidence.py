@@ -220,6 +220,8 @@ class Evidence:
                 f"the global test rejects, but residuals are only {self.factor:.3g} times as expected"
             )
         lines += [each.sentence for each in self.found.systematic if each.significant and not each.large]
+        if self.found.hints:
+            lines.append("nothing was corrected: put right what the data mean, and adjust again")
         f = self.found.degrees_of_freedom
         if 0 < f < FEW:
             lines.append(f"with {f:g} degrees of freedom only gross disagreement can be seen")
