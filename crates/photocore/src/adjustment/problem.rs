@@ -237,6 +237,14 @@ impl<'a, M: Model> Linearized<'a, M> {
         Self { observation_sd, ..self }
     }
 
+    /// The same with some unknowns as they are given by other standard deviations: the others stay as they are.
+    pub fn with_unknowns(mut self, unknowns: impl Iterator<Item = usize>, sd: &[f64]) -> Self {
+        if let Some(fixed) = &mut self.fixed {
+            unknowns.for_each(|unknown| fixed[unknown] = sd[unknown] == 0.0);
+        }
+        self
+    }
+
     /// With the columns of fixed unknowns, and without a loss.
     pub fn of_all(problem: &'a Problem<M>, values: &[f64]) -> Self {
         let prepared = problem.model.prepare(values);
