@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
+from photogram.results.covariance import Covariances, Propagated
 from photogram.results.iteration import Iteration
+from photogram.results.selection import Selection
 from photogram.show.ways import Shown
 from photogram.statistics.reliability import standardized
 
@@ -231,6 +233,37 @@ class AdjustedNetwork(Shown, ABC):
     def point_sd(self) -> Floats:
         """(n, 3) standard deviations."""
         return standard_deviations(self.point_covariances)
+
+    @abstractmethod
+    def covariances(self) -> Covariances:
+        """Return an object that answers for covariances of anything with anything, from one factor.
+
+        The normal equations are formed and factored once, at the adjusted values; the object keeps the
+        factor, as long as you keep the object.
+
+        Raises
+        ------
+        AdjustmentError
+            Unknowns are not determined.
+        OutOfMemoryError
+            The factor would take more memory than there is.
+        KeyboardInterrupt
+            Ctrl-C.
+        """
+
+    def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
+        """Return the joint covariance matrix of a selection, or that of one with another.
+
+        For several questions ask one object: :meth:`covariances`, which says what a selection is and what
+        errors there are.
+        """
+        return self.covariances().covariance(a, b)
+
+    def propagate(
+        self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
+    ) -> Propagated:
+        """Return a function of adjusted unknowns with its covariance; see `Covariances.propagate`."""
+        return self.covariances().propagate(function, unknowns, bias=bias)
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""
