@@ -100,7 +100,7 @@ class AdjustedCollection(AdjustedNetwork):
         """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`.
 
         Kinds are `photo` (all parameters), `pose` and `camera` (its first six, the others) and `point`.
-        Photos and points are called by their numbers: `("photo", 3)`, `("point", [7, 8])`, `("camera", None)`.
+        Photos and points are called by their numbers: `("photo", 3)`, `("point", [7, 8])`.
         """
         network = collection_network(self.collection, self.options)
         return Covariances(
