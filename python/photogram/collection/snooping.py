@@ -149,8 +149,12 @@ class _Named:
             name=self.name,
             row_name=self.row_name,
             unit=self.unit,
-            photo_name=lambda photo: f"photo {photo}",
+            photo_name=self.photo_name,
         )
+
+    def photo_name(self, photo: int) -> str:
+        """Return what a photo is called."""
+        return f"photo {photo}"
 
     def loads(self, group: int) -> Indices:
         kind, subject = int(self.kinds[group]), int(self.subjects[group])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -234,10 +235,16 @@ class NetworkTrial:
 def image_loads(points: Indices, photos: Indices) -> Callable[[int], Indices]:
     """Return a function that tells from which photos a point is seen, its images being given by both."""
     order = np.argsort(points, kind="stable")
-    sorted_points, sorted_photos = points[order], photos[order]
+    return _ImageLoads(points[order], photos[order])
 
-    def of(point: int) -> Indices:
-        first, last = np.searchsorted(sorted_points, [point, point + 1])
-        return np.asarray(sorted_photos[first:last])
 
-    return of
+@dataclass(frozen=True, eq=False)
+class _ImageLoads:
+    """A function that can be pickled, as results that hold it are: images by points, in their order."""
+
+    points: Indices
+    photos: Indices
+
+    def __call__(self, point: int) -> Indices:
+        first, last = np.searchsorted(self.points, [point, point + 1])
+        return np.asarray(self.photos[first:last])

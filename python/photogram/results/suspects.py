@@ -95,8 +95,12 @@ class _Named:
             name=self.name,
             row_name=self.row_name,
             unit=self.unit,
-            photo_name=lambda photo: f"photo {block.photo_ids[photo]}",
+            photo_name=self.photo_name,
         )
+
+    def photo_name(self, photo: int) -> str:
+        """Return what a photo is called."""
+        return f"photo {self.block.photo_ids[photo]}"
 
     def loads(self, group: int) -> Indices:
         """Return the photos that a group has to do with."""
