@@ -28,6 +28,8 @@ CAMERAS = 6
 """That have a panel at most: those with the most images."""
 FEWEST = 8
 """Images of a cell whose mean is drawn."""
+ROOM = 0.06
+"""Around the frame, of its longer side."""
 LONGEST = 2.5
 """Vectors that are longer than so many times the scale's are cut short."""
 LEVEL = 0.01
@@ -64,8 +66,12 @@ def residuals(result: object, ax: Where = None) -> Any:
     columns = min(3, len(cameras))
     rows = -(-len(cameras) // columns)
     width = 6.4 if columns == 1 else 4.2 * columns
-    across, up = np.ptp(images.xy, axis=0) if len(images.xy) else (1.0, 1.0)
-    high = rows * (float(np.clip(up / max(across, 1e-12), 0.3, 1.5)) * (width / columns - 0.9) + 2.0)
+    extent = np.ptp(images.xy, axis=0) if len(images.xy) else np.ones(2)
+    across, up = np.maximum(extent + 2 * ROOM * extent.max(), 1e-12)
+    many = np.bincount(images.cameras[np.isin(images.cameras, cameras)]).max(initial=0) > SINGLE
+    # Title, scale and labels; where means are drawn, also what they are.
+    beside = 1.85 if many else 1.25
+    high = rows * (float(np.clip(up / across, 0.3, 1.5)) * (width / columns - 0.75) + beside)
     with panels(ax, rows, columns, width, high) as found:
         for axes, camera in zip(found, cameras, strict=False):
             _field(axes, images, camera)
@@ -88,7 +94,7 @@ def largest_cameras(images: Images, most: int = CAMERAS) -> tuple[list[int], str
 def frame(axes: Axes, images: Images, edges: Floats) -> None:
     """Give axes the frame of a camera: equal scales, room around it, y as the camera counts it."""
     low, high = edges
-    margin = 0.06 * float((high - low).max())
+    margin = ROOM * float((high - low).max())
     axes.set_aspect("equal", anchor="NW")
     axes.set_xlim(low[0] - margin, high[0] + margin)
     up = (low[1] - margin, high[1] + margin)
