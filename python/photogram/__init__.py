@@ -8,6 +8,15 @@ from typing import TYPE_CHECKING
 from photogram.former_names import TODAY, found_under_former_names
 
 if TYPE_CHECKING:
+    from photogram import absolute_orientation as absolute_orientation
+    from photogram import collection as collection
+    from photogram import comparator as comparator
+    from photogram import formats as formats
+    from photogram import giant as giant
+    from photogram import perspective_center as perspective_center
+    from photogram import planning as planning
+    from photogram import plots as plots
+    from photogram import stellar as stellar
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
@@ -155,12 +164,27 @@ NumPy and the engine take a while, in which the command line could not yet end c
 """
 
 
+MODULES = (
+    "absolute_orientation",
+    "collection",
+    "comparator",
+    "formats",
+    "giant",
+    "perspective_center",
+    "planning",
+    "plots",
+    "stellar",
+)
+"""The packages that users know by name: loaded when they are first asked for, too."""
+
 found_under_former_names()
 
 
 def __getattr__(name: str) -> object:
     if name in _HOMES:
         value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    elif name in MODULES:
+        value = import_module(f"{__name__}.{name}")
     elif name in TODAY:
         value = import_module(f"{__name__}.{TODAY[name]}")
     else:
@@ -170,4 +194,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, *MODULES})

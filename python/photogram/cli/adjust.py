@@ -10,13 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import print_remark, print_sections
-from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.maps import CloudFile, Crs, MapFile, check_maps, drawn_maps
 from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
     ParquetFolder,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Strict,
     Threads,
@@ -24,12 +27,15 @@ from photogram.cli.options import (
     default_out,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.projects import (
-    EXAMPLE,
     NOTHING,
     Additions,
+    Example,
+    ProjectPath,
     described,
+    project_path,
     read_project,
     with_additions,
 )
@@ -62,18 +68,8 @@ class LossName(StrEnum):
 @with_additions()
 def adjust(
     job: Job,
-    path: Annotated[
-        Path | None,
-        Reads.FILE,
-        typer.Argument(
-            metavar="PATH",
-            help="A project: a folder or file of any format that docs/formats.md lists.",
-            show_default=False,
-        ),
-    ] = None,
-    example: Annotated[
-        bool, typer.Option("--example", help="Adjust the packaged example instead, that of `photogram new`.")
-    ] = False,
+    path: ProjectPath = None,
+    example: Example = False,
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
@@ -83,6 +79,8 @@ def adjust(
         ),
     ] = None,
     json: JsonFile = None,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     parquet: ParquetFolder = None,
     crs: Crs = None,
     map: MapFile = None,  # noqa: A002  # as the option is called
@@ -123,15 +121,14 @@ def adjust(
     observations with their standard deviations, redundancy numbers and test values, and the adjusted project
     go to --out.
     """
-    if example:
-        path = job.packaged(*EXAMPLE)
-    assert path is not None
+    path = project_path(job, path)
     target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
     with job:
         from photogram import Result
         from photogram.formats.additions import self_calibrated
 
         check_maps(map)
+        pictures = Pictures(job, plots, plot_format, target)
         project = read_project(job, path, added)
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
@@ -166,7 +163,7 @@ def adjust(
             files["report.txt"] += removed.report().encode()
         taken = [] if removed is None else removed.sections()
         job.finish(
-            {target / name: content for name, content in files.items()},
+            {**{target / name: content for name, content in files.items()}, **pictures.of(result)},
             {} if json is None else {json: result.to_json()},
             as_data(result, parquet),
             drawn_maps(result, map, ply, crs, _sizes(project), quiet=quiet),

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
-from photogram.cli.job import Job, Reads, with_job
+from photogram.cli.job import Job, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
-from photogram.cli.projects import NOTHING, Additions, described, read_project, with_additions
+from photogram.cli.projects import (
+    NOTHING,
+    Additions,
+    Example,
+    ProjectPath,
+    described,
+    project_path,
+    read_project,
+    with_additions,
+)
 
 __all__ = ["check_project"]
 
@@ -20,7 +25,8 @@ __all__ = ["check_project"]
 @with_additions()
 def check_project(
     job: Job,
-    path: Annotated[Path, Reads.FILE, typer.Argument(metavar="PATH", help="A project: a folder or file.")],
+    path: ProjectPath = None,
+    example: Example = False,
     json: JsonFile = None,
     added: Additions = NOTHING,
     threads: Threads = None,
@@ -33,7 +39,7 @@ def check_project(
     with job:
         from photogram import check
 
-        project = read_project(job, path, added)
+        project = read_project(job, project_path(job, path), added)
         if not quiet:
             print_sections(described(project), "`photogram info`")
         with job.status("checking"):

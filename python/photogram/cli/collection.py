@@ -16,6 +16,9 @@ from photogram.cli.options import (
     Ordering,
     OrderingName,
     ParquetFolder,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -26,6 +29,7 @@ from photogram.cli.options import (
     as_data,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -78,6 +82,8 @@ def collection(
         Path | None, Writes.FILE, Former("--out DIR writes the report there"), typer.Option(hidden=True)
     ] = None,
     json: JsonFile = None,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     parquet: ParquetFolder = None,
     loss: Annotated[
         Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")
@@ -133,6 +139,7 @@ def collection(
         if components and out is not None:
             names.append(out / COMPONENTS)
         job.writes(*names)
+        pictures = Pictures(job, plots, plot_format, out)
         photos = photos.replace(image_sd=sd)
         if snoop and (loss is not Loss.SQUARES or components):
             raise typer.BadParameter("not with a robust loss, nor with --components", param_hint="--snoop")
@@ -154,7 +161,7 @@ def collection(
                 result = adjust(photos, loss=_LOSSES[loss], scale=scale, covariance=covariance, **options)
         told = log or result
         estimates = estimated(job, photos, components, threads)
-        written = {}
+        written = pictures.of(result)
         if names:
             written[names[0]] = told.report().encode()
             written[names[1]] = to_bytes(result.adjusted(), packing, found.name)

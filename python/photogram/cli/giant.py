@@ -18,6 +18,9 @@ from photogram.cli.options import (
     Ordering,
     OrderingName,
     ParquetFolder,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -29,6 +32,7 @@ from photogram.cli.options import (
     default_out,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
@@ -71,6 +75,8 @@ def giant(
         ),
     ] = None,
     json: JsonFile = None,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
     parquet: ParquetFolder = None,
     map: MapFile = None,  # noqa: A002  # as the option is called
     ply: CloudFile = None,
@@ -160,6 +166,7 @@ def giant(
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
         job.writes(*(out / name for name in RESULTS), *([out / COMPONENTS] if components else []))
+        pictures = Pictures(job, plots, plot_format, out)
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         block = _refracted(
@@ -182,6 +189,7 @@ def giant(
         found = estimated(job, block, components, threads)
         if found is not None:
             written[out / COMPONENTS] = found.report().encode()
+        written |= pictures.of(result)
         documents = {}
         if json is not None:
             documents[json] = (log or result).to_json()

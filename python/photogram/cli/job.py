@@ -46,6 +46,7 @@ class Writes(Enum):
 
     FILE = "file"
     DIRECTORY = "directory of results"
+    EITHER = "file or directory, which the command finds out"
 
 
 @dataclass(frozen=True)
@@ -271,7 +272,7 @@ def _holds_path(kind: object) -> bool:
 def with_job(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command its :class:`Job` as the parameter `job`, made of its options that are marked.
 
-    Where it has an option `--example`, either that or its first argument must be given.
+    Where it has an option `--example`, that stands for its first argument.
 
     Raises
     ------
@@ -289,6 +290,8 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
     def with_one(**values: Any) -> None:
         for parameter in own:
             _check_value(parameter, values)
+        if "example" in values:
+            _arrange(own, values)
         found: dict[Reads | Writes, list[Path]] = {each: [] for each in (*Reads, *Writes)}
         for name, role in marked.items():
             given = values.get(name)
@@ -317,8 +320,25 @@ def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
     for mark in metadata:
         if isinstance(mark, Former) and value != parameter.default and not values.get("quiet"):
             print_remark(f"{_option(parameter)} will go: {mark.now}")
-        if isinstance(mark, ArgumentInfo) and values.get("example") == bool(value):
-            raise typer.BadParameter(f"give {mark.metavar}, or --example", param_hint=mark.metavar)
+
+
+def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
+    """Give arguments their values: with `--example` the first one goes without."""
+    arguments = {
+        parameter.name: mark.metavar
+        for parameter in parameters
+        for mark in get_args(parameter.annotation)[1:]
+        if isinstance(mark, ArgumentInfo)
+    }
+    given = [values[name] for name in arguments if values[name]]
+    example = bool(values["example"])
+    first, *others = arguments.values()
+    if len(given) + example > len(arguments) or not (given or example):
+        raise typer.BadParameter(f"give {first}, or --example", param_hint=first)
+    if len(given) + example < len(arguments):
+        raise typer.BadParameter("is missing", param_hint=others[-1])
+    if example:
+        values.update(zip(arguments, [None, *given], strict=True))
 
 
 def _option(parameter: Parameter) -> str:

@@ -3,7 +3,7 @@
 from photogram.formats.format import Format, Wishes
 from photogram.formats.placing import Placed, placed
 from photogram.formats.project import Frame, Options, Project
-from photogram.formats.registry import FORMATS, cannot_hold, read, recognised, to_files
+from photogram.formats.registry import FORMATS, cannot_hold, read, recognised, target, to_files
 
 __all__ = [
     "FORMATS",
@@ -17,5 +17,6 @@ __all__ = [
     "placed",
     "read",
     "recognised",
+    "target",
     "to_files",
 ]

@@ -61,9 +61,9 @@ def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
 def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:
     """Return a project with the standard deviations of image coordinates that a user gives.
 
-    A plain project has them where its tables say nothing.
+    A plain project has them where its tables say nothing; some readers take them in the unit of their files.
     """
-    if "images" not in sd or project.title == "plain project":
+    if "images" not in sd or project.sd_taken:
         return project
     own = np.broadcast_to(sd["images"], (len(project.block.image_xy), 2))
     lacks = tuple(each for each in project.lacks if "--sd images" not in each)

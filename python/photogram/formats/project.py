@@ -70,6 +70,9 @@ class Project:
         What was left out, corrected or doubtful.
     details
         What the writer of the same format wants to know again; other formats do not read it.
+    sd_taken
+        Whether the reader has taken the standard deviations of images that a user gives, in the unit of the
+        files.
     """
 
     block: Block
@@ -83,6 +86,7 @@ class Project:
     lacks: tuple[str, ...] = ()
     messages: tuple[Message, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
+    sd_taken: bool = False
 
     def __post_init__(self) -> None:
         if self.block.frame != self.frame:

@@ -4,6 +4,7 @@ from photogram.results import (  # noqa: F401  (the ways to show a result)
     document,
     findings,
     judged,
+    pictured,
     report,
     saved_block,
     tables,

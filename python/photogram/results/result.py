@@ -81,7 +81,7 @@ class Redundancies(SumsByKind):
     """Sums of redundancy numbers."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(AdjustedNetwork):
     """An adjusted block; the arrays that every network has are those of `AdjustedNetwork`, with k = 6.
 
@@ -169,6 +169,14 @@ class Result(AdjustedNetwork):
             unknowns=adjusted_unknowns(block, solution, scale),
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
         )
+
+    @property
+    def _what(self) -> str:
+        return f"block: {self.block.title}" if self.block.title else "block"
+
+    @property
+    def _image_unit(self) -> str:
+        return self.block.image_unit
 
     def covariances(self) -> Covariances:
         """Return an object that answers for covariances of anything with anything, from one factor.
