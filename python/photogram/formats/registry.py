@@ -33,6 +33,7 @@ FORMATS: dict[str, Format] = {
         "bingo",
         "dbat",
         "giant",
+        "results",
     )
 }
 """By name, in the order in which help lists them."""
