@@ -7,6 +7,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from fuzz.networks import random_network
 from photogram import (
     Camera,
     InnerConstraints,
@@ -142,6 +143,16 @@ def test_it_says_the_same(pair):
     for name in ("photo", "point", "image", "control", "station"):
         one, two = (getattr(each, f"{name}_table")() for each in (result, again))
         assert one.equals(two)
+
+
+@pytest.mark.parametrize("number", range(0, 42, 3))
+def test_random_networks_of_every_kind_come_back(number, tmp_path):
+    network = random_network(5, number)
+    result = adjust(network.block, datum=network.datum)
+    result.to_parquet(tmp_path)
+    again = read_result(tmp_path)
+    compare(result, again)
+    assert again.report() == result.report()
 
 
 def test_unknowns_in_common_are_one_object_again():
