@@ -11,7 +11,7 @@ import typer
 
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.job import Job, Writes, with_job
-from photogram.cli.maps import CloudFile, Crs, MapFile, check_maps, drawn_maps
+from photogram.cli.maps import CloudFile, CloudOrigin, Crs, MapFile, check_maps, drawn_maps, point_clouds
 from photogram.cli.options import (
     JsonFile,
     Ordering,
@@ -85,6 +85,7 @@ def adjust(
     crs: Crs = None,
     map: MapFile = None,  # noqa: A002  # as the option is called
     ply: CloudFile = None,
+    ply_origin: CloudOrigin = None,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -166,7 +167,8 @@ def adjust(
             {**{target / name: content for name, content in files.items()}, **pictures.of(result)},
             {} if json is None else {json: result.to_json()},
             as_data(result, parquet),
-            drawn_maps(result, map, ply, crs, _sizes(project), quiet=quiet),
+            drawn_maps(result, map, crs, _sizes(project), quiet=quiet),
+            point_clouds(result, ply, ply_origin, crs),
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )

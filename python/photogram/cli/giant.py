@@ -12,7 +12,7 @@ from rich.markup import escape
 from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.maps import CloudFile, MapFile, check_maps, drawn_maps
+from photogram.cli.maps import CloudFile, CloudOrigin, MapFile, check_maps, drawn_maps, point_clouds
 from photogram.cli.options import (
     JsonFile,
     Ordering,
@@ -80,6 +80,7 @@ def giant(
     parquet: ParquetFolder = None,
     map: MapFile = None,  # noqa: A002  # as the option is called
     ply: CloudFile = None,
+    ply_origin: CloudOrigin = None,
     listing: Annotated[
         Path | None,
         Writes.FILE,
@@ -202,7 +203,8 @@ def giant(
             written,
             documents,
             as_data(result, parquet),
-            drawn_maps(result, map, ply, None, quiet=quiet),
+            drawn_maps(result, map, None, quiet=quiet),
+            point_clouds(result, ply, ply_origin),
             summary=lambda: print_sections(
                 [
                     *(log.sections() if log else []),
