@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import print_remark, print_sections
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.maps import CloudFile, CloudOrigin, Crs, MapFile, check_maps, drawn_maps, point_clouds
 from photogram.cli.options import (
@@ -74,11 +75,14 @@ def adjust(
         Path | None,
         Writes.DIRECTORY,
         out_option(
-            "Directory for report.txt, the tables of the result, and the adjusted project in `adjusted/`."
+            "Directory for report.html, report.txt, the tables of the result, and the adjusted project in"
+            " `adjusted/`."
             " Default: PATH-adjusted."
         ),
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
     parquet: ParquetFolder = None,
@@ -124,9 +128,11 @@ def adjust(
     """
     path = project_path(job, path)
     target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
+    place = html_place(html, no_html, target)
     with job:
         from photogram import Result
         from photogram.formats.additions import self_calibrated
+        from photogram.show.ways import page_of
 
         check_maps(map)
         pictures = Pictures(job, plots, plot_format, target)
@@ -163,8 +169,9 @@ def adjust(
             files["removed.csv"] = removed.table().to_csv(index=False).encode()
             files["report.txt"] += removed.report().encode()
         taken = [] if removed is None else removed.sections()
+        page = html_files(job, "adjust", place, html is not None, lambda: page_of(removed or result))
         job.finish(
-            {**{target / name: content for name, content in files.items()}, **pictures.of(result)},
+            {target / name: content for name, content in files.items()} | pictures.of(result) | page,
             {} if json is None else {json: result.to_json()},
             as_data(result, parquet),
             drawn_maps(result, map, crs, _sizes(project), quiet=quiet),

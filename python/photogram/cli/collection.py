@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +11,7 @@ import typer
 
 from photogram.cli.components import COMPONENTS, Components, estimated, with_components
 from photogram.cli.console import print_sections
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.maps import CloudFile, CloudOrigin, point_clouds
 from photogram.cli.options import (
@@ -74,7 +76,8 @@ def collection(
         Path | None,
         Writes.DIRECTORY,
         out_option(
-            "Directory for report.txt and the adjusted collection: adjusted.txt, or adjusted.out for a Bundle"
+            "Directory for report.html, report.txt and the adjusted collection: adjusted.txt, or"
+            " adjusted.out for a Bundle"
             " file, packed as FILE is."
             " Default: no files."
         ),
@@ -83,6 +86,8 @@ def collection(
         Path | None, Writes.FILE, Former("--out DIR writes the report there"), typer.Option(hidden=True)
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
     parquet: ParquetFolder = None,
@@ -132,6 +137,7 @@ def collection(
         from photogram.collection.formats import recognised
         from photogram.collection.report import summary
         from photogram.collection.snooping import snoop_collection
+        from photogram.show.ways import page_of
 
         if problem is None:
             problem = job.packaged(*EXAMPLE)
@@ -141,7 +147,8 @@ def collection(
         names = [] if out is None else [out / "report.txt", out / f"adjusted{found.suffix}{packing}"]
         if components and out is not None:
             names.append(out / COMPONENTS)
-        job.writes(*names)
+        place = html_place(html, no_html, out)
+        job.writes(*names, *([place] if place else []))
         pictures = Pictures(job, plots, plot_format, out)
         photos = photos.replace(image_sd=sd)
         if snoop and (loss is not Loss.SQUARES or components):
@@ -172,6 +179,9 @@ def collection(
             written[out / COMPONENTS] = estimates.report().encode()
         if report is not None:
             written[report] = told.report().encode()
+        written |= html_files(
+            job, "collection", place, html is not None, lambda: replace(page_of(told), title=problem.name)
+        )
         if json is not None:
             written[json] = told.to_json()
         sections = [

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
 from photogram.cli.console import SHOWN, errors, print_sections
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.maps import CloudFile, CloudOrigin, MapFile, check_maps, drawn_maps, point_clouds
 from photogram.cli.options import (
@@ -75,6 +76,8 @@ def giant(
         ),
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
     parquet: ParquetFolder = None,
@@ -153,12 +156,14 @@ def giant(
 ) -> None:
     """Adjust a GIANT project: photographs, points and their covariances.
 
-    Writes FRAMES and GROUND (adjusted, when converged), RESTART (stations of the last iteration), report.txt.
+    Writes FRAMES and GROUND (adjusted, when converged), RESTART (stations of the last iteration), report.html
+    and report.txt.
     """
     with job:
         from photogram.errors import AdjustmentError
         from photogram.giant import Limits, read_project
         from photogram.results.report import summary
+        from photogram.show.ways import page_of
 
         check_maps(map)
         if directory is None:
@@ -166,7 +171,9 @@ def giant(
             job.reads(directory)
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
-        job.writes(*(out / name for name in RESULTS), *([out / COMPONENTS] if components else []))
+        place = html_place(html, no_html, out)
+        others = [*([out / COMPONENTS] if components else []), *([place] if place else [])]
+        job.writes(*(out / name for name in RESULTS), *others)
         pictures = Pictures(job, plots, plot_format, out)
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
@@ -191,7 +198,7 @@ def giant(
         if found is not None:
             written[out / COMPONENTS] = found.report().encode()
         written |= pictures.of(result)
-        documents = {}
+        documents = html_files(job, "giant", place, html is not None, lambda: page_of(log or result))
         if json is not None:
             documents[json] = (log or result).to_json()
         if listing is not None:

@@ -3,6 +3,7 @@
 from photogram.results import (  # noqa: F401  (the ways to show a result)
     document,
     findings,
+    html,
     judged,
     pictured,
     report,

@@ -18,6 +18,9 @@ from photogram.statistics.verdict import Verdict, verdict
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram.show.page import Page
+    from photogram.show.run import Run
+
 __all__ = [
     "Judged",
     "Shown",
@@ -25,6 +28,8 @@ __all__ = [
     "document_of",
     "files_of",
     "findings_of",
+    "html_of",
+    "page_of",
     "picture_of",
     "report_of",
 ]
@@ -64,6 +69,21 @@ def picture_of(result: object) -> bytes:
 
 
 @singledispatch
+def page_of(result: object) -> Page:
+    """Return the report of a result for the browser, without its last section."""
+    _undefined(result, "page")
+
+
+def html_of(result: object, run: Run | None = None) -> bytes:
+    """Return the report of a result as one HTML file; `run` is the run of the command that made it."""
+    from photogram.show.html import page_html
+    from photogram.show.run import reproducibility
+
+    page = page_of(result)
+    return page_html(page.with_sections(reproducibility(run, page.phases)))
+
+
+@singledispatch
 def findings_of(result: object) -> Findings:
     """Return what the verdict on a result rests on."""
     _undefined(result, "verdict")
@@ -92,6 +112,13 @@ class Shown(Judged):
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
         return document_of(self)
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return what the result says about one kind of thing as a data frame.
