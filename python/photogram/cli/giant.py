@@ -161,6 +161,7 @@ def giant(
     """
     with job:
         from photogram.errors import AdjustmentError
+        from photogram.formats.planes import plane_remarks
         from photogram.giant import Limits, read_project
         from photogram.results.report import summary
         from photogram.show.ways import page_of
@@ -180,6 +181,7 @@ def giant(
         block = _refracted(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
+        project = replace(project, messages=[*project.messages, *plane_remarks(block, directory)])
         if snoop and (as_published or components or project.common.intersection_only):
             refused = "not with --as-published, --components or an intersection"
             raise typer.BadParameter(refused, param_hint="--snoop")

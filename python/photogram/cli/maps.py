@@ -53,7 +53,7 @@ CloudOrigin = Annotated[
     typer.Option(
         "--ply-origin",
         metavar="X Y Z",
-        help="Taken away from the coordinates of --ply, for viewers that want small numbers; a comment says it.",
+        help="Taken away from the coordinates of --ply, for viewers that want small ones; a comment says it.",
         show_default=False,
     ),
 ]
