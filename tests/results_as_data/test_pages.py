@@ -54,6 +54,11 @@ def test_a_folder_that_is_the_input_is_refused(run):
     done = run("adjust", "quarry", "--parquet", "quarry/images.csv")
     assert done.exit_code == 1
     assert "is not a directory" in done.output
+    for place in ("quarry", "./quarry/"):
+        done = run("adjust", "quarry", "--parquet", place)
+        assert done.exit_code == 1
+        assert "the results would be written over the input" in " ".join(done.output.split())
+    assert not list(Path("quarry").glob("*.parquet"))
 
 
 def test_a_result_is_a_project_to_go_on_with(run):
