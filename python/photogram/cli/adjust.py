@@ -134,9 +134,9 @@ def adjust(
         from photogram.formats.additions import self_calibrated
         from photogram.show.ways import page_of
 
-        check_maps(map)
         pictures = Pictures(job, plots, plot_format, target)
         project = read_project(job, path, added)
+        check_maps(map)  # now that all inputs are known, which it must not be
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
         sections = described(project)
