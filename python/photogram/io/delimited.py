@@ -27,7 +27,7 @@ from photogram.io.places import Place
 from photogram.io.rows import LONGEST_RECORD
 from photogram.messages import listed, quoted
 
-__all__ = ["ColumnTable", "Names", "read_columns", "read_rows"]
+__all__ = ["FALSE", "TRUE", "ColumnTable", "Names", "read_columns", "read_rows"]
 
 DELIMITERS = ("\t", ";", ",", "|")
 """In this order; blanks where a header has none of them."""
@@ -35,7 +35,7 @@ LARGE = 1 << 20
 """Bytes from which a table is worth the parser of pandas."""
 COMMENT = "#"
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
-_TRUE, _FALSE = frozenset({"true", "yes", "1", "t", "y"}), frozenset({"false", "no", "0", "f", "n"})
+TRUE, FALSE = frozenset({"true", "yes", "1", "t", "y"}), frozenset({"false", "no", "0", "f", "n"})
 
 
 @dataclass(frozen=True)
@@ -207,9 +207,9 @@ class ColumnTable:
         if column in self.columns:
             for row, cell in enumerate(self.texts(column)):
                 word = cell.lower()
-                if word and word not in _TRUE | _FALSE:
+                if word and word not in TRUE | FALSE:
                     raise self.error(row, f"column {column}: {quoted(cell)} is neither true nor false")
-                values[row] = word in _TRUE if word else default
+                values[row] = word in TRUE if word else default
         return values
 
 

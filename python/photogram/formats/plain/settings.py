@@ -26,14 +26,26 @@ TABLES = (
     "points",
     "control",
     "distances",
+    "instruments",
     "height_differences",
     "coordinate_differences",
+    "levels",
+    "level_points",
+    "planes",
+    "plane_points",
+    "lines",
+    "line_points",
+    "plumb_lines",
+    "plumb_line_points",
     "gnss",
     "gnss_groups",
     "attitudes",
     "attitude_groups",
+    "relative_poses",
     "rigs",
     "frames",
+    "bases",
+    "covariances",
 )
 """In the order in which they are read and written."""
 WITH_CRS = ("control", "gnss", "points", "photos")
@@ -47,7 +59,14 @@ WITH_SD = (
     "distances",
     "height_differences",
     "coordinate_differences",
+    "level_points",
+    "plane_points",
+    "line_points",
+    "plumb_line_points",
+    "bases",
 )
+WITH_THREE = ("control", "points", "gnss", "photos", "attitudes", "coordinate_differences")
+"""Of these those that may have three; images may have two, all others have one."""
 ENDINGS = (".csv", ".tsv", ".txt", ".parquet")
 
 _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
@@ -300,7 +319,7 @@ class _File:
 
     def deviations(self, table: str) -> tuple[float, ...]:
         """Return standard deviations of a table."""
-        counts = (1, 2) if table == "images" else (1,) if table.endswith("ances") else (1, 3)
+        counts = (1, 2) if table == "images" else (1, 3) if table in WITH_THREE else (1,)
         found = self.numbers("sd", table, counts)
         if not all(each >= 0 for each in found):
             self.fail(table, f"{list(found)} is no standard deviation")
