@@ -11,7 +11,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -117,6 +117,8 @@ class ColumnTable:
         found = self.ready.get(column)
         if not isinstance(found, Names):
             found = _factorised(self.cells[column])
+        if _all_apart(found.names):
+            return found
         for name in found.names:
             if not name or name.lower() == "nan":
                 row = int(np.flatnonzero(found.rows == found.names.index(name))[0])
@@ -303,8 +305,7 @@ def _text(path: Path) -> str:
 def _head(path: Path, text: str, known: Collection[str], spelling: Callable[[str], str]) -> tuple[Place, str]:
     """Find the header: the first line, or the last comment before it where only that names known columns."""
     comment: Place | None = None
-    for record, line in enumerate(io.StringIO(text), 1):
-        line = line.rstrip("\n")
+    for record, line in enumerate(_lines(text), 1):
         if line.lstrip().startswith(COMMENT):
             comment = Place(path, record, line.lstrip()[1:])
             continue
@@ -320,6 +321,16 @@ def _head(path: Path, text: str, known: Collection[str], spelling: Callable[[str
     if comment is not None and _knows(comment, known, spelling):
         return comment, _delimiter(comment)
     raise Place(path).error("holds no table")
+
+
+def _lines(text: str) -> Iterator[str]:
+    """Yield the lines of a text, without a copy of what nobody asks for."""
+    start = 0
+    while (end := text.find("\n", start)) >= 0:
+        yield text[start:end]
+        start = end + 1
+    if start < len(text):
+        yield text[start:]
 
 
 def _knows(place: Place, known: Collection[str], spelling: Callable[[str], str]) -> bool:
@@ -433,8 +444,20 @@ def _by_pandas(
     return ColumnTable(path, head, tuple(columns), count, {}, records, delimiter, ready)
 
 
+def _all_apart(names: Sequence[str]) -> bool:
+    """Whether names are surely all right: without blanks, and different when case is put aside."""
+    text = "\n".join(names).casefold()
+    words = text.split()
+    if len(words) < len(names) or text.count("\n") >= len(names):
+        return False
+    different = set(words)
+    return len(different) == len(names) == len(words) and "nan" not in different
+
+
 def _merged(codes: Indices, texts: list[str]) -> Names:
     """Return names of which those that were alike but for blanks at their ends are one."""
+    if len(set(texts)) == len(texts):
+        return Names(texts, codes)
     found = _factorised(texts)
     return Names(found.names, found.rows[codes])
 
