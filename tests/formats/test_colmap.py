@@ -276,6 +276,57 @@ def test_the_package_reads_what_is_written(pycolmap, tmp_path, target):
     assert theirs.compute_num_observations() == len(project.block.image_xy)
 
 
+def cost_of(model):
+    """Return the sum of squared residuals of a model of the package, pixels."""
+    return sum(
+        float(np.sum((image.project_point(model.points3D[own.point3D_id].xyz) - own.xy) ** 2))
+        for image in model.images.values()
+        for own in image.points2D
+        if own.has_point3D()
+    )
+
+
+@pytest.mark.parametrize("calibrated", [False, True])
+def test_one_command_finds_the_cost_of_the_package_and_all_covariances(pycolmap, run, tmp_path, calibrated):
+    pycolmap.set_random_seed(5)
+    options = pycolmap.SyntheticDatasetOptions()
+    options.num_rigs, options.num_cameras_per_rig, options.num_frames_per_rig = 2, 1, 7
+    options.num_points3D = 120
+    model = pycolmap.synthesize_dataset(options)
+    noise = pycolmap.SyntheticNoiseOptions()
+    noise.point2D_stddev, noise.point3D_stddev = 0.6, 0.01
+    pycolmap.synthesize_noise(noise, model)
+    (tmp_path / "model").mkdir()
+    model.write_binary(str(tmp_path / "model"))
+    more = ("--self-calibrate", "all") if calibrated else ()
+    done = run("adjust", "model", "--datum", "inner", "--sd", "images=0.6", *more, "--json", "result.json")
+    assert done.exit_code in (0, 4), done.output
+    chosen = pycolmap.BundleAdjustmentOptions()
+    chosen.refine_focal_length = chosen.refine_principal_point = chosen.refine_extra_params = calibrated
+    pycolmap.bundle_adjustment(model, chosen)
+    again = pycolmap.Reconstruction(str(tmp_path / "model-adjusted" / "adjusted-colmap"))
+    np.testing.assert_allclose(cost_of(again), cost_of(model), rtol=1e-3)
+    assert cost_of(again) < cost_of(model) * (1 + 1e-6)
+    place = tmp_path / "model-adjusted" / "adjusted-colmap"
+    counts = {"photo": len(again.images), "point": len(again.points3D), "camera": len(again.cameras)}
+    for kind, count in counts.items():
+        content = (place / f"{kind}_covariances.bin").read_bytes()
+        assert struct.unpack_from("<Q", content) == (count,)
+    photos = np.frombuffer(
+        (place / "photo_covariances.bin").read_bytes(), [("id", "<u4"), ("c", "<f8", 21)], counts["photo"], 8
+    )
+    points = np.frombuffer(
+        (place / "point_covariances.bin").read_bytes(), [("id", "<u8"), ("c", "<f8", 6)], counts["point"], 8
+    )
+    for table, diagonal in ((photos, [0, 2, 5, 9, 14, 20]), (points, [0, 2, 5])):
+        assert np.isfinite(table["c"]).all()
+        assert (table["c"][:, diagonal] > 0).all()
+    assert set(photos["id"].tolist()) == set(again.images)
+    assert set(points["id"].tolist()) == set(again.points3D)
+    deviations = json.loads((tmp_path / "result.json").read_text())["cameras"]
+    assert len(deviations) == counts["camera"]
+
+
 def test_a_model_of_the_package_adjusts_to_the_cost_of_its_own_adjustment(pycolmap, tmp_path):
     pycolmap.set_random_seed(3)
     options = pycolmap.SyntheticDatasetOptions()

@@ -339,6 +339,15 @@ def test_tables_of_parquet_are_read_as_those_of_text(example):
     other = formats.read(example)
     assert other.block.point_ids == plain.block.point_ids
     np.testing.assert_array_equal(other.block.image_xy, plain.block.image_xy)
+    # Names of digits are whole numbers in many tables; each group of rows has a dictionary of its own.
+    of_name = {name: 100 + row for row, name in enumerate(dict.fromkeys(columns["point"]))}
+    digits = [of_name[name] for name in columns["point"]]
+    numbered = pyarrow.table({**columns, "point": pyarrow.array(digits, pyarrow.int32())})
+    parquet.write_table(numbered, example / "images.parquet", row_group_size=7)
+    (example / "control.csv").unlink(), (example / "distances.csv").unlink()
+    found = formats.read(example).block
+    np.testing.assert_array_equal(found.image_xy, plain.block.image_xy)
+    assert [found.point_ids[row] for row in found.image_points] == list(map(str, digits))
     columns["point"] = [*columns["point"][:-1], None]
     parquet.write_table(pyarrow.table(columns), example / "images.parquet")
     with pytest.raises(InputError, match="column point: is empty"):

@@ -242,7 +242,7 @@ def read_columns(
         the header.
     """
     if path.suffix == ".parquet":
-        return _parquet(path, spelling)
+        return _parquet(path, spelling, numbers)
     text = _text(path)
     head, delimiter = _head(path, text, known, spelling)
     columns = tuple(spelling(cell.strip().lower()) for cell in _split(head, delimiter))
@@ -468,7 +468,7 @@ def _factorised(cells: Sequence[str]) -> Names:
     return Names(list(places), rows)
 
 
-def _parquet(path: Path, spelling: Callable[[str], str]) -> ColumnTable:
+def _parquet(path: Path, spelling: Callable[[str], str], numbers: Collection[str]) -> ColumnTable:
     import pyarrow
     import pyarrow.compute
     import pyarrow.parquet
@@ -485,8 +485,13 @@ def _parquet(path: Path, spelling: Callable[[str], str]) -> ColumnTable:
         if columns.count(name) > 1:
             raise head.error(f"the column {quoted(name)} is there twice")
         kind = column.type
+        if pyarrow.types.is_integer(kind) and name not in numbers:
+            # Names that are digits all of them.
+            column, kind = column.cast(pyarrow.string()), pyarrow.string()
+        if pyarrow.types.is_large_string(kind):
+            column, kind = column.cast(pyarrow.string()), pyarrow.string()
         if pyarrow.types.is_dictionary(kind) or pyarrow.types.is_string(kind):
-            whole = column.combine_chunks()
+            whole = column.unify_dictionaries().combine_chunks()
             coded = whole if pyarrow.types.is_dictionary(kind) else pyarrow.compute.dictionary_encode(whole)
             texts = [str(text).strip() for text in coded.dictionary.to_pylist()]
             codes = coded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
