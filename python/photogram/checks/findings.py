@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from photogram import _photocore
 from photogram.io import json
 from photogram.show.sections import composed, headline
+from photogram.show.ways import html_of
 
 if TYPE_CHECKING:
     from photogram.results.result import Result
@@ -110,6 +111,13 @@ class Check:
         grave, look = len(self.grave), len(self.findings) - len(self.grave)
         head = f"{headline('check', self.title)}\n{grave} grave, {look} to look at"
         return composed(head, ((section.title, section.text()) for section in self.sections))
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     def to_json(self) -> bytes:
         """Return the findings as a JSON document (UTF-8); `docs/giant-check.md` lists its members."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
+from photogram.cli.html import HtmlFile, html_files
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
 from photogram.cli.projects import (
@@ -28,6 +29,7 @@ def check_project(
     path: ProjectPath = None,
     example: Example = False,
     json: JsonFile = None,
+    html: HtmlFile = None,
     added: Additions = NOTHING,
     threads: Threads = None,
     quiet: Quiet = False,
@@ -38,6 +40,7 @@ def check_project(
     """
     with job:
         from photogram import check
+        from photogram.show.ways import page_of
 
         project = read_project(job, project_path(job, path), added)
         if not quiet:
@@ -46,6 +49,7 @@ def check_project(
             found = check(project.block, threads=threads)
         job.finish(
             {} if json is None else {json: found.to_json()},
+            html_files(job, "check", html, True, lambda: page_of(found)),
             summary=lambda: output.print(escape(found.report()), end=""),
             code=NOT_CONVERGED if found.grave else 0,
         )

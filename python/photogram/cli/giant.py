@@ -11,11 +11,17 @@ from rich.markup import escape
 
 from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
 from photogram.cli.console import SHOWN, errors, print_sections
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.maps import CloudFile, MapFile, check_maps, drawn_maps
 from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -23,9 +29,11 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     default_out,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
@@ -68,6 +76,13 @@ def giant(
         ),
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
+    parquet: ParquetFolder = None,
+    map: MapFile = None,  # noqa: A002  # as the option is called
+    ply: CloudFile = None,
     listing: Annotated[
         Path | None,
         Writes.FILE,
@@ -140,19 +155,25 @@ def giant(
 ) -> None:
     """Adjust a GIANT project: photographs, points and their covariances.
 
-    Writes FRAMES and GROUND (adjusted, when converged), RESTART (stations of the last iteration), report.txt.
+    Writes FRAMES and GROUND (adjusted, when converged), RESTART (stations of the last iteration), report.html
+    and report.txt.
     """
     with job:
         from photogram.errors import AdjustmentError
         from photogram.giant import Limits, read_project
         from photogram.results.report import summary
+        from photogram.show.ways import page_of
 
+        check_maps(map)
         if directory is None:
             directory = job.packaged(EXAMPLE)
             job.reads(directory)
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
-        job.writes(*(out / name for name in RESULTS), *([out / COMPONENTS] if components else []))
+        place = html_place(html, no_html, out)
+        others = [*([out / COMPONENTS] if components else []), *([place] if place else [])]
+        job.writes(*(out / name for name in RESULTS), *others)
+        pictures = Pictures(job, plots, plot_format, out)
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         block = _refracted(
@@ -175,7 +196,8 @@ def giant(
         found = estimated(job, block, components, threads)
         if found is not None:
             written[out / COMPONENTS] = found.report().encode()
-        documents = {}
+        written |= pictures.of(result)
+        documents = html_files(job, "giant", place, html is not None, lambda: page_of(log or result))
         if json is not None:
             documents[json] = (log or result).to_json()
         if listing is not None:
@@ -186,6 +208,8 @@ def giant(
         job.finish(
             written,
             documents,
+            as_data(result, parquet),
+            drawn_maps(result, map, ply, None, quiet=quiet),
             summary=lambda: print_sections(
                 [
                     *(log.sections() if log else []),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from photogram.errors import InputError, PhotogramError
 from photogram.formats.format import Format, Wishes
+from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
 from photogram.io.files import reading
 from photogram.memory import turned
@@ -79,7 +80,8 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     chosen = recognised(path) if file_format is None else _named(file_format)
     with turned(f"reading {path}"):
         try:
-            return chosen.read(path, wishes or Wishes())
+            project = chosen.read(path, wishes or Wishes())
+            return project.replace(messages=(*project.messages, *plane_remarks(project)))
         except InputError as error:
             # What refuses arrays or systems of coordinates does not know where they came from.
             raise (error if error.file else InputError(error.message, file=path)) from None
