@@ -312,6 +312,14 @@ def test_two_files_of_one_table_and_a_missing_one(example):
         formats.read(example)
 
 
+def test_a_table_under_another_name_is_remarked_on(example):
+    assert not any("other names" in str(each) for each in formats.read(example).messages)
+    (example / "gnss.csv").rename(example / "gnns.csv")
+    (example / "wishes.csv").write_text("a,b\n")
+    (remark,) = [str(each) for each in formats.read(example).messages if "other names" in str(each)]
+    assert remark.endswith("not read: gnns.csv (did you mean gnss?), wishes.csv")
+
+
 def test_a_point_that_is_known_twice_must_be_the_same(example):
     (example / "points.csv").write_text("point,x,y,z\nsouth-1,1,2,3\n")
     with pytest.raises(InputError, match="south-1 has another x in the table points"):

@@ -52,7 +52,7 @@ def recognised(path: Path) -> Format:
 
 
 def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
-    """Return the format of what lies at a path, and where: in a folder it may be its one file that has any."""
+    """Return the format of what lies at a path, and where: in a folder its only file that has any."""
     among = list(FORMATS.values()) if file_format is None else [_named(file_format)]
     with reading(path):
         path.stat()

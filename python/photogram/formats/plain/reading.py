@@ -17,7 +17,7 @@ from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_p
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.observed import read_observations
 from photogram.formats.plain.rigs import read_frames, read_rigs
-from photogram.formats.plain.settings import Settings, read_settings
+from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.tables import ANGLES, AXES, Tables, covariances_of, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, assembled
@@ -46,7 +46,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     """
     settings = read_settings(path / SETTINGS if path.is_dir() else path)
     settings = replace(settings, sd={**settings.sd, **wishes.sd})
-    tables = Tables(settings, [])
+    tables = Tables(settings, unread_tables(settings))
     if "images" not in settings.tables:
         raise InputError("has no table of images (images.csv)", file=settings.path)
     transform = Transform(settings, tables.messages)

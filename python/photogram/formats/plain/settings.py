@@ -15,8 +15,9 @@ from photogram.errors import InputError
 from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
+from photogram.messages import Message, listed
 
-__all__ = ["TABLES", "Settings", "bare_settings", "read_settings"]
+__all__ = ["TABLES", "Settings", "bare_settings", "read_settings", "unread_tables"]
 
 VERSION = 1
 TABLES = (
@@ -329,6 +330,22 @@ class _File:
 def _nearest(word: str, known: Any) -> str:
     close = difflib.get_close_matches(word, list(known), 1, 0.5)
     return f"; did you mean {close[0]}?" if close else f", but {', '.join(known)}"
+
+
+def unread_tables(settings: Settings) -> list[Message]:
+    """Return a remark on tables beside the settings that no table is called, with the nearest names."""
+    used = {path.resolve() for path in settings.tables.values()}
+    others = [
+        path
+        for path in sorted(settings.path.parent.iterdir())
+        if path.suffix in ENDINGS and path.suffix != ".txt" and path.resolve() not in used
+    ]
+    if not others:
+        return []
+    close = {path.name: difflib.get_close_matches(path.stem.lower(), TABLES, 1, 0.75) for path in others}
+    meant = [f"{name} (did you mean {each[0]}?)" for name, each in close.items() if each]
+    rest = [name for name, each in close.items() if not each]
+    return [Message(f"tables of other names are not read: {listed([*meant, *rest])}", settings.path)]
 
 
 def _tables(file: _File) -> dict[str, Path]:
