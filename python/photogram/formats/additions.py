@@ -238,9 +238,8 @@ def with_control(
         table = listed_control.control
         settings = replace(settings, crs={"control": crs or listed_control.crs})
         tables = Tables(settings, listed_control.messages)
-        project = _with_table(
-            project, path, _new_images(project, _known_photos(project, listed_control)), None
-        )
+        images = _new_images(project, _known_photos(project, listed_control))
+        project = _with_table(project, path, images, None)
     transform = Transform(settings, tables.messages)
     given = read_control(tables, table, transform)
     block = project.block
