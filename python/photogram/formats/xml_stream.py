@@ -23,7 +23,7 @@ __all__ = ["Element", "read_stream", "root_of"]
 
 PIECE = 1 << 16
 DEEPEST = 200
-_PACKED_BADLY = (zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError)
+_PACKED_BADLY = (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError)
 """What archives that are damaged, or packed in other ways, end in."""
 
 
