@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from damaged import check_damaged
 from test_plain_project import EXAMPLE, change, written
 
 from fuzz.networks import KINDS, random_network
@@ -157,6 +158,11 @@ def test_a_fault_is_named_with_file_row_and_column(facade, file, old, new, words
         formats.read(facade)
     for word in (f"{file}.csv", *words):
         assert word in str(refused.value)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_damaged_tables_end_in_a_message(facade, tmp_path, seed):
+    assert check_damaged(facade, tmp_path / "damaged", "plain", 125, 20 + seed) > 40
 
 
 RIGS = """rig,sensor,camera,x,y,z,omega,phi,kappa,sd_x
