@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
-from photogram.results.covariance import Covariances, Propagated
+from photogram.results.covariance import Covariances
 from photogram.results.datum import (
     ResultDatum,
     datum_messages,
@@ -29,8 +28,8 @@ from photogram.results.datum import (
 )
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.reliability import Reliability
-from photogram.results.selection import Adjusted, Selection, photo_components, point_components
+from photogram.results.reliability import Reliability, reliability_of
+from photogram.results.selection import Adjusted, photo_components, point_components
 from photogram.results.suspects import network_trial
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
@@ -121,6 +120,9 @@ class Result(AdjustedNetwork):
         What coordinates and standard deviations refer to.
     options, state
         How the core adjusted the block, and where that ended: what covariances are computed from.
+    hints
+        Mistakes in conventions (units, axes, signs, angles) that would explain why images do not fit, as
+        sentences; see :func:`photogram.hints`. They head the verdict.
     """
 
     block: Block
@@ -139,6 +141,7 @@ class Result(AdjustedNetwork):
     datum: ResultDatum
     options: CoreOptions
     state: _photocore.BlockState
+    hints: tuple[str, ...] = ()
 
     @classmethod
     def from_solution(
@@ -158,6 +161,7 @@ class Result(AdjustedNetwork):
             block=block.kept(),
             messages=messages,
             loss=options.loss,
+            hints=(),
             options=options,
             datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
@@ -179,34 +183,14 @@ class Result(AdjustedNetwork):
         return self.block.image_unit
 
     def covariances(self) -> Covariances:
-        """Return an object that answers for covariances of anything with anything, from one factor.
-
-        The normal equations are formed and factored once, at the adjusted values; the object keeps the
-        factor, as long as you keep the object.
-
-        Raises
-        ------
-        OutOfMemoryError
-            The factor would take more memory than there is.
-        KeyboardInterrupt
-            Ctrl-C.
-        """
-        network = block_network(self.block, self.options)
-        return Covariances(adjusted(self), network, self.state, self.covariance_scale)
-
-    def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
-        """Return the joint covariance matrix of a selection, or that of one with another.
-
-        For several questions ask one object: :meth:`covariances`, which says what a selection is and what
-        errors there are.
-        """
-        return self.covariances().covariance(a, b)
-
-    def propagate(
-        self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
-    ) -> Propagated:
-        """Return a function of adjusted unknowns with its covariance; see `Covariances.propagate`."""
-        return self.covariances().propagate(function, unknowns, bias=bias)
+        """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`."""
+        network, state = block_network(self.block, self.options), self.state
+        return Covariances(
+            adjusted(self),
+            lambda: network.covariances(state, threads=0, progress=None),
+            lambda error: refused(self.block, network, state, error),
+            self.covariance_scale,
+        )
 
     def reliability(
         self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
@@ -229,11 +213,9 @@ class Result(AdjustedNetwork):
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
-        one_of("unit_weight", unit_weight, ("known", "unknown"))
         core = block_network(self.block, self.options).trial(self.state, threads=0)
         trial = network_trial(self.block, core)
-        known = unit_weight == "known"
-        return Reliability(trial, self.covariances, level=level, power=power, known=known)
+        return reliability_of(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
 
     def restarted(self) -> Block:
         """Return the block as it was given, but with free photos and cameras where the adjustment has ended.
@@ -310,6 +292,11 @@ class Result(AdjustedNetwork):
         table = super()._table(what)
         table.attrs["datum"] = str(self.datum)
         return table
+
+    @property
+    def geographic(self) -> bool:
+        """Whether plan coordinates are angles."""
+        return self.block.geographic
 
     @property
     def image_points(self) -> Indices:
@@ -424,7 +411,7 @@ def adjusted(result: Result) -> Adjusted:
     # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
     cameras, unknowns = result.cameras, result.unknowns
     return Adjusted(
-        block=block,
+        network="block",
         ids={
             "photo": block.photo_ids,
             "step": block.photo_ids,
