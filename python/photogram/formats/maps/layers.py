@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.crs import amid, enu_origin, has_place
+from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
 from photogram.formats.placing import Placed, frame_of, placed
 from photogram.results.ellipses import CONFIDENCE, ellipses, fitting_scale
 from photogram.results.findings import axes
@@ -145,7 +145,7 @@ def map_layers(
             *_suspicious(found),
         ),
     ]
-    system = None if not found.crs or enu_origin(found.crs) is not None else found.crs
+    system = None if not found.crs or enu_origin(found.crs) is not None else without_geoid(found.crs)
     layers = []
     for name, description, geometries, columns in parts:
         scaled = name in ("point_ellipses", "control_residuals", "check_residuals")
