@@ -165,22 +165,22 @@ impl AtHome {
         let start = Instant::now();
         let layout = &system.layout;
         let stacks = system.incidence.stacks_at(index);
-        let part = |stacks: Stacks<'_>| {
-            let (mut stack, mut others) = (Stack::default(), Others { by_group, ..Others::default() });
+        let room = || (Stack::default(), Others { by_group, ..Others::default() });
+        let part = |(stack, others): &mut (Stack, Others), stacks: Stacks<'_>| {
             let mut part = Self::default();
             for run in stacks.iter().take_while(|_| !control.stopped()) {
                 stack.gather(system, equations, run);
                 stack.eliminate(layout, prior, 0.0);
-                others.gather(&stack, front, height);
-                others.cofactors(&stack, layout, &mut part);
+                others.gather(stack, front, height);
+                others.cofactors(stack, layout, &mut part);
                 control.count(run.len());
             }
             part
         };
         let mut found = if stacks.locals() < MANY {
-            part(stacks)
+            part(&mut room(), stacks)
         } else {
-            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map(part).collect();
+            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map_init(room, part).collect();
             parts.into_iter().fold(Self::default(), |mut all, part| {
                 all.local.extend(part.local);
                 all.equations.extend(part.equations);
