@@ -37,3 +37,24 @@ def test_a_good_ray_goes_only_where_the_bad_one_is_named_beside_it(seed):
     named |= {rival.name for entry in snooped.removed for rival in entry.in_dispute}
     assert len(bad & named) >= 0.9 * len(bad) > 20
     assert 0.8 < snooped.result.variance_of_unit_weight < 1.25
+
+
+@pytest.mark.parametrize(("seed", "names"), [(1000, False), (1001, False), (1005, False), (1001, True)])
+def test_a_photo_whose_every_image_is_bad_is_one_group(seed, names):
+    """Names of all points scrambled, or images that are off by 30 standard deviations."""
+    block, _ = planted(seed, 0.0)
+    random = np.random.default_rng([seed, 9])
+    photo = int(random.integers(len(block.photo_ids)))
+    own = np.flatnonzero(block.image_photos == photo)
+    xy = block.image_xy.copy()
+    if names:
+        xy[own] = xy[random.permutation(own)]
+    else:
+        xy[own] += 30 * block.image_sd[own] * random.normal(size=(len(own), 2))
+    snooped = photogram.snoop(block.replace(image_xy=xy))
+    assert [entry.name for entry in snooped.removed] == [f"all of photo {block.photo_ids[photo]}"]
+    (entry,) = snooped.removed
+    assert "median" in entry.consequences[0]
+    assert entry.dimension > len(own)
+    assert entry.log_probability < -100
+    assert 0.8 < snooped.result.variance_of_unit_weight < 1.25
