@@ -35,6 +35,14 @@ COMMANDS = {
     ),
     "check EXAMPLES/project --html report.html": (".", ["Verdict", "Plan of the network", "Reproducibility"]),
     "giant check EXAMPLES/galveston --html report.html": (".", ["Verdict", "Findings", "Key numbers"]),
+    "absolute-orientation --example --out out": (
+        "out",
+        ["Residuals in plan", "Parameters", "Control", "Tests", "Transformed points", "Iterations"],
+    ),
+    "perspective-center --example --out out": (
+        "out",
+        ["Residuals and distortion", "Perspective centre and attitude", "Points", "Iterations"],
+    ),
 }
 """Commands, where their report goes, and sections that it has."""
 

@@ -77,7 +77,9 @@ _NEXT = {
         " deviations, unless values were smoothed or used twice.",
     ),
     "accepted": (),
-    "not-tested": ("The tests of single observations and the check points have to do.",),
+    "not-tested": (
+        "Give standard deviations where they are known: the residuals as a whole are tested then, too.",
+    ),
 }
 """What follows from the condition that gave the headline, in the words of a program."""
 
