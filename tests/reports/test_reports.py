@@ -39,6 +39,18 @@ COMMANDS = {
         "out",
         ["Residuals in plan", "Parameters", "Control", "Tests", "Transformed points", "Iterations"],
     ),
+    "comparator --example": (
+        "comparator-calibrated",
+        ["Where the errors come from", "Pictures", "Linear parameters", "Polynomials", "Cases", "Tests"],
+    ),
+    "stellar-camera --example": (
+        "plate-calibrated",
+        ["Stars and residuals", "How much, how good", "Parameters", "Worst observations", "Distortion"],
+    ),
+    "stellar-camera exposures --example": (
+        "night-calibrated",
+        ["Stars and residuals", "Camera", "Exposures", "Lens", "Worst observations", "Tests"],
+    ),
     "perspective-center --example --out out": (
         "out",
         ["Residuals and distortion", "Perspective centre and attitude", "Points", "Iterations"],

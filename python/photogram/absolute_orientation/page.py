@@ -64,6 +64,10 @@ def _advice(result: Orientation) -> list[str]:
     others = []
     if result.degrees_of_freedom == 0:
         others.append("Seven known coordinates are just enough: one more makes errors visible.")
+    if not result.weighted and result.usable:
+        others.append(
+            "Give standard deviations where they are known: the residuals are tested as a whole then."
+        )
     if result.alternatives:
         scale = significant(result.alternatives[0].scale, 6)
         others.append(

@@ -77,9 +77,7 @@ _NEXT = {
         " deviations, unless values were smoothed or used twice.",
     ),
     "accepted": (),
-    "not-tested": (
-        "Give standard deviations where they are known: the residuals as a whole are tested then, too.",
-    ),
+    "not-tested": (),
 }
 """What follows from the condition that gave the headline, in the words of a program."""
 
