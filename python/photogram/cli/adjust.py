@@ -137,6 +137,7 @@ def adjust(
 
         pictures = Pictures(job, plots, plot_format, target)
         project = read_project(job, path, added)
+        project = project.replace(path=job.shown(project.path), messages=tuple(job.told(project.messages)))
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
         sections = described(project)

@@ -179,7 +179,7 @@ def collection(
         if json is not None:
             written[json] = told.to_json()
         sections = [
-            ("File", [f"{problem}: {found.title}"]),
+            ("File", [f"{job.shown(problem)}: {found.title}"]),
             *(log.sections() if log else []),
             *with_components(summary(result), estimates)[1 if log else 0 :],
         ]

@@ -172,6 +172,7 @@ def giant(
         block = _refracted(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
+        project.messages[:] = job.told(project.messages)
         if snoop and (as_published or components or project.common.intersection_only):
             refused = "not with --as-published, --components or an intersection"
             raise typer.BadParameter(refused, param_hint="--snoop")
