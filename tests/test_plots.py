@@ -1,5 +1,6 @@
 """Pictures of results: axes in and out, all kinds of networks, nothing over anything else, equal files."""
 
+import re
 import subprocess
 import sys
 from importlib.resources import files
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from example_scripts import load
+from example_scripts import EXAMPLES, load
 from photogram import adjust, collection, simulate
 from photogram.errors import InputError
 from photogram.giant import read_project
@@ -17,6 +18,7 @@ from photogram.plots import PICTURES, figures, picture_files
 from photogram.plots.cells import cells
 from photogram.plots.panels import labels
 from photogram.plots.pictured import pictured
+from photogram.show.pictures import drawn
 
 ALWAYS = {"network", "residuals", "redundancy", "tests"}
 
@@ -165,10 +167,11 @@ def test_a_lens_that_was_left_out_shows_in_the_means_of_the_cells(large):
     assert "are larger than chance gives" not in written(figures(large, ["residuals"])["residuals"])
 
 
-def test_equal_results_give_equal_files(ring, tmp_path):
-    for ending in ("png", "svg"):
-        first, second = (picture_files(ring, tmp_path, ending) for _ in range(2))
-        assert first == second
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_equal_results_give_equal_files(ring, ending):
+    path = Path(f"network.{ending}")
+    first, second = (drawn(figures(ring, ["network"])["network"], path) for _ in range(2))
+    assert first == second
 
 
 def test_saved_pictures_are_all_there(calibrated, tmp_path):
@@ -208,3 +211,23 @@ def test_an_adjustment_loads_no_matplotlib():
         " r.plot; assert 'matplotlib' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_page_quotes_the_example_and_shows_pictures_that_are_there():
+    root = Path(__file__).parents[1]
+    command = [sys.executable, root / "docs" / "regenerate.py", "--check", "pictures.md"]
+    assert subprocess.run(command, check=False).returncode == 0
+    page = (root / "docs" / "pictures.md").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[[^\]]+\]\(pictures/(\w+)\.svg\)", page)
+    assert sorted(shown) == sorted(PICTURES)
+    for name in shown:
+        assert 5_000 < (root / "docs" / "pictures" / f"{name}.svg").stat().st_size < 200_000
+
+
+def test_the_example_writes_all_pictures(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLES)
+    load("pictures").main([str(tmp_path)])
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "side-by-side.png",
+        *(f"{name}.svg" for name in PICTURES),
+    }

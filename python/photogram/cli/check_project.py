@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
 from rich.markup import escape
 
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
 from photogram.cli.html import HtmlFile, html_files
-from photogram.cli.job import Job, Reads, with_job
+from photogram.cli.job import Job, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
-from photogram.cli.projects import NOTHING, Additions, described, read_project, with_additions
+from photogram.cli.projects import (
+    NOTHING,
+    Additions,
+    Example,
+    ProjectPath,
+    described,
+    project_path,
+    read_project,
+    with_additions,
+)
 
 __all__ = ["check_project"]
 
@@ -21,7 +26,8 @@ __all__ = ["check_project"]
 @with_additions()
 def check_project(
     job: Job,
-    path: Annotated[Path, Reads.FILE, typer.Argument(metavar="PATH", help="A project: a folder or file.")],
+    path: ProjectPath = None,
+    example: Example = False,
     json: JsonFile = None,
     html: HtmlFile = None,
     added: Additions = NOTHING,
@@ -36,7 +42,7 @@ def check_project(
         from photogram import check
         from photogram.show.ways import page_of
 
-        project = read_project(job, path, added)
+        project = read_project(job, project_path(job, path), added)
         if not quiet:
             print_sections(described(project), "`photogram info`")
         with job.status("checking"):

@@ -17,6 +17,7 @@ from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     PictureFormat,
     PlotFormat,
     Plots,
@@ -27,6 +28,7 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     out_option,
 )
 from photogram.cli.pictures import Pictures
@@ -87,6 +89,7 @@ def collection(
     no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
+    parquet: ParquetFolder = None,
     loss: Annotated[
         Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")
     ] = Loss.SQUARES,
@@ -186,6 +189,7 @@ def collection(
         whole = (section for section in sections if section[1])
         job.finish(
             written,
+            as_data(result, parquet),
             summary=lambda: print_sections(whole, "the report"),
             code=(estimates or told).verdict.exit_code(strict=strict),
         )

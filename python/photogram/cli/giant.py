@@ -13,10 +13,12 @@ from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, e
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.maps import CloudFile, MapFile, check_maps, drawn_maps
 from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
     PictureFormat,
     PlotFormat,
     Plots,
@@ -27,6 +29,7 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     default_out,
     out_option,
 )
@@ -77,6 +80,9 @@ def giant(
     no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
+    parquet: ParquetFolder = None,
+    map: MapFile = None,  # noqa: A002  # as the option is called
+    ply: CloudFile = None,
     listing: Annotated[
         Path | None,
         Writes.FILE,
@@ -158,6 +164,7 @@ def giant(
         from photogram.results.report import summary
         from photogram.show.ways import page_of
 
+        check_maps(map)
         if directory is None:
             directory = job.packaged(EXAMPLE)
             job.reads(directory)
@@ -202,6 +209,8 @@ def giant(
         job.finish(
             written,
             documents,
+            as_data(result, parquet),
+            drawn_maps(result, map, ply, None, quiet=quiet),
             summary=lambda: print_sections(
                 [
                     *(log.sections() if log else []),

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from rich.status import Status
 
-    from photogram.io.writing import OutputSet
+    from photogram.io.writing import Content, OutputSet
     from photogram.show.run import Run
 
 __all__ = ["Former", "Job", "Reads", "Writes", "roles", "with_job"]
@@ -49,6 +49,7 @@ class Writes(Enum):
 
     FILE = "file"
     DIRECTORY = "directory of results"
+    EITHER = "file or directory, which the command finds out"
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ class Job:
         self._outputs += [path for path in files if path not in self._outputs]
         self._check()
 
-    def write(self, *results: Mapping[Path, bytes]) -> None:
+    def write(self, *results: Mapping[Path, Content]) -> None:
         """Write results: all of them or none, none over an input, and no two to one place.
 
         Those whose names a user chose are given apart from those that have names of their own.
@@ -165,7 +166,7 @@ class Job:
                     outputs.write(path, content)
 
     def finish(
-        self, *results: Mapping[Path, bytes], summary: Callable[[], None] | None = None, code: int = 0
+        self, *results: Mapping[Path, Content], summary: Callable[[], None] | None = None, code: int = 0
     ) -> None:
         """Write the results, as :meth:`write` does, then show what they are, and end.
 
@@ -304,7 +305,7 @@ def _holds_path(kind: object) -> bool:
 def with_job(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command its :class:`Job` as the parameter `job`, made of its options that are marked.
 
-    Where it has an option `--example`, either that or its first argument must be given.
+    Where it has an option `--example`, that stands for its first argument.
 
     Raises
     ------
@@ -322,6 +323,8 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
     def with_one(**values: Any) -> None:
         for parameter in own:
             _check_value(parameter, values)
+        if "example" in values:
+            _arrange(own, values)
         found: dict[Reads | Writes, list[Path]] = {each: [] for each in (*Reads, *Writes)}
         for name, role in marked.items():
             given = values.get(name)
@@ -367,8 +370,25 @@ def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
     for mark in metadata:
         if isinstance(mark, Former) and value != parameter.default and not values.get("quiet"):
             print_remark(f"{_option(parameter)} will go: {mark.now}")
-        if isinstance(mark, ArgumentInfo) and values.get("example") == bool(value):
-            raise typer.BadParameter(f"give {mark.metavar}, or --example", param_hint=mark.metavar)
+
+
+def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
+    """Give arguments their values: with `--example` the first one goes without."""
+    arguments = {
+        parameter.name: mark.metavar
+        for parameter in parameters
+        for mark in get_args(parameter.annotation)[1:]
+        if isinstance(mark, ArgumentInfo)
+    }
+    given = [values[name] for name in arguments if values[name]]
+    example = bool(values["example"])
+    first, *others = arguments.values()
+    if len(given) + example > len(arguments) or not (given or example):
+        raise typer.BadParameter(f"give {first}, or --example", param_hint=first)
+    if len(given) + example < len(arguments):
+        raise typer.BadParameter("is missing", param_hint=others[-1])
+    if example:
+        values.update(zip(arguments, [None, *given], strict=True))
 
 
 def _option(parameter: Parameter) -> str:

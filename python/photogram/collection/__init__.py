@@ -9,6 +9,7 @@ from photogram.collection import (  # noqa: F401  (the ways to show a result, an
     html,
     pictured,
     report,
+    saved,
     snooping,
     tables,
 )

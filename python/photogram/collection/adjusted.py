@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["AdjustedCollection"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AdjustedCollection(AdjustedNetwork):
     """An adjusted collection; the arrays that every network has are those of `AdjustedNetwork`.
 
@@ -51,6 +51,14 @@ class AdjustedCollection(AdjustedNetwork):
     datum: list[tuple[int, str]]
     options: CollectionOptions
     state: _photocore.BlockState
+
+    @property
+    def _what(self) -> str:
+        return "collection"
+
+    @property
+    def _image_unit(self) -> str:
+        return "px"
 
     @property
     def cost(self) -> float:

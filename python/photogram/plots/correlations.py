@@ -67,6 +67,7 @@ def correlations(result: object, ax: Where = None) -> Any:
 
 def _matrix(axes: Axes, each: Correlated) -> AxesImage:
     image = axes.imshow(each.coefficients, cmap=signed(), vmin=-1.0, vmax=1.0)
+    axes.set_anchor("NW")
     places = range(len(each.names))
     axes.set_xticks(places, each.names, rotation=90 if max(map(len, each.names)) > 3 else 0)
     axes.set_yticks(places, each.names)

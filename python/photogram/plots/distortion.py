@@ -10,7 +10,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.plots.panels import Where, handed_out, panels
 from photogram.plots.pictured import Curves, pictured
-from photogram.show.style import COLOURS, faint, ink
+from photogram.show.style import COLOURS, FAINT, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +70,7 @@ def draw_curves(panels: list[Axes], curves: Curves) -> None:
     taken = 0
     for number, (axes, curve) in enumerate(zip(panels, curves.curves, strict=False)):
         for other in curves.others:
-            axes.plot(curves.radii, factor * other, color=faint, linewidth=0.5, alpha=0.5)
+            axes.plot(curves.radii, factor * other, color=FAINT, linewidth=0.5, alpha=0.5)
         for name, sd in curve.bands.items():
             low, high = factor * (curve.values - sd), factor * (curve.values + sd)
             colour = COLOURS[taken % len(COLOURS)]
@@ -80,8 +80,8 @@ def draw_curves(panels: list[Axes], curves: Curves) -> None:
             )
             # Bands are thin on curves of hundreds of micrometres: once more by themselves.
             _dashed(panels[-1], curves.radii, factor * sd, seen, colour, f"sd of the {name}")
-        _dashed(axes, curves.radii, factor * curve.values, seen, ink, "")
-        axes.axhline(0.0, color=faint, linewidth=0.5)
+        _dashed(axes, curves.radii, factor * curve.values, seen, INK, "")
+        axes.axhline(0.0, color=FAINT, linewidth=0.5)
         if len(curves.others):
             # Single photos whose curves go astray do not set the scale.
             ends = np.quantile(factor * curves.others, [0.1, 0.9], axis=0)

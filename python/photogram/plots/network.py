@@ -11,7 +11,7 @@ from photogram.errors import InputError
 from photogram.plots.panels import NOWHERE, Where, labels, note, panels, scale_bars
 from photogram.plots.pictured import Pictured, Plan, pictured
 from photogram.show.pictures import round_length
-from photogram.show.style import BLUE, ORDERED, PURPLE, VERMILION, faint, ink
+from photogram.show.style import BLUE, FAINT, INK, ORDERED, PURPLE, VERMILION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,7 +94,7 @@ def view_of_plan(axes: Axes, plan: Plan) -> tuple[int, int, int]:
 
 
 def _frame(axes: Axes, plan: Plan, seen: tuple[int, int, int], limits: Floats) -> None:
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", anchor="NW")
     axes.set_xlim(*limits[:, 0])
     axes.set_ylim(*limits[:, 1])
     unit = f", {plan.unit}" if plan.unit else ""
@@ -203,7 +203,7 @@ def _photos(axes: Axes, plan: Plan, seen: tuple[int, int, int]) -> str:
     axes.plot(
         *shown.T,
         "+",
-        color=ink if len(shown) <= 300 else faint,
+        color=INK if len(shown) <= 300 else FAINT,
         markersize=size,
         markeredgewidth=0.7,
         label=f"photo ({len(plan.photos):,})",
@@ -340,7 +340,7 @@ def _vectors(
             marker,
             markersize=size,
             markerfacecolor="white",
-            markeredgecolor=ink,
+            markeredgecolor=INK,
             markeredgewidth=0.9,
             label=f"{kind} point ({len(rows):,})",
             zorder=5.0,
@@ -431,6 +431,6 @@ def _names(axes: Axes, plan: Plan, seen: tuple[int, int, int], ends: Floats) -> 
                 *(plan.point_ids[row] for row in held.tolist()),
                 *(plan.photo_ids[row] for row in photos.tolist()),
             ],
-            [ink] * len(held) + [faint] * len(photos),
+            [INK] * len(held) + [FAINT] * len(photos),
             avoid=ends,
         )

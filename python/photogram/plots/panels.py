@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.show.style import ink, styled
+from photogram.show.style import FAINT, INK, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,6 +70,9 @@ def panels(
             found = np.atleast_1d(np.asarray(ax, dtype=object)).ravel().tolist()
         if len(found) < rows * columns:
             raise InputError(f"the picture has {rows * columns} panels, but ax is {len(found)} axes")
+        for axes in found[: rows * columns]:
+            # Ticks are made when they are drawn, outside of this context.
+            axes.tick_params(color=FAINT, labelsize=8.0, labelcolor=INK)
         yield found[: rows * columns]
 
 
@@ -94,7 +97,7 @@ def note(axes: Axes, lines: Sequence[str]) -> None:
         loc="upper left",
         bbox_to_anchor=(0.0, 0.0),
         bbox_transform=_below(axes),
-        prop={"size": 7.5, "color": ink},
+        prop={"size": 7.5, "color": INK},
         pad=0.0,
         borderpad=0.0,
         frameon=False,
@@ -151,7 +154,7 @@ def scale_bars(axes: Axes, bars: Sequence[tuple[float, str, str]], title: str) -
             textcoords="offset points",
             va="center",
             fontsize=8.0,
-            color=ink,
+            color=INK,
             annotation_clip=False,
         )
     axes.set_title(title, pad=8.0 + 12.0 * len(bars))

@@ -13,7 +13,7 @@ from photogram.plots.network import thinned, view_of_plan
 from photogram.plots.panels import Where, handed_out, note, panels
 from photogram.plots.pictured import Images, Pictured, pictured
 from photogram.plots.residuals import frame
-from photogram.show.style import ORDERED, ink
+from photogram.show.style import INK, ORDERED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,7 +116,7 @@ def _over_network(axes: Axes, drawn: Pictured, values: Floats) -> None:
     axes.plot(
         *plan.photos[:: max(1, len(plan.photos) // 1000)][:, list(seen[:2])].T,
         "+",
-        color=ink,
+        color=INK,
         markersize=3.0,
         markeredgewidth=0.5,
         alpha=0.5,

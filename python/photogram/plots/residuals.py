@@ -11,7 +11,7 @@ from photogram.plots.cells import Cells, cells
 from photogram.plots.panels import Where, handed_out, note, panels, scale_bars
 from photogram.plots.pictured import Images, pictured
 from photogram.show.pictures import round_length
-from photogram.show.style import faint, ink, marked
+from photogram.show.style import FAINT, INK, MARKED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +37,7 @@ LEVEL = 0.01
 def residuals(result: object, ax: Where = None) -> Any:
     """Draw image residuals over the frame of each camera: one by one, or the means of cells where many.
 
-    Means that errors by chance would hardly give (1 percent for all cells together) are marked.
+    Means that errors by chance would hardly give (1 percent for all cells together) are coloured.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def frame(axes: Axes, images: Images, edges: Floats) -> None:
     """Give axes the frame of a camera: equal scales, room around it, y as the camera counts it."""
     low, high = edges
     margin = 0.06 * float((high - low).max())
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", anchor="NW")
     axes.set_xlim(low[0] - margin, high[0] + margin)
     up = (low[1] - margin, high[1] + margin)
     axes.set_ylim(*(up[::-1] if images.down else up))
@@ -108,7 +108,7 @@ def _field(axes: Axes, images: Images, camera: int) -> None:
     frame(axes, images, grid.edges)
     remark: list[str] = []
     if len(xy) <= SINGLE:
-        places, shown, colours = xy, vectors, np.full(len(xy), ink)
+        places, shown, colours = xy, vectors, np.full(len(xy), INK)
     else:
         places, shown, colours, remark = _means(grid, vectors)
     cut = 0
@@ -134,8 +134,8 @@ def _field(axes: Axes, images: Images, camera: int) -> None:
             zorder=2.0,
         )
         bar = round_length(0.15 * extent / scale * factor)
-        bars = [(scale * bar / factor, ink, f"{bar:g} {unit}")]
-    axes.plot(*places.T, ".", color=faint, markersize=2.0, zorder=1.0)
+        bars = [(scale * bar / factor, INK, f"{bar:g} {unit}")]
+    axes.plot(*places.T, ".", color=FAINT, markersize=2.0, zorder=1.0)
     rms = np.sqrt((vectors**2).mean(axis=0)) * factor
     name = images.names[camera]
     scale_bars(axes, bars, f"{name}: {len(xy):,} images, rms {rms[0]:.3g}, {rms[1]:.3g} {unit}")
@@ -152,7 +152,7 @@ def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, Any, list[str]
     with np.errstate(invalid="ignore", divide="ignore"):
         square = (means[filled] ** 2 * grid.counts[filled, np.newaxis] / variance).sum(axis=1)
     beyond = square > critical_chi_square(LEVEL / len(filled), 2)
-    colours = np.where(beyond, marked, ink)
+    colours = np.where(beyond, MARKED, INK)
     per_cell = _between(grid.counts[filled])
     said = [f"means of cells with {per_cell} images; those with less than {FEWEST} are left out"]
     if beyond.any():

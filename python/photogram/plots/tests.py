@@ -12,7 +12,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.plots.panels import Where, handed_out, labels, note, panels
 from photogram.plots.pictured import pictured
-from photogram.show.style import BLUE, SKY, faint, ink, marked
+from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
 
 if TYPE_CHECKING:
@@ -79,10 +79,10 @@ def _histogram(axes: Axes, values: Floats, unit_weight: float) -> None:
     density = counts / (len(values) * np.diff(edges))
     axes.stairs(density, edges, fill=True, color=SKY, alpha=0.6, label=f"{len(values):,} test values")
     x = np.linspace(-reach, reach, 241)
-    axes.plot(x, _bell(x, 1.0), color=ink, label="normal, standard deviations as given")
+    axes.plot(x, _bell(x, 1.0), color=INK, label="normal, standard deviations as given")
     if abs(unit_weight - 1.0) > 0.02:
         label = f"normal, standard deviations × {unit_weight:.3g}"
-        axes.plot(x, _bell(x, unit_weight), color=marked, linestyle="--", label=label)
+        axes.plot(x, _bell(x, unit_weight), color=MARKED, linestyle="--", label=label)
     axes.set_ylim(0.0, 1.35 * max(float(density.max()), 0.4))
     axes.legend(loc="upper right")
     axes.set_xlabel("test value w")
@@ -104,15 +104,15 @@ def _quantiles(axes: Axes, values: Floats, groups: list[Observations], unit_weig
     ordered = np.sort(values)[rows]
     # Of the order statistics of independent values, about; those of residuals are nearly so.
     spread = 1.96 * np.sqrt(probability * (1.0 - probability) / n) / _bell(expected, 1.0)
-    band: dict[str, Any] = {"alpha": 0.35, "linewidth": 0, "color": faint}
+    band: dict[str, Any] = {"alpha": 0.35, "linewidth": 0, "color": FAINT}
     axes.fill_between(expected, expected - spread, expected + spread, label="95 % of normal values", **band)
     axes.plot(
-        expected[[0, -1]], expected[[0, -1]], color=ink, linewidth=0.9, label="standard deviations as given"
+        expected[[0, -1]], expected[[0, -1]], color=INK, linewidth=0.9, label="standard deviations as given"
     )
     if abs(unit_weight - 1.0) > 0.02:
         ends = expected[[0, -1]]
         label = f"standard deviations × {unit_weight:.3g}"
-        axes.plot(ends, unit_weight * ends, color=marked, linewidth=0.9, linestyle="--", label=label)
+        axes.plot(ends, unit_weight * ends, color=MARKED, linewidth=0.9, linestyle="--", label=label)
     limit = critical_normal(bonferroni(LEVEL, n))
     beyond = np.abs(ordered) > limit
     axes.plot(
@@ -120,10 +120,10 @@ def _quantiles(axes: Axes, values: Floats, groups: list[Observations], unit_weig
     )
     if beyond.any():
         axes.plot(
-            expected[beyond], ordered[beyond], "D", color=marked, markersize=4.0, label=_count(values, limit)
+            expected[beyond], ordered[beyond], "D", color=MARKED, markersize=4.0, label=_count(values, limit)
         )
-    axes.axhline(limit, color=faint, linewidth=0.7, linestyle=":")
-    axes.axhline(-limit, color=faint, linewidth=0.7, linestyle=":")
+    axes.axhline(limit, color=FAINT, linewidth=0.7, linestyle=":")
+    axes.axhline(-limit, color=FAINT, linewidth=0.7, linestyle=":")
     reach = 1.3 * max(float(np.abs(ordered).max()), limit)
     axes.set_ylim(-reach, reach)
     axes.set_xlim(1.08 * expected[0], 1.08 * expected[-1])
@@ -137,7 +137,7 @@ def _quantiles(axes: Axes, values: Floats, groups: list[Observations], unit_weig
         at = np.column_stack(
             [normal_quantiles((np.minimum(places, n - 1) + 0.5) / n), [value for value, _ in worst]]
         )
-        labels(axes, at, [name for _, name in worst], [ink] * len(worst))
+        labels(axes, at, [name for _, name in worst], [INK] * len(worst))
 
 
 def _count(values: Floats, limit: float) -> str:

@@ -7,5 +7,6 @@ from photogram.results import (  # noqa: F401  (the ways to show a result)
     judged,
     pictured,
     report,
+    saved_block,
     tables,
 )

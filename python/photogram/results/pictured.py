@@ -10,14 +10,15 @@ from photogram.arguments.types import Floats, Indices
 from photogram.network import geometry
 from photogram.network.rays import LocalAxes, local_axes
 from photogram.plots.pictured import Correlated, Curve, Curves, Images, Pictured, Plan, pictured
-from photogram.results.distortion import distortion_curve
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.ellipses import metric_covariances
 from photogram.results.findings import tested_observations
 from photogram.results.footprints import footprints
 from photogram.results.result import Result
 from photogram.statistics.outliers import Observations
 
-__all__ = ["PicturedBlock"]
+__all__ = ["PicturedBlock", "curves_of"]
 
 
 class PicturedBlock(Pictured):
@@ -119,29 +120,26 @@ class PicturedBlock(Pictured):
     @property
     def distortion(self) -> list[Curves]:
         """Cameras with radial distortion."""
-        found = []
-        for each in self.result.cameras:
-            curve = distortion_curve(self.result, each)
-            if curve is None:
-                continue
-            unit = str(each.camera.unit)
-            balanced = (
-                f"balanced at {curve.balanced_at:.4g} {unit}:"
-                f" principal distance {curve.balanced_distance:.6g} {unit}"
-            )
-            found.append(
-                Curves(
-                    camera=f"{each.name} ({each.camera.model}, {curve.direction})",
-                    unit=unit,
-                    radii=curve.radii,
-                    observed=curve.observed,
-                    curves=[
-                        Curve("", curve.values, {"mapping": curve.sd_mapping, "curve": curve.sd}),
-                        Curve(balanced, curve.balanced, {"balanced curve": curve.sd_balanced}),
-                    ],
-                )
-            )
-        return found
+        curves = [(each, distortion_curve(self.result, each)) for each in self.result.cameras]
+        return [curves_of(each, curve) for each, curve in curves if curve is not None]
+
+
+def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
+    """Return what is drawn of the distortion of a camera: the curve, and its balanced form."""
+    unit = str(camera.camera.unit)
+    balanced = (
+        f"balanced at {curve.balanced_at:.4g} {unit}: principal distance {curve.balanced_distance:.6g} {unit}"
+    )
+    return Curves(
+        camera=f"{camera.name} ({camera.camera.model}, {curve.direction})",
+        unit=unit,
+        radii=curve.radii,
+        observed=curve.observed,
+        curves=[
+            Curve("", curve.values, {"mapping": curve.sd_mapping, "curve": curve.sd}),
+            Curve(balanced, curve.balanced, {"balanced curve": curve.sd_balanced}),
+        ],
+    )
 
 
 @pictured.register(Result)

@@ -81,7 +81,7 @@ class Redundancies(SumsByKind):
     """Sums of redundancy numbers."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(AdjustedNetwork):
     """An adjusted block; the arrays that every network has are those of `AdjustedNetwork`, with k = 6.
 
@@ -170,6 +170,14 @@ class Result(AdjustedNetwork):
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
         )
 
+    @property
+    def _what(self) -> str:
+        return f"block: {self.block.title}" if self.block.title else "block"
+
+    @property
+    def _image_unit(self) -> str:
+        return self.block.image_unit
+
     def covariances(self) -> Covariances:
         """Return an object that answers for covariances of anything with anything, from one factor.
 
@@ -226,6 +234,21 @@ class Result(AdjustedNetwork):
         trial = network_trial(self.block, core)
         known = unit_weight == "known"
         return Reliability(trial, self.covariances, level=level, power=power, known=known)
+
+    def restarted(self) -> Block:
+        """Return the block as it was given, but with free photos and cameras where the adjustment has ended.
+
+        What was observed or held is as it was given.
+        `photogram.adjust(result.restarted())` goes on from there: with other options, or with other weights,
+        after :meth:`photogram.Block.replace`.
+        """
+        block = self.block
+        free = {name: np.isinf(getattr(block, f"photo_{name}_sd")) for name in ("position", "attitude")}
+        return block.replace(
+            cameras=[each.restarted() for each in self.cameras] or block.cameras,
+            photo_positions=np.where(free["position"], self.photo_positions, block.photo_positions),
+            photo_attitudes=np.where(free["attitude"], self.photo_attitudes, block.photo_attitudes),
+        )
 
     def in_datum(self, datum: InnerConstraints) -> Self:
         """Return the result in another datum, without adjusting again (S-transformation, docs/datum.md).

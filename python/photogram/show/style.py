@@ -12,7 +12,20 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
 
-__all__ = ["COLOURS", "ORDERED", "faint", "ink", "marked", "need_matplotlib", "signed", "styled"]
+__all__ = [
+    "BLUE",
+    "COLOURS",
+    "FAINT",
+    "INK",
+    "MARKED",
+    "ORDERED",
+    "PURPLE",
+    "SKY",
+    "VERMILION",
+    "need_matplotlib",
+    "signed",
+    "styled",
+]
 
 BLACK = "#000000"
 BLUE = "#0072b2"
@@ -23,7 +36,7 @@ ORANGE = "#e69f00"
 SKY = "#56b4e9"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 """Of kinds, in the order in which they are taken."""
-ink, marked, faint = "#222222", VERMILION, "#8c8c8c"
+INK, MARKED, FAINT = "#222222", VERMILION, "#8c8c8c"
 """What is drawn as it is, what a reader should look at, and what only helps."""
 ORDERED = "cividis"
 """Colour map of values from small to large."""
@@ -33,16 +46,16 @@ SETTINGS: dict[str, Any] = {
     "axes.titlesize": 10.0,
     "axes.titlelocation": "left",
     "axes.labelsize": 9.0,
-    "axes.edgecolor": faint,
+    "axes.edgecolor": FAINT,
     "axes.linewidth": 0.8,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0,
-    "xtick.color": faint,
-    "ytick.color": faint,
-    "xtick.labelcolor": ink,
-    "ytick.labelcolor": ink,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
     "legend.fontsize": 8.0,
     "legend.frameon": False,
     "legend.title_fontsize": 8.0,

@@ -8,9 +8,9 @@ they are there as soon as the class is.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property, singledispatch
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn
 
 from photogram.statistics.findings import Findings
 from photogram.statistics.verdict import Verdict, verdict
@@ -26,6 +26,7 @@ __all__ = [
     "Shown",
     "columns_of",
     "document_of",
+    "files_of",
     "findings_of",
     "html_of",
     "page_of",
@@ -50,6 +51,15 @@ def document_of(result: object) -> bytes:
 def columns_of(result: object, what: str) -> Mapping[str, Any]:
     """Return what a result says about one kind of thing (`photo`, `point`, `image` ...) as named columns."""
     _undefined(result, f"table of {what}s")
+
+
+@singledispatch
+def files_of(result: object) -> Mapping[str, bytes | Callable[[BinaryIO], None]]:
+    """Return a result as files of a folder, by their names, from which it can be read again.
+
+    Large ones write themselves to the file that they are given.
+    """
+    _undefined(result, "files")
 
 
 @singledispatch
