@@ -28,6 +28,10 @@ COMMANDS = {
         ["Verdict", "What was taken out", "Cameras", "Reproducibility"],
     ),
     "giant --example": ("galveston-adjusted", [*NETWORK, "Control points", "Observed photos", "Remarks"]),
+    "giant --example --components kind": (
+        "galveston-adjusted",
+        ["Variance components", "Plan of the network"],
+    ),
     "collection --example --out out": ("out", [*NETWORK, "Cameras"]),
     "plan --out out": (
         "out",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.components import COMPONENTS, Components, estimated, with_components
+from photogram.cli.components import COMPONENTS, Components, estimated, with_components, with_components_page
 from photogram.cli.console import print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
@@ -36,6 +36,7 @@ from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
     from photogram.adjustment import robust
+    from photogram.show.page import Page
 
 __all__ = ["collection"]
 
@@ -176,9 +177,11 @@ def collection(
             written[out / COMPONENTS] = estimates.report().encode()
         if report is not None:
             written[report] = told.report().encode()
-        written |= html_files(
-            job, "collection", place, html is not None, lambda: replace(page_of(told), title=problem.name)
-        )
+
+        def page() -> Page:
+            return with_components_page(replace(page_of(told), title=problem.name), estimates)
+
+        written |= html_files(job, "collection", place, html is not None, page)
         if json is not None:
             written[json] = told.to_json()
         sections = [

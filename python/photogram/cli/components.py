@@ -11,9 +11,17 @@ from photogram.cli.job import Job
 
 if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
+    from photogram.show.page import Page
     from photogram.show.sections import Section
 
-__all__ = ["COMPONENTS", "Components", "UnitVarianceName", "estimated", "with_components"]
+__all__ = [
+    "COMPONENTS",
+    "Components",
+    "UnitVarianceName",
+    "estimated",
+    "with_components",
+    "with_components_page",
+]
 
 COMPONENTS = "components.txt"
 """What goes to the output directory where variance components are asked for."""
@@ -68,6 +76,15 @@ def estimated(
                 status.update(f"variance components, adjustment {number + 1}")
 
         return variance_components(network, groups, threads=threads, progress=tell)
+
+
+def with_components_page(page: Page, found: VarianceComponents | None) -> Page:
+    """Return the report for the browser with what components say, if any were estimated."""
+    if found is None:
+        return page
+    from photogram.results.page.weights import weighed_page
+
+    return weighed_page(found, page)
 
 
 def with_components(sections: list[Section], found: VarianceComponents | None) -> list[Section]:

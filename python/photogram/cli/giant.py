@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
+from photogram.cli.components import (
+    COMPONENTS,
+    Components,
+    UnitVarianceName,
+    estimated,
+    with_components,
+    with_components_page,
+)
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
@@ -198,7 +205,9 @@ def giant(
         if found is not None:
             written[out / COMPONENTS] = found.report().encode()
         written |= pictures.of(result)
-        documents = html_files(job, "giant", place, html is not None, lambda: page_of(log or result))
+        documents = html_files(
+            job, "giant", place, html is not None, lambda: with_components_page(page_of(log or result), found)
+        )
         if json is not None:
             documents[json] = (log or result).to_json()
         if listing is not None:
