@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from photogram.cli.job import Job
 
 if TYPE_CHECKING:
+    from photogram.adjustment.cleaning import Cleaned
     from photogram.results.components import VarianceComponents
     from photogram.show.page import Page
     from photogram.show.sections import Section
@@ -18,9 +20,11 @@ __all__ = [
     "COMPONENTS",
     "Components",
     "UnitVarianceName",
+    "cleaned",
     "estimated",
     "with_components",
     "with_components_page",
+    "with_weights",
 ]
 
 COMPONENTS = "components.txt"
@@ -54,7 +58,7 @@ Components = Annotated[
         "--components",
         help="Estimate variance components of groups of observations: by which factors their standard"
         " deviations are wrong. Given more than once: of all combinations. The results stay those of the"
-        " given weights.",
+        " given weights; with --snoop those of the weights that what is left bears out.",
         show_default=False,
     ),
 ]
@@ -78,13 +82,27 @@ def estimated(
         return variance_components(network, groups, threads=threads, progress=tell)
 
 
-def with_components_page(page: Page, found: VarianceComponents | None) -> Page:
+def with_components_page(page: Page, found: VarianceComponents | None, made: Cleaned | None) -> Page:
     """Return the report for the browser with what components say, if any were estimated."""
-    if found is None:
-        return page
-    from photogram.results.page.weights import weighed_page
+    from photogram.results.page.weights import reweighed_page, weighed_page
 
-    return weighed_page(found, page)
+    if made is not None:
+        return reweighed_page(made.report().splitlines(), page)
+    return page if found is None else weighed_page(found, page)
+
+
+def cleaned(network: object, bases: list[Basis], threads: int | None, options: Mapping[str, Any]) -> Cleaned:
+    """Take gross errors out and estimate weights in turn, with options of snooping."""
+    from photogram.adjustment.cleaning import clean
+
+    return clean(network, [basis.value.replace("-", " ") for basis in bases], threads=threads, **options)
+
+
+def with_weights(sections: list[Section], made: Cleaned | None) -> list[Section]:
+    """Return the sections of snooping, with what became of the weights below its verdict."""
+    if made is None:
+        return sections
+    return [*sections[:1], ("Weights", made.report().splitlines()), *sections[1:]]
 
 
 def with_components(sections: list[Section], found: VarianceComponents | None) -> list[Section]:

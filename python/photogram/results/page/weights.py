@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from photogram.results.components import VarianceComponents, statement
 from photogram.results.components_picture import figure_of_components
 from photogram.show.judgement import advice, judged
-from photogram.show.page import Column, Drawing, Page, Part, Remarks, Row, Section, Table
+from photogram.show.page import Column, Drawing, Lines, Page, Part, Remarks, Row, Section, Table
 from photogram.statistics.components import Component
 
-__all__ = ["weighed_page"]
+__all__ = ["reweighed_page", "weighed_page"]
 
 
 def weighed_page(found: VarianceComponents, page: Page) -> Page:
@@ -37,6 +38,21 @@ def weighed_page(found: VarianceComponents, page: Page) -> Page:
     )
 
 
+def reweighed_page(lines: Sequence[str], page: Page) -> Page:
+    """Return the page of a network whose gross errors were taken out and weights estimated in turn.
+
+    Parameters
+    ----------
+    lines
+        What was done to the weights.
+    page
+        That of the network that is left.
+    """
+    section = Section("components", "Weights", [Lines(lines)], _CHANGED)
+    return replace(page, sections=[section, *page.sections])
+
+
+_CHANGED = "Weights were estimated from the observations that are left: the rest of this page has these."
 _INTRO = (
     "By which factors the standard deviations of groups of observations are wrong, as their residuals say."
     " Everything else on this page has the weights that were given."
