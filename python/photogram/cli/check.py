@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, output
+from photogram.cli.console import output
 from photogram.cli.html import HtmlFile, html_files
 from photogram.cli.job import Job, Reads, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
@@ -50,5 +50,5 @@ def check(
             {} if json is None else {json: found.to_json()},
             html_files(job, "giant check", html, True, lambda: page_of(found)),
             summary=lambda: output.print(escape(found.report()), end=""),
-            code=NOT_CONVERGED if found.grave else 0,
+            code=found.verdict.exit,
         )

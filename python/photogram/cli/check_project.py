@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, output, print_sections
+from photogram.cli.console import output, print_sections
 from photogram.cli.html import HtmlFile, html_files
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
@@ -51,5 +51,5 @@ def check_project(
             {} if json is None else {json: found.to_json()},
             html_files(job, "check", html, True, lambda: page_of(found)),
             summary=lambda: output.print(escape(found.report()), end=""),
-            code=NOT_CONVERGED if found.grave else 0,
+            code=found.verdict.exit,
         )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.components import COMPONENTS, Components, estimated, with_components
+from photogram.cli.components import COMPONENTS, Components, cleaned, estimated, with_components, with_weights
 from photogram.cli.console import print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
@@ -148,9 +148,9 @@ def collection(
         job.writes(*names, *([place] if place else []))
         pictures = Pictures(job, plots, plot_format, out)
         photos = photos.replace(image_sd=sd)
-        if snoop and (loss is not Loss.SQUARES or components):
-            raise typer.BadParameter("not with a robust loss, nor with --components", param_hint="--snoop")
-        log = None
+        if snoop and loss is not Loss.SQUARES:
+            raise typer.BadParameter("not with a robust loss", param_hint="--snoop")
+        log, made = None, None
         with job.status("adjusting") as status:
             options: dict[str, Any] = {
                 "tolerance": tolerance,
@@ -160,20 +160,24 @@ def collection(
                 "progress": shown(status, "cost", 0.5) if status is not None else None,
             }
             if snoop:
-                log = snoop_collection(photos, level=level, fdr=fdr, unit_weight=unit_weight.value, **options)
+                options |= {"level": level, "fdr": fdr, "unit_weight": unit_weight.value}
+                if components:
+                    made = cleaned(photos, components, options.pop("threads"), options)
+                log = made.snooped if made else snoop_collection(photos, **options)
                 if not isinstance(log.result, AdjustedCollection):
                     raise TypeError("a collection gives the result of a collection")
                 result = log.result
             else:
                 result = adjust(photos, loss=_LOSSES[loss], scale=scale, covariance=covariance, **options)
         told = log or result
-        estimates = estimated(job, photos, components, threads)
+        estimates = None if made else estimated(job, photos, components, threads)
+        weights = made or estimates
         written = pictures.of(result)
         if names:
             written[names[0]] = told.report().encode()
             written[names[1]] = to_bytes(result.adjusted(), packing, found.name)
-        if estimates is not None and out is not None:
-            written[out / COMPONENTS] = estimates.report().encode()
+        if weights is not None and out is not None:
+            written[out / COMPONENTS] = weights.report().encode()
         if report is not None:
             written[report] = told.report().encode()
         written |= html_files(
@@ -183,7 +187,7 @@ def collection(
             written[json] = told.to_json()
         sections = [
             ("File", [f"{problem}: {found.title}"]),
-            *(log.sections() if log else []),
+            *with_weights(log.sections() if log else [], made),
             *with_components(summary(result), estimates)[1 if log else 0 :],
         ]
         whole = (section for section in sections if section[1])

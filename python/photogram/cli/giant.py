@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
+from photogram.cli.components import (
+    COMPONENTS,
+    Components,
+    UnitVarianceName,
+    cleaned,
+    estimated,
+    with_components,
+    with_weights,
+)
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
@@ -39,6 +47,7 @@ from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
     from photogram import Block, Result, Snooped
+    from photogram.adjustment.cleaning import Cleaned
     from photogram.giant import Project
     from photogram.giant.common import Common
 
@@ -179,13 +188,13 @@ def giant(
         block = _refracted(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
-        if snoop and (as_published or components or project.common.intersection_only):
-            refused = "not with --as-published, --components or an intersection"
+        if snoop and (as_published or project.common.intersection_only):
+            refused = "not with --as-published or an intersection"
             raise typer.BadParameter(refused, param_hint="--snoop")
         options = {"level": level, "fdr": fdr, "unit_weight": unit_weight.value} if snoop else None
         try:
-            result, log = _adjust(
-                job, project, block, as_published, unit_variance, ordering, threads, options
+            result, log, made = _adjust(
+                job, project, block, as_published, unit_variance, ordering, threads, options, components
             )
         except AdjustmentError:
             # What was remarked on while reading is often the reason.
@@ -193,9 +202,10 @@ def giant(
                 errors.print(escape(str(message)))
             raise
         written = _result_files(project, block, result, log, out, as_published)
-        found = estimated(job, block, components, threads)
-        if found is not None:
-            written[out / COMPONENTS] = found.report().encode()
+        found = None if made else estimated(job, block, components, threads)
+        weights = made or found
+        if weights is not None:
+            written[out / COMPONENTS] = weights.report().encode()
         written |= pictures.of(result)
         documents = html_files(job, "giant", place, html is not None, lambda: page_of(log or result))
         if json is not None:
@@ -212,7 +222,7 @@ def giant(
             drawn_maps(result, map, ply, None, quiet=quiet),
             summary=lambda: print_sections(
                 [
-                    *(log.sections() if log else []),
+                    *with_weights(log.sections() if log else [], made),
                     *with_components(summary(result), found)[1 if log else 0 :],
                 ],
                 "report.txt",
@@ -264,7 +274,8 @@ def _adjust(
     ordering: OrderingName,
     threads: int | None,
     snooping: dict[str, Any] | None,
-) -> tuple[Result, Snooped | None]:
+    components: Components,
+) -> tuple[Result, Snooped | None, Cleaned | None]:
     """Adjust the block as COMMON asks, or snoop it, with the progress on standard error."""
     from photogram import AsPublished, Result, adjust, snoop
 
@@ -273,11 +284,13 @@ def _adjust(
         progress = shown(status, "weighted sum of squares", 1.0) if status is not None else None
         if snooping is not None:
             snooping["unit_variance"] = unit_variance.value if unit_variance else common.unit_variance
-            log = snoop(block, threads=threads, progress=progress, **snooping)
+            snooping["progress"] = progress
+            made = cleaned(block, components, threads, snooping) if components else None
+            log = made.snooped if made else snoop(block, threads=threads, **snooping)
             if not isinstance(log.result, Result):
                 raise TypeError("a block gives the result of a block")
             result = replace(log.result, messages=[*project.messages, *log.result.messages])
-            return result, replace(log, result=result)
+            return result, replace(log, result=result), made
         result = adjust(
             block,
             unit_variance=unit_variance.value if unit_variance else common.unit_variance,
@@ -289,7 +302,7 @@ def _adjust(
             progress=progress,
             threads=threads,
         )
-    return replace(result, messages=[*project.messages, *result.messages]), None
+    return replace(result, messages=[*project.messages, *result.messages]), None, None
 
 
 def _result_files(

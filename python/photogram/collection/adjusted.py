@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
 from photogram.collection.core import CollectionOptions
+from photogram.collection.suspects import collection_trial
 from photogram.results.network import AdjustedNetwork
+from photogram.results.reliability import Reliability, reliability_of
 
 if TYPE_CHECKING:
     from photogram import _photocore
@@ -51,6 +53,8 @@ class AdjustedCollection(AdjustedNetwork):
     datum: list[tuple[int, str]]
     options: CollectionOptions
     state: _photocore.BlockState
+
+    KNOWN: ClassVar[bool] = False
 
     @property
     def _what(self) -> str:
@@ -97,6 +101,32 @@ class AdjustedCollection(AdjustedNetwork):
         """(n, 3) given minus adjusted coordinates; 0 where fixed, NaN where free."""
         residuals = self.collection.point_positions - self.point_positions
         return np.where(np.isfinite(self.point_given_sd), residuals, np.nan)
+
+    def reliability(
+        self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
+    ) -> Reliability:
+        """Return which gross errors of every observation are found, and what others do (docs/blunders.md).
+
+        It takes a factorisation and a selected inverse at the adjusted values. A collection has no
+        covariances on demand: influences on chosen unknowns cannot be asked for.
+
+        Parameters
+        ----------
+        level, power
+            Of the test of an observation: alpha0, beta0.
+        unit_weight
+            `known`, or `unknown`: estimated by the adjustment, which makes errors harder to find.
+
+        Raises
+        ------
+        InputError
+            Options that cannot be.
+        KeyboardInterrupt
+            Ctrl-C.
+        """
+        options = replace(self.options, covariance=True, loss=None)
+        trial = collection_trial(self.collection, options, self.state)
+        return reliability_of(trial, None, level=level, power=power, unit_weight=unit_weight)
 
     def adjusted(self) -> Collection:
         """Return the collection at its adjusted values; points that were left out stay as they were."""

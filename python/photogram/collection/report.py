@@ -30,6 +30,7 @@ def report(result: AdjustedCollection) -> str:
     (photos, points), heads = names(result), _heads(result)
     sections = [
         *summary(result),
+        ("Reliability", _reliability(result)),
         ("Iterations", _iterations(result)),
         (
             "Weighted and fixed points: given minus adjusted, redundancy, standardized residual",
@@ -55,6 +56,11 @@ def summary(result: AdjustedCollection) -> list[Section]:
         ("Adjustment", _adjustment(result)),
         (f"Image points with |t| > {NOTABLE:g} (externally studentized), largest first", _suspects(result)),
     ]
+
+
+def _reliability(result: AdjustedCollection) -> list[str]:
+    summary = result.reliability_summary
+    return [] if summary is None else summary.lines("")
 
 
 def problems_of(result: AdjustedCollection) -> list[str]:

@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -13,20 +14,23 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram import _photocore
 from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.io.writing import write_whole
 from photogram.messages import Message
 from photogram.results.iteration import Iteration
+from photogram.results.reliability import Reliability
+from photogram.results.reliability_summary import ReliabilitySummary, reliability_summary
 from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown, files_of
 from photogram.statistics.reliability import standardized
+from photogram.statistics.snooping.suspects import LostSupportError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram import _photocore
     from photogram.plots import Plots
 
 __all__ = ["AdjustedNetwork", "Observed"]
@@ -133,6 +137,9 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
     formations: int
     seconds: Mapping[str, float]
 
+    KNOWN: ClassVar[bool] = True
+    """Whether standard deviations are given, so that the unit weight is known."""
+
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
@@ -185,6 +192,33 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         found["iterations"] = [Iteration(*row) for row in solution.iterations]
         same = {each.name: getattr(solution, each.name) for each in fields(cls) if each.name not in found}
         return cls(**found, **same)
+
+    @property
+    def geographic(self) -> bool:
+        """Whether plan coordinates are angles."""
+        return False
+
+    @abstractmethod
+    def reliability(
+        self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
+    ) -> Reliability:
+        """Return which gross errors of every observation are found, and what others do."""
+
+    @cached_property
+    def reliability_summary(self) -> ReliabilitySummary | None:
+        """What the report says of reliability, with the tests of all groups of observations.
+
+        None where there are no redundancy numbers, or the adjustment has not converged or has a loss.
+        """
+        computed = bool(np.isfinite(self.redundancy[self.used_images]).all())
+        if not (computed and self.converged and self.loss is None and self.degrees_of_freedom > 0):
+            return None
+        try:
+            found = self.reliability(unit_weight="known" if self.KNOWN else "unknown")
+        except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
+            # Everything else stands; a network that rounding makes singular here has said so before.
+            return None
+        return reliability_summary(found, heights=self.geographic)
 
     @property
     @abstractmethod

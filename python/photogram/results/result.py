@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -29,7 +28,7 @@ from photogram.results.datum import (
 )
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.reliability import Reliability
+from photogram.results.reliability import Reliability, reliability_of
 from photogram.results.selection import Adjusted, Selection, photo_components, point_components
 from photogram.results.suspects import network_trial
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
@@ -121,6 +120,9 @@ class Result(AdjustedNetwork):
         What coordinates and standard deviations refer to.
     options, state
         How the core adjusted the block, and where that ended: what covariances are computed from.
+    hints
+        Mistakes in conventions (units, axes, signs, angles) that would explain why images do not fit, as
+        sentences; see :func:`photogram.hints`. They head the verdict.
     """
 
     block: Block
@@ -139,6 +141,7 @@ class Result(AdjustedNetwork):
     datum: ResultDatum
     options: CoreOptions
     state: _photocore.BlockState
+    hints: tuple[str, ...] = ()
 
     @classmethod
     def from_solution(
@@ -158,6 +161,7 @@ class Result(AdjustedNetwork):
             block=block.kept(),
             messages=messages,
             loss=options.loss,
+            hints=(),
             options=options,
             datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
@@ -229,11 +233,9 @@ class Result(AdjustedNetwork):
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
-        one_of("unit_weight", unit_weight, ("known", "unknown"))
         core = block_network(self.block, self.options).trial(self.state, threads=0)
         trial = network_trial(self.block, core)
-        known = unit_weight == "known"
-        return Reliability(trial, self.covariances, level=level, power=power, known=known)
+        return reliability_of(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
 
     def restarted(self) -> Block:
         """Return the block as it was given, but with free photos and cameras where the adjustment has ended.
@@ -310,6 +312,11 @@ class Result(AdjustedNetwork):
         table = super()._table(what)
         table.attrs["datum"] = str(self.datum)
         return table
+
+    @property
+    def geographic(self) -> bool:
+        """Whether plan coordinates are angles."""
+        return self.block.geographic
 
     @property
     def image_points(self) -> Indices:

@@ -207,7 +207,7 @@ fn moved<M: Model>(
         };
         let apart = problem.model.step_between(&unknowns, reference);
         let Carried { basis, amounts, length } =
-            carried(&open, datum, &apart).ok_or(DatumError::NotCarried)?;
+            carried(&open.vectors(&motions), datum, &apart).ok_or(DatumError::NotCarried)?;
         stalls += usize::from(length >= 0.5 * before);
         if length == 0.0 || stalls == STALLS {
             return Ok((unknowns, basis));
@@ -238,10 +238,9 @@ fn motions_of<M: Model>(
     Some((Motions { vectors, preferred }, (kept, all)))
 }
 
-/// The basis at some values, and by how much the open combinations still bring the carriers nearer to their references, which are the step
+/// The basis at some values for null vectors G, and by how much these still bring the carriers nearer to their references, which are the step
 /// `apart` away: with F G = Q R, F the factors, B^T G = R^T R, so that in the columns of G R^-1 it is I. None where the carriers do not carry all null vectors.
-fn carried(open: &Open, datum: &Datum, apart: &[f64]) -> Option<Carried> {
-    let g = &open.vectors;
+fn carried(g: &Mat<f64>, datum: &Datum, apart: &[f64]) -> Option<Carried> {
     let d = g.ncols();
     let scaled_row = |row: usize, k: usize| datum.carriers[row].1 * g[(datum.carriers[row].0, k)];
     let b = Mat::from_fn(datum.carriers.len(), d, scaled_row);
