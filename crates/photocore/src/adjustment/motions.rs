@@ -16,23 +16,8 @@ use crate::normals::{Equations, Layout};
 pub(super) struct Open {
     /// Motions (rows) in each combination (columns).
     pub combinations: Mat<f64>,
-    /// The null vectors: how each combination moves the unknowns.
-    pub vectors: Mat<f64>,
     /// As many unknowns as combinations, where there are so many that tell these apart.
     pub hold: Vec<usize>,
-}
-
-impl Open {
-    /// All motions, each by itself.
-    pub fn all(motions: &Motions) -> Self {
-        let count = motions.vectors.len();
-        let unknowns = motions.vectors.first().map_or(0, Vec::len);
-        Self {
-            combinations: Mat::identity(count, count),
-            vectors: Mat::from_fn(unknowns, count, |unknown, k| motions.vectors[k][unknown]),
-            hold: vec![],
-        }
-    }
 }
 
 /// What a combination may change of the observations, as the square of a share of what its parts change, and be rounding: the eigenvalues
@@ -226,7 +211,7 @@ impl<M: Model> Problem<M> {
         };
         let free = motions.preferred.iter().filter(|&&unknown| self.sd[unknown] != 0.0);
         let hold = to_hold(&vectors, free.map(length));
-        (!open.is_empty()).then_some(Open { combinations, vectors, hold })
+        (!open.is_empty()).then_some(Open { combinations, hold })
     }
 
     /// The unknowns to hold at given values; none where there is a datum.
