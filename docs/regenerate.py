@@ -24,6 +24,7 @@ DOCS = Path(__file__).parent
 PAGES: dict[str, Mapping[str, Callable[[], list[str]]]] = {
     "comparator.md": comparator_numbers.BLOCKS,
     "extending.md": {},
+    "pictures.md": {},
     "self-calibration.md": calibration_numbers.BLOCKS,
     "stellar-camera.md": stellar_numbers.BLOCKS,
     "tests.md": tests_numbers.BLOCKS,

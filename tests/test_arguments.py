@@ -26,8 +26,8 @@ PACKAGES = (
     "photogram.stellar",
 )
 MADE_BY_THE_LIBRARY = {
-    "photogram": "Cleaned FirstValues GroupSums Iteration Message Orientation Plan Pose Progress Resection"
-    " Result Simulation Snooped VarianceComponents VarianceFunction",
+    "photogram": "Cleaned Differences FirstValues GroupSums Iteration Message Orientation Plan Pose Progress"
+    " Resection Result Simulation Snooped VarianceComponents VarianceFunction",
     "photogram.absolute_orientation": "Orientation",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
@@ -119,6 +119,7 @@ def good(tmp_path_factory):
     calibrated = photogram.adjust(
         block.replace(cameras=[lens], photo_cameras=[0] * 3, principal_distances=None)
     )
+    calibrated.to_parquet(folder / "result")
     points, places = np.array([[100.0, 200.0, 30.0]]), np.array([[0.0, 0.0, 1000.0]])
     resected = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 5.0], [0.0, 100.0, 3.0], [100.0, 100.0, 0.0]])
     seen = photogram.network.geometry.project(
@@ -147,6 +148,8 @@ def good(tmp_path_factory):
             "camera_from": {"path": star_camera, "name": "stars", "weighted": True},
             "clean": {"network": block},
             "compare": {"results": {"one": calibrated, "two": calibrated}},
+            "differences": {"first": calibrated, "second": calibrated},
+            "read_result": {"directory": folder / "result"},
             "eliminate_terms": {"block": calibrated.block},
             "score_test": {"result": calibrated, "names": ["K3"]},
             "terms_test": {"result": calibrated, "names": ["K1"]},

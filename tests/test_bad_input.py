@@ -145,7 +145,6 @@ def tables() -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("table", "column"),
     [
-        ("photos", "photo"),
         ("photos", "Y"),
         ("photos", "kappa_deg"),
         ("images", "photo"),
@@ -161,6 +160,14 @@ def test_columns_that_are_missing(tables, table, column):
         columns = {name: values for name, values in tables[table].items() if name != column}
         with pytest.raises(InputError, match=f"{table} has no column {column}"):
             Block.from_tables(**{**tables, table: form(columns)})
+
+
+def test_photos_without_names_are_numbers_and_images_that_know_others_are_told(tables):
+    photos = {name: values for name, values in tables["photos"].items() if name != "photo"}
+    numbered = {**tables["images"], "photo": [0, 1]}
+    assert Block.from_tables(**{**tables, "photos": photos, "images": numbered}).photo_ids == ["0", "1"]
+    with pytest.raises(InputError, match="names the photo 'A', which the photos do not list: they are 0, 1"):
+        Block.from_tables(**{**tables, "photos": photos})
 
 
 def test_tables_that_cannot_be(tables):

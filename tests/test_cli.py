@@ -17,7 +17,7 @@ from photogram.network.simulation import simulate as simulate_function
 
 STRASBOURG = Path(__file__).parents[2] / "shared" / "data" / "strasbourg" / "giant"
 SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]
-OUTPUTS = {"FRAMES", "GROUND", "RESTART", "report.txt"}
+OUTPUTS = {"FRAMES", "GROUND", "RESTART", "report.html", "report.txt"}
 
 
 @pytest.fixture
@@ -110,7 +110,7 @@ def test_a_restart_needs_fewer_iterations(run, project, tmp_path):
 def test_section_2_save_flags_of_common(run, project, tmp_path):
     damage(project / "COMMON", "0100000000100", "0100001010100")
     assert run("giant", project, "--quiet").exit_code == 0
-    assert names(tmp_path / "block-adjusted") == {"RESTART", "report.txt"}
+    assert names(tmp_path / "block-adjusted") == {"RESTART", "report.html", "report.txt"}
 
 
 def test_quiet_prints_nothing(run, project):
@@ -128,7 +128,7 @@ def test_section_2_as_published_stops_at_the_limit_of_common(run, project, tmp_p
     result = run("giant", project, "--as-published", "--json", "result.json")
     assert result.exit_code == 3
     assert "not converged" in result.output
-    assert names(tmp_path / "block-adjusted") == {"RESTART", "report.txt"}
+    assert names(tmp_path / "block-adjusted") == {"RESTART", "report.html", "report.txt"}
     assert json.loads(Path("result.json").read_bytes())["status"] == "not converged"
     assert run("giant", project).exit_code == 0
 

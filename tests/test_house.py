@@ -16,6 +16,7 @@ FLOORS = (
     ("adjustment",),
     ("results",),
     ("network",),
+    ("plots",),
     ("show", "io"),
     ("statistics",),
     ("arguments",),

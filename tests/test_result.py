@@ -308,7 +308,7 @@ def test_members_of_the_document(result, document):
         "observations_beside_images",
         "control", "stations", "problems", "global_test", "verdict",
         "check_points", "dropped_points", "ordering", "predictions", "operations", "refraction", "seconds",
-        "datum", "redundancy", "weakest",
+        "datum", "redundancy", "weakest", "reliability",
     }  # fmt: skip
     assert document["status"] == "converged"
     assert document["title"] == "A BLOCK OF TWO STRIPS"

@@ -217,7 +217,7 @@ def test_a_good_block(simulated):
     result = adjust(simulated)
     assert result.verdict.code == "accepted"
     assert {test.name.partition(":")[0] for test in result.verdict.tests} >= {
-        "global", "image coordinates", "components of control",
+        "global", "images", "control points",
         "pattern over the frame of the camera", "normality of image residuals",
     }  # fmt: skip
     document = json.loads(result.to_json())["verdict"]
@@ -249,11 +249,63 @@ def test_a_block_with_a_blunder_and_one_with_bad_weights(simulated):
     assert wrong.code == "gross-errors"
     photo = simulated.photo_ids[simulated.image_photos[image]]
     point = simulated.point_ids[simulated.image_points[image]]
-    assert wrong.headline.startswith(f"Gross errors likely: 1) x of point {point} on photo {photo} (w = ")
+    assert wrong.headline.startswith(f"Gross errors likely: 1) image of point {point} on photo {photo} (T = ")
     optimistic = adjust(simulated.replace(image_sd=simulated.image_sd / 2)).verdict
     assert (optimistic.code, optimistic.exit, optimistic.warning) == ("weights", 0, True)
     assert " 1.9" in optimistic.headline or " 2.0" in optimistic.headline
     assert adjust(simulated.replace(image_sd=simulated.image_sd / 8)).verdict.exit == 4
+
+
+def test_an_image_is_tested_with_both_its_coordinates(simulated):
+    """T is what the sum of squares falls by without the image, of as many dimensions as show."""
+    result = adjust(simulated)
+    largest = next(test for test in result.verdict.tests if test.name.startswith("images: "))
+    summary = result.reliability_summary
+    assert largest.tests == int(summary.testable.sum()) < summary.tests.residual.size / 1.5
+    assert (largest.statistic, largest.distribution) == ("T", "chi2")
+    name = largest.name.removeprefix("images: image of point ")
+    point, photo = name.split(" on photo ")
+    block = simulated
+    kept = ~(
+        (block.image_points == block.point_ids.index(point))
+        & (block.image_photos == block.photo_ids.index(photo))
+    )
+    without = adjust(
+        block.replace(
+            image_points=block.image_points[kept],
+            image_photos=block.image_photos[kept],
+            image_xy=block.image_xy[kept],
+            image_sd=block.image_sd[kept],
+        )
+    )
+    fall = result.sums_of_squares.total - without.sums_of_squares.total
+    assert fall == pytest.approx(largest.value, rel=1e-3)
+    freedom = result.degrees_of_freedom - without.degrees_of_freedom
+    assert largest.dof == (freedom,)
+
+
+def test_reliability_stands_in_report_and_document(simulated):
+    result = pickle.loads(pickle.dumps(adjust(simulated)))
+    summary = result.reliability_summary
+    every = result.reliability()
+    kinds = {each.kind: each for each in summary.kinds}
+    assert sum(each.redundancy for each in summary.kinds) == pytest.approx(
+        result.degrees_of_freedom, abs=1e-6
+    )
+    assert kinds["image"].groups == len(simulated.image_xy)
+    images = [each for each in summary.weakest if each.kind == "image"]
+    checked = (every.suspects.kinds == 0) & (every.tests.least > 0.01)
+    assert images[0].external_sd == pytest.approx(np.nanmax(every.group_external[checked]))
+    group = [every.suspects.name(each) for each in range(len(checked))].index(images[0].name)
+    moved = np.linalg.norm(every.own_point_effect[every.suspects.rows(group)], axis=1)
+    assert images[0].own_point == pytest.approx(moved.max())
+    assert all(0.9 < pair.correlation <= 1 for pair in summary.pairs)
+    report = result.report()
+    assert images[0].name in report[report.index("\nReliability\n") :]
+    document = json.loads(result.to_json())["reliability"]
+    assert [each["kind"] for each in document["kinds"]] == [each.kind for each in summary.kinds]
+    assert list(summary.table()["name"]) == [each["name"] for each in document["weakest"]]
+    assert pickle.loads(pickle.dumps(result)).reliability_summary.lines("m") == summary.lines("m")
 
 
 def test_a_lens_that_is_not_modelled(simulated):

@@ -1,11 +1,14 @@
 """The verdict as commands end by it."""
 
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from photogram import adjust, check, simulate
 from photogram.cli import app
 from photogram.giant import Project, read_project, write_project
 
@@ -33,6 +36,57 @@ def test_warnings_count_where_they_are_asked_to(run, project):
     assert (document["code"], document["exit"], document["warning"]) == ("weights", 0, True)
     assert run("giant", project, "--strict", "--quiet").exit_code == 4
     assert "Verdict\n-------\nWeights too optimistic" in Path("half-adjusted", "report.txt").read_text()
+
+
+def test_gross_errors_and_weights_together(run, project, tmp_path):
+    """Ten gross errors, and standard deviations of half the size: weights change, and only the errors go."""
+    block = read_project(project).to_block()
+    xy = block.image_xy.copy()
+    bad = np.flatnonzero(adjust(block).redundancy.min(axis=1) > 0.3)[::60][:10]
+    xy[bad] += 0.3
+    write_project(Project.from_block(block.replace(image_xy=xy)), tmp_path / "wrong")
+    done = run(
+        "giant", tmp_path / "wrong", "--snoop", "--components", "kind", "--json", "result.json", "--out", "o"
+    )
+    assert done.exit_code == 0, done.output
+    document = json.loads(Path("result.json").read_bytes())
+    names = {
+        f"image of point {block.point_ids[block.image_points[row]]} on photo"
+        f" {block.photo_ids[block.image_photos[row]]}"
+        for row in bad.tolist()
+    }
+    assert {entry["name"] for entry in document["verdict"]["removed"]} == names
+    assert 0.8 < document["variance_of_unit_weight"] < 1.25
+    text = Path("o", "components.txt").read_text()
+    factor = float(re.search(r"standard deviations of \S+.*: multiplied by (\S+)", text)[1])
+    assert factor == pytest.approx(2.0, rel=0.1)
+    assert text.splitlines()[0] in done.output
+
+
+def test_a_hint_heads_the_verdict():
+    block = simulate(strips=2, photos_per_strip=4, seed=5).block
+    down = adjust(block.replace(image_xy=block.image_xy * [1.0, -1.0]))
+    assert down.hints
+    assert down.verdict.hints == down.hints
+    assert down.verdict.exit in (3, 4)
+    lines = [down.verdict.headline, *down.verdict.lines]
+    assert any("y of the images has the wrong sign" in line for line in lines)
+    assert any("nothing was corrected" in line for line in lines)
+    good = adjust(block)
+    assert good.hints == good.verdict.hints == ()
+
+
+def test_a_check_ends_with_a_verdict():
+    block = simulate(strips=2, photos_per_strip=4, seed=5).block
+    good = check(block)
+    assert (good.verdict.exit, bool(good.grave)) == (0, False)
+    assert good.verdict.tests == good.result.verdict.tests
+    down = check(block.replace(image_xy=block.image_xy * [1.0, -1.0]))
+    assert (down.verdict.code, down.verdict.exit) == ("hint", 3)
+    assert json.loads(down.to_json())["verdict"]["headline"] == down.verdict.headline
+    xy = block.image_xy.copy()
+    xy[int(np.argmax(adjust(block).redundancy[:, 0])), 0] += 1.0
+    assert check(block.replace(image_xy=xy)).verdict.code == "gross-errors"
 
 
 @pytest.mark.parametrize(

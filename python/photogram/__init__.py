@@ -8,6 +8,15 @@ from typing import TYPE_CHECKING
 from photogram.former_names import TODAY, found_under_former_names
 
 if TYPE_CHECKING:
+    from photogram import absolute_orientation as absolute_orientation
+    from photogram import collection as collection
+    from photogram import comparator as comparator
+    from photogram import formats as formats
+    from photogram import giant as giant
+    from photogram import perspective_center as perspective_center
+    from photogram import planning as planning
+    from photogram import plots as plots
+    from photogram import stellar as stellar
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
@@ -22,6 +31,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.variance_function import variance_function
     from photogram.checks.checking import check
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
+    from photogram.formats.results import read_result
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
     from photogram.network.block import Block
@@ -32,6 +42,7 @@ if TYPE_CHECKING:
     from photogram.network.simulation import Simulation, simulate
     from photogram.planning import Plan, plan
     from photogram.results.components import VarianceComponents
+    from photogram.results.differences import Differences, differences
     from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
     from photogram.results.model_tests import compare, score_test, terms_test
@@ -47,6 +58,7 @@ __all__ = [
     "Block",
     "Camera",
     "Cleaned",
+    "Differences",
     "FirstValues",
     "GroupSums",
     "InnerConstraints",
@@ -75,6 +87,7 @@ __all__ = [
     "check",
     "clean",
     "compare",
+    "differences",
     "eliminate_terms",
     "first_values",
     "group_sums",
@@ -82,6 +95,7 @@ __all__ = [
     "orient",
     "plan",
     "predict",
+    "read_result",
     "resect",
     "score_test",
     "simulate",
@@ -99,6 +113,7 @@ _HOMES = {
     "Camera": "network.cameras",
     "VarianceComponents": "results.components",
     "VarianceFunction": "results.variance_function",
+    "Differences": "results.differences",
     "FirstValues": "adjustment.first_values",
     "GroupSums": "results.group_sums",
     "InnerConstraints": "network.datum",
@@ -126,6 +141,7 @@ _HOMES = {
     "Cleaned": "adjustment.cleaning",
     "clean": "adjustment.cleaning",
     "compare": "results.model_tests",
+    "differences": "results.differences",
     "eliminate_terms": "adjustment.elimination",
     "score_test": "results.model_tests",
     "terms_test": "results.model_tests",
@@ -135,6 +151,7 @@ _HOMES = {
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",
+    "read_result": "formats.results",
     "resect": "adjustment.resection",
     "simulate": "network.simulation",
     "snoop": "adjustment.snooping",
@@ -147,12 +164,27 @@ NumPy and the engine take a while, in which the command line could not yet end c
 """
 
 
+MODULES = (
+    "absolute_orientation",
+    "collection",
+    "comparator",
+    "formats",
+    "giant",
+    "perspective_center",
+    "planning",
+    "plots",
+    "stellar",
+)
+"""The packages that users know by name: loaded when they are first asked for, too."""
+
 found_under_former_names()
 
 
 def __getattr__(name: str) -> object:
     if name in _HOMES:
         value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    elif name in MODULES:
+        value = import_module(f"{__name__}.{name}")
     elif name in TODAY:
         value = import_module(f"{__name__}.{TODAY[name]}")
     else:
@@ -162,4 +194,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, *MODULES})

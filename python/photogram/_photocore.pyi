@@ -585,6 +585,7 @@ def block_network(
     unit_variance: str,
     minimum: tuple[int, tuple[int, int] | None] | None,
     memory: int | None,
+    points_given: bool,
 ) -> BlockNetwork:
     """Return a block as it is adjusted by least squares (GIANT guide, sections 4 to 9).
 
@@ -649,6 +650,8 @@ def block_network(
         its coordinate; None leaves either to the core.
     memory
         Bytes that the adjustment, or covariances that are asked for, may take; None for any number.
+    points_given
+        Whether points start from their coordinates where these are known, not where their rays meet.
 
     Raises
     ------
@@ -752,6 +755,10 @@ class NetworkTrial:
     def photos(self) -> list[list[float]]:
         """The values of each photo where the last trial has ended: as they are given, pose first."""
 
+    @property
+    def points(self) -> _Floats:
+        """(n, 3) coordinates of the points where the last trial has ended; NaN for those that are out."""
+
     def stand(self) -> tuple[str, int, float, int, list[int]]:
         """Take the network as its adjustment has ended, with everything in it; return what `adjust` does."""
 
@@ -773,7 +780,8 @@ class NetworkTrial:
         points, photos
             Those that are out with all that was observed of them: they stay where they are.
         tolerance
-            When to stop, as the options of the network count it; theirs when None.
+            When to stop: for a block when no unknown would change by more than this multiple of its standard
+            deviation in the next iteration, for a collection as its options count it; theirs when None.
 
         Returns
         -------
@@ -787,12 +795,12 @@ class NetworkTrial:
         *,
         iterations: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
-    ) -> _Floats:
+    ) -> _Floats | None:
         """Adjust with a robust loss from where the last trial has ended, and stay there.
 
         Returns
         -------
-        (G,) factors by which it has changed weights.
+        (G,) factors by which it has changed weights; None where it diverges: then nothing has changed.
         """
 
     def tests(self) -> dict[str, NDArray[Any]]:
@@ -819,10 +827,12 @@ class NetworkTrial:
         or photo is.
         """
 
-    def on_points(self, points: list[int]) -> list[tuple[list[int], _Floats, _Floats]]:
+    def on_points(self, points: list[int], *, gone: bool = False) -> list[tuple[list[int], _Floats, _Floats]]:
         """Return all observations of points together: suspects, residuals of unit weight, and R.
 
-        Nothing for points that observations beside images touch.
+        Nothing for points that observations beside images touch. `gone`: of points that are out with all that
+        was observed of them, as if they took part, each by itself against the photos as the others determine
+        them; nothing then also where the rays do not determine the point.
         """
 
     def effects(self, suspects: list[int]) -> _Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from photogram.messages import locate
 
@@ -10,7 +11,19 @@ __all__ = ["AdjustmentError", "InputError", "OutOfMemoryError", "PhotogramError"
 
 
 class PhotogramError(Exception):
-    """Base of every exception that photogram raises on purpose."""
+    """Base of every exception that photogram raises on purpose; all can be pickled."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Not by what the class is called with, which differs from one to the other.
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[PhotogramError], arguments: tuple[Any, ...], held: dict[str, Any]) -> PhotogramError:
+    """Make an exception anew of what it holds."""
+    # Of a MemoryError that is an error of ours first, too, the base makes the object.
+    error = BaseException.__new__(kind, *arguments)
+    error.__dict__.update(held)
+    return error
 
 
 class InputError(PhotogramError, ValueError):

@@ -38,7 +38,11 @@ def test_what_was_packed_is_packed_again(run, tmp_path, packing):
     made = simulate(seed=3)
     (tmp_path / f"problem.txt{packing}").write_bytes(to_bytes(made.collection, packing))
     assert run("collection", f"problem.txt{packing}", "--out", "out").exit_code == 0
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"report.txt", f"adjusted.txt{packing}"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "report.html",
+        "report.txt",
+        f"adjusted.txt{packing}",
+    }
     assert len(read(tmp_path / "out" / f"adjusted.txt{packing}").image_xy) == len(made.collection.image_xy)
 
 

@@ -5,9 +5,11 @@ import pytest
 from block import sample, truth
 from damaged import check_damaged
 from test_opensfm import only
+from test_plain_project import written
 
-from photogram import Attitudes, InputError, adjust, formats
+from photogram import Attitudes, Camera, InputError, adjust, formats
 from photogram.formats import additions
+from photogram.formats.project import Frame
 from photogram.formats.self_check import agreement
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
@@ -65,7 +67,7 @@ def test_a_table_of_markers_is_control(tmp_path):
     [
         ('type="frame"', 'type="rpc"', ["record 5", "type rpc"]),
         ("<f>3612.5</f>", "<f>x</f>", ["record 13", "'x' is not a number"]),
-        ("<p1>-0.00025</p1>", "<p1>-0.00025</p1><p3>0.1</p3>", ["p3 is not zero"]),
+        ("<p1>-0.00025</p1>", "<p1>-0.00025</p1><p3>1e999</p3>", ["record 13", "'1e999' is not a number"]),
         (
             'sensor_id="0" component_id="0" label="DJI_0001"',
             'sensor_id="9" label="DJI_0001"',
@@ -82,6 +84,82 @@ def test_a_fault_is_named_with_its_line(tmp_path, old, new, words):
         formats.read(tmp_path / "cameras.xml", "agisoft")
     for word in ("cameras.xml", *words):
         assert word in str(refused.value)
+
+
+def test_further_tangential_terms_have_a_camera(tmp_path):
+    text = sample("agisoft", "cameras.xml").read_text()
+    (tmp_path / "cameras.xml").write_text(
+        text.replace("<p1>-0.00025</p1>", "<p1>-0.00025</p1><p3>0.1</p3>", 1)
+    )
+    camera, other = formats.read(tmp_path / "cameras.xml").block.cameras
+    assert (camera.model, other.model) == ("agisoft_frame_p4", "agisoft_frame")
+    assert camera.parameters["p3"] == 0.1
+
+
+def both_ways(project, place):
+    """Write and read a project."""
+    return formats.read(written(project, place, "agisoft") / "cameras.xml")
+
+
+def test_what_is_written_is_read_again(tmp_path):
+    project = formats.read(sample("agisoft", "cameras.xml"))
+    other = both_ways(project, tmp_path)
+    one, two = project.block, other.block
+    assert other.frame == project.frame
+    assert two.photo_ids == one.photo_ids
+    assert two.point_ids == one.point_ids
+    assert [each.parameters for each in two.cameras] == [each.parameters for each in one.cameras]
+    np.testing.assert_allclose(two.photo_positions, one.photo_positions, rtol=0, atol=5e-9)
+    np.testing.assert_allclose(two.photo_attitudes, one.photo_attitudes, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(two.image_xy, one.image_xy, rtol=0, atol=1e-12)
+    assert project.checks == other.checks
+    mine, own = ([each for each in block.observations if each.KIND == "control"] for block in (one, two))
+    assert [each.point for each in own] == [each.point for each in mine]
+    for a, b in zip(mine, own, strict=True):
+        np.testing.assert_allclose(b.observed, a.observed, rtol=0, atol=5e-9)
+        np.testing.assert_allclose(b.precision, a.precision, rtol=1e-6, atol=1e-12)
+    # Digits of the earth: the loss that the page of formats states.
+    a, b = adjust(one), adjust(two)
+    assert (np.abs(a.photo_positions - b.photo_positions) < 1e-6 * a.photo_sd[:, :3]).all()
+
+
+def test_a_block_without_a_place_on_the_earth_keeps_all_digits(tmp_path):
+    project = formats.read(sample("project"))
+    local = project.replace(frame=Frame(), starts=project.starts)
+    names = " ".join(formats.cannot_hold(local, "agisoft"))
+    assert "images of tie points" in names
+    assert "digits" not in names
+    other = both_ways(local, tmp_path)
+    assert [each.model for each in other.block.cameras] == ["agisoft_frame", "agisoft_frame"]
+    np.testing.assert_array_equal(other.block.photo_positions, local.block.photo_positions)
+    np.testing.assert_allclose(other.block.photo_attitudes, local.block.photo_attitudes, rtol=0, atol=1e-14)
+    points = {name: row for row, name in enumerate(local.block.point_ids)}
+    for row, name in enumerate(other.block.point_ids):
+        np.testing.assert_array_equal(
+            other.block.point_positions[row], local.block.point_positions[points[name]]
+        )
+        np.testing.assert_array_equal(other.block.point_sd[row], local.block.point_sd[points[name]])
+    # Control and references of cameras adjust to the same, as the images of control do.
+    own = set(other.block.point_ids)
+    block = local.block
+    keep = np.array([block.point_ids[point] in own for point in block.image_points])
+    less = block.replace(
+        image_photos=block.image_photos[keep],
+        image_points=block.image_points[keep],
+        image_xy=block.image_xy[keep],
+        image_sd=0.3,
+    )
+    one, two = adjust(less, tolerance=1e-10), adjust(other.block.replace(image_sd=0.3), tolerance=1e-10)
+    assert (np.abs(one.photo_positions - two.photo_positions) < 1e-9 * one.photo_sd[:, :3]).all()
+    np.testing.assert_allclose(two.photo_sd, one.photo_sd, rtol=1e-9)
+
+
+def test_what_metashape_does_not_have_is_refused():
+    project = formats.read(sample("project"))
+    camera = Camera("opencv_fisheye", {"fx": 900.0, "fy": 900.0, "cx": 500.0, "cy": 400.0}, name="A")
+    other = project.block.cameras[1]
+    with pytest.raises(InputError, match="opencv_fisheye, which Metashape does not have"):
+        formats.to_files(project.replace(block=project.block.replace(cameras=[camera, other])), "agisoft")
 
 
 def test_damaged_documents_end_in_a_message(tmp_path):

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from block import sample, truth
 from damaged import check_damaged
+from test_plain_project import written
 
-from photogram import Attitudes, InputError, adjust, formats
-from photogram.formats import Wishes
+from photogram import Attitudes, Camera, InputError, adjust, formats
+from photogram.formats import Wishes, additions
+from photogram.network.directions import image_directions
 
 FOCAL = {"A": 8.67, "B": 9.315}
 
@@ -108,6 +110,119 @@ def test_a_fault_is_named_with_its_line(tmp_path, file, old, new, words):
         formats.read(tmp_path)
     for word in words:
         assert word in str(refused.value)
+
+
+SD = Wishes(sd={"control": (0.02, 0.02, 0.03)})
+
+
+def pinholes():
+    """Return the sample as exact pinhole cameras see it, with names that are no words and noise."""
+    project = formats.read(sample("project"))
+    block = project.block
+    cameras = [
+        Camera("pinhole", {"fx": f, "fy": f, "cx": w / 2, "cy": h / 2}, name=name)
+        for name, f, w, h in (("A", 3612.5, 4000, 3000), ("B", 3105.0, 3000, 4000))
+    ]
+    directions = image_directions(block)
+    own = block.photo_cameras[block.image_photos]
+    f = np.array([3612.5, 3105.0])[own, np.newaxis]
+    middle = np.array([[2000.0, 1500.0], [1500.0, 2000.0]])[own]
+    noise = np.random.default_rng(4).normal(0, 0.3, block.image_xy.shape)
+    xy = middle + f * directions[:, :2] / -directions[:, 2:] * [1, -1] + noise
+    return project.replace(
+        block=block.replace(cameras=cameras, image_xy=xy, image_sd=0.3, observations=()),
+        pixel_mm=(0.0024, 0.003),
+    )
+
+
+def compared(one, two):
+    """Return the largest difference of positions of photos and points in standard deviations."""
+    photos = [two.block.photo_ids.index(name) for name in one.block.photo_ids]
+    points = [two.block.point_ids.index(name) for name in one.block.point_ids]
+    a = np.abs(two.photo_positions[photos] - one.photo_positions) / one.photo_sd[:, :3]
+    b = np.abs(two.point_positions[points] - one.point_positions) / one.point_sd
+    return max(a.max(), np.nanmax(b))
+
+
+def with_own_sd(project, pixels=(0.0024, 0.003)):
+    """Return a block of reduced coordinates with the standard deviations of its pixels."""
+    block = project.block
+    sides = np.array(pixels)[block.photo_cameras[block.image_photos]]
+    return block.replace(image_sd=0.3 * np.column_stack([sides, sides]))
+
+
+def test_bingo_keeps_all_digits(tmp_path):
+    project = pinholes()
+    lost = " ".join(formats.cannot_hold(project, "bingo"))
+    for word in ("standard deviations", "underscores", "control.csv"):
+        assert word in lost
+    place = written(project, tmp_path, "bingo")
+    other = formats.read(place)
+    names = {name.replace(" ", "_"): name for name in project.block.photo_ids}
+    other = additions.with_control(other, place / "control.csv", {}, None)
+    block = with_own_sd(other).replace(photo_ids=[names[name] for name in other.block.photo_ids])
+    one, two = adjust(project.block, tolerance=1e-10), adjust(block, tolerance=1e-10)
+    assert compared(one, two) < 1e-9
+    np.testing.assert_allclose(two.photo_sd, one.photo_sd, rtol=1e-8)
+
+
+def test_patb_keeps_the_digits_that_are_stated(tmp_path):
+    project = pinholes()
+    lost = " ".join(formats.cannot_hold(project, "patb"))
+    assert "image coordinates are written to 1e-4 micrometres, positions to 1e-5" in lost
+    place = written(project, tmp_path, "patb")
+    assert [len(line) for line in (place / "block.ori").read_text().splitlines()[:3]] == [80, 80, 64]
+    other = formats.read(place, None, SD)
+    assert other.block.photo_ids == project.block.photo_ids
+    assert sorted(other.block.point_ids) == sorted(project.block.point_ids)
+    assert len(other.checks) == len(project.checks) == 2
+    one, two = adjust(project.block, tolerance=1e-10), adjust(with_own_sd(other), tolerance=1e-10)
+    # 1e-4 micrometres are 1.4e-4 of the standard deviations of these images.
+    assert 1e-9 < compared(one, two) < 5e-4
+
+
+@pytest.mark.parametrize("file_format", ["patb", "bingo"])
+def test_distorted_cameras_are_written_as_their_rays(tmp_path, file_format):
+    project = formats.read(sample("project"))
+    assert "lenses" in " ".join(formats.cannot_hold(project, file_format))
+    other = formats.read(written(project, tmp_path, file_format)).block
+    block = project.block
+    assert len(other.image_xy) == len(block.image_xy)
+    np.testing.assert_array_equal(other.image_photos, block.image_photos)
+    # Half of the last digit over the principal distance.
+    limit = 1e-14 if file_format == "bingo" else 0.6e-7 / 8.67
+    np.testing.assert_allclose(image_directions(other), image_directions(block), rtol=0, atol=limit)
+
+
+def test_pixels_without_a_size_have_a_principal_distance_of_their_own(tmp_path):
+    project = pinholes().replace(pixel_mm=(None, 0.003))
+    assert "the principal distance is 100 mm" in " ".join(formats.cannot_hold(project, "patb"))
+    other = formats.read(written(project, tmp_path, "patb")).block
+    assert [each.parameters["c"] for each in other.cameras] == [-100.0, -9.315]
+
+
+def test_heights_alone_are_control_of_patb(tmp_path):
+    project = pinholes()
+    block = project.block
+    held = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))[:2]
+    positions, sd = block.point_positions.copy(), block.point_sd.copy()
+    positions[held, :2], sd[held, :2] = np.nan, np.inf
+    partly = project.replace(block=block.replace(point_positions=positions, point_sd=sd))
+    other = formats.read(written(partly, tmp_path, "patb"), None, SD)
+    for row in held:
+        own = other.block.point_ids.index(block.point_ids[row])
+        np.testing.assert_array_equal(np.isfinite(other.block.point_sd[own]), [False, False, True])
+        np.testing.assert_array_equal(np.isfinite(other.block.point_positions[own]), [False, False, True])
+
+
+def test_names_that_are_no_words_of_bingo_are_refused():
+    project = pinholes()
+    names = list(project.block.photo_ids)
+    twins = [names[0], names[0].replace("_", " "), *names[2:]]
+    with pytest.raises(InputError, match="differ by blanks alone"):
+        formats.to_files(project.replace(block=project.block.replace(photo_ids=twins)), "bingo")
+    with pytest.raises(InputError, match="the name -99 means something else"):
+        formats.to_files(project.replace(block=project.block.replace(photo_ids=["-99", *names[1:]])), "bingo")
 
 
 @pytest.mark.parametrize("seed", range(2))

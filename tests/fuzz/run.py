@@ -24,8 +24,8 @@ CPU_SECONDS = 20
 """Of one input; more is a hang."""
 WALL_SECONDS = 900
 """Of one input, for waits that use no processor."""
-MEMORY = 3 << 30
-"""Address space of a worker, bytes."""
+MEMORY = 5 << 30
+"""Address space of a worker, bytes; pyarrow reserves more than one GiB of it where pandas finds it."""
 TOLD = 60.0
 """Seconds between two lines about the progress of a run."""
 IN_MEMORY = "/dev/shm"

@@ -80,7 +80,7 @@ def directory(request, tmp_path):
 def test_section_2_restart_from_unit_20(directory, tmp_path):
     # Two iterations are not enough: unit 20 only.
     run(directory, "--as-published", "--out", tmp_path / "out", code=3)
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"RESTART", "report.txt"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"RESTART", "report.html", "report.txt"}
     restart = with_files(directory, tmp_path / "again", FRAMES=tmp_path / "out" / "RESTART")
     frames, input_frames = read_project(restart).frames, read_project(directory).frames
     assert [frame.position_sd for frame in frames] == [frame.position_sd for frame in input_frames]

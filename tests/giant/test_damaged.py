@@ -17,7 +17,7 @@ from photogram.io.writing import write_whole
 PROJECTS = 840
 RUNS = 8
 ERROR_AT = re.compile(r"error: (?P<file>.+?)(, record (?P<record>\d+))?: ")
-WRITTEN = {"RESTART", "report.txt"}
+WRITTEN = {"RESTART", "report.html", "report.txt"}
 
 
 @pytest.fixture(scope="module")

@@ -106,7 +106,7 @@ def test_section_6_divergence_writes_unit_20_only(tmp_path):
     assert sums(result)[-1] > sums(result)[-2]
     printed = run(tmp_path / "in", "--as-published", "--out", tmp_path / "out", code=3)
     assert "diverged" in printed
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"RESTART", "report.txt"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"RESTART", "report.html", "report.txt"}
 
 
 @pytest.mark.giant("6", "initial ground coordinates: rays intersected from the initial stations")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
 from photogram.show.pictures import arrows, drawn, new_figure, round_length
+from photogram.show.style import PURPLE, VERMILION
 from photogram.show.ways import picture_of
 
 if TYPE_CHECKING:
@@ -76,12 +77,12 @@ def _residuals(axes: Axes, plan: Floats, enlarged: Floats) -> None:
     """Draw residuals, already in the scale of the plan."""
     flat = np.isfinite(enlarged[:, :2]).any(axis=1)
     if flat.any():
-        arrows(axes, plan[flat], np.nan_to_num(enlarged[flat, :2]), width=0.004, zorder=3, color="C0")
-        axes.plot([], [], color="C0", label="plan residual")
+        arrows(axes, plan[flat], np.nan_to_num(enlarged[flat, :2]), width=0.004, zorder=3, color=VERMILION)
+        axes.plot([], [], color=VERMILION, label="plan residual")
     high = np.isfinite(enlarged[:, 2])
     ends = plan[high, 1] + enlarged[high, 2]
     axes.vlines(
-        plan[high, 0], plan[high, 1], ends, color="C1", linewidth=3, label="height residual (up: positive)"
+        plan[high, 0], plan[high, 1], ends, color=PURPLE, linewidth=3, label="height residual (up: positive)"
     )
     # Bars do not widen the limits of the axes by themselves.
     axes.update_datalim(np.column_stack([plan[high, 0], ends]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal, get_args
 
@@ -206,6 +206,37 @@ def adjust(
         unit_variance=unit_variance,
         minimum=minimum_row(block, datum) if isinstance(datum, MinimumConstraints) else None,
     )
+    return _adjusted(block, options, processors, progress, inner, as_published)
+
+
+def adjusted_from(
+    block: Block,
+    options: CoreOptions,
+    *,
+    threads: int | None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Result:
+    """Adjust a block whose values, those of points too, are where an adjustment of much of it has ended.
+
+    Parameters
+    ----------
+    block, options
+        The block, and how the core adjusts it.
+    threads, progress
+        As of :func:`adjust`.
+    """
+    options = replace(options, points_given=True)
+    return _adjusted(started(block), options, core_threads(threads), progress)
+
+
+def _adjusted(
+    block: Block,
+    options: CoreOptions,
+    processors: int,
+    progress: Callable[[Progress], None] | None,
+    inner: DatumRow | None = None,
+    as_published: AsPublished | None = None,
+) -> Result:
     network = block_network(block, options)
     try:
         told = None if progress is None else teller(progress)

@@ -94,6 +94,7 @@ def clean(
     level: float = 0.05,
     probing: Probing | None = None,
     threads: int | None = None,
+    **options: Any,
 ) -> Cleaned:
     """Take gross errors out and estimate weights, in the order in which neither spoils the other.
 
@@ -112,6 +113,8 @@ def clean(
         Of the tests of snooping, and of those of components.
     threads
         As of :func:`photogram.adjust`.
+    options
+        Further ones of :func:`photogram.snoop`.
 
     Raises
     ------
@@ -122,7 +125,7 @@ def clean(
     names = grouping.groups.names
     settings = Settings(level=level, equality=False, probing=probing or Probing())
     factors = np.ones(grouping.count)
-    snooped = snoop(network, level=level, threads=threads)
+    snooped = snoop(network, level=level, threads=threads, **options)
     if not _rejected(snooped.result, level):
         return Cleaned(snooped, None, names, factors, 0, settled=True)
     for rounds in range(1, MOST_ROUNDS + 1):
@@ -130,7 +133,7 @@ def clean(
         found = of_grouping(left, own, settings, held=held, threads=threads)
         changed = _changed(found, names, factors)
         before = _out(snooped)
-        snooped = snoop(scaled(network, grouping, changed), level=level, threads=threads)
+        snooped = snoop(scaled(network, grouping, changed), level=level, threads=threads, **options)
         stands = bool((np.abs(changed / factors - 1) <= STANDS).all())
         factors = changed
         if stands and before == _out(snooped):

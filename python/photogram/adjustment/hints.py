@@ -158,13 +158,20 @@ def hinted(error: AdjustmentError, block: Block) -> AdjustmentError:
 
 
 def with_hints(result: Result) -> Result:
-    """Return a result, with hints among its messages where it has not converged or images fit badly."""
+    """Return a result, with hints for its verdict where it has not converged or images fit badly.
+
+    They stand among its messages too, and so do those on standard deviations, which are no mistakes of
+    conventions: the verdict has tests of its own for them.
+    """
     variance = result.variance_of_unit_weight
     fits = variance is None or variance <= BAD**2
     if (result.converged and fits) or result.loss is not None:
         return result
-    found = hints(result)
-    return replace(result, messages=[*found, *result.messages]) if found else result
+    conventions = hints(result.block)
+    found = conventions or (weight_hints(result) if result.converged else [])
+    if not found:
+        return result
+    return replace(result, hints=tuple(map(str, conventions)), messages=[*found, *result.messages])
 
 
 def verdicts(block: Block) -> list[Verdict]:

@@ -10,7 +10,7 @@ from typing import Any, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import Progress, UnitVariance, adjust, core_threads
+from photogram.adjustment.adjustment import Progress, UnitVariance, adjust, adjusted_from, core_threads
 from photogram.arguments.arrays import number, one_of, truth_value, whole_number
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError
@@ -177,7 +177,8 @@ def _snoop_block(
         if not first.converged and robust is not False:
             first = adjusted(block, covariance=False, loss="huber")
         trial, outcome = _snooped_from(first, settings, threads, parts=parts)
-    result = adjusted(_without(block, trial, outcome.out))
+    cleaned, options = _without(block, trial, outcome.out), options_of(unit_variance)
+    result = adjusted_from(cleaned, options, threads=threads, progress=progress)
     remarks = [Message(remark) for remark in outcome.remarks]
     result = dataclasses.replace(result, messages=[*remarks, *result.messages])
     return Snooped(result=result, outcome=outcome, suspects=trial.suspects, settings=settings)
@@ -235,7 +236,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     subject = subjects[group]
     images = np.ones(len(block.image_xy), dtype=bool)
     images[subject[gone[IMAGE]]] = False
-    point_sd = block.point_sd.copy()
+    point_sd, points = block.point_sd.copy(), core.points
     point_sd[subject[gone[CONTROL]], components[gone[CONTROL]]] = np.inf
     position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
     position_sd[subject[gone[POSITION]], components[gone[POSITION]]] = np.inf
@@ -257,6 +258,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
         photo_attitudes_observed=_observed(block.photo_attitudes, attitudes, attitude_sd),
         photo_position_sd=position_sd,
         photo_attitude_sd=attitude_sd,
+        point_positions=np.where(np.isinf(point_sd) & ~np.isnan(points), points, block.point_positions),
         point_sd=point_sd,
         image_photos=block.image_photos[images],
         image_points=block.image_points[images],

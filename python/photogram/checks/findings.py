@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from photogram import _photocore
 from photogram.io import json
 from photogram.show.sections import composed, headline
+from photogram.show.ways import html_of
+from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict
 
 if TYPE_CHECKING:
     from photogram.results.result import Result
@@ -15,6 +17,20 @@ if TYPE_CHECKING:
 __all__ = ["Check", "Finding", "Level", "Section"]
 
 Level = Literal["grave", "look"]
+CONVENTIONS = frozenset(
+    {
+        "mirrored",
+        "kappa",
+        "sign-of-principal-distance",
+        "sense-of-rotation",
+        "convention",
+        "lens",
+        "control-set",
+        "control-system",
+        "observed-positions",
+    }
+)
+"""Kinds of findings that are mistakes in what the data of a whole set mean."""
 SHOWN = 40
 """Findings of one level that a section of the text shows at most; the JSON document has all."""
 
@@ -105,11 +121,46 @@ class Check:
         """The grave findings."""
         return [finding for finding in self.findings if finding.level == "grave"]
 
+    @property
+    def verdict(self) -> Verdict:
+        """What the findings come to, in the form of the verdict on an adjustment.
+
+        Grave findings make results wrong: exit code 3, that of the command. Mistakes in what data mean stand
+        as hints; tests are those of the adjustment, where there was one.
+        """
+        grave, look = self.grave, [each for each in self.findings if each.level == "look"]
+        hints = tuple(each.text for each in grave if each.kind in CONVENTIONS)
+        tests = () if self.result is None else self.result.verdict.tests
+        if grave:
+            code, exit_code = ("hint" if hints else "gross-errors"), EXIT_NOT_CONVERGED
+            what = "The data are likely wrong" if hints else "Gross errors likely"
+            named = [each.text for each in sorted(grave, key=lambda each: each.kind not in CONVENTIONS)]
+            headline = f"{what}: {named[0]}" + (f" (and {len(named) - 1} more)" if named[1:] else "")
+        else:
+            code, exit_code = ("look-at", 0) if look else ("accepted", 0)
+            headline = f"Nothing grave was found; {len(look)} to look at" if look else "Nothing was found"
+        return Verdict(
+            code=code,
+            headline=headline,
+            exit=exit_code,
+            warning=bool(grave or look),
+            lines=tuple(each.text for each in [*grave[1:], *look]),
+            tests=tests,
+            hints=hints,
+        )
+
     def report(self) -> str:
         """Return the check as text."""
         grave, look = len(self.grave), len(self.findings) - len(self.grave)
         head = f"{headline('check', self.title)}\n{grave} grave, {look} to look at"
         return composed(head, ((section.title, section.text()) for section in self.sections))
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     def to_json(self) -> bytes:
         """Return the findings as a JSON document (UTF-8); `docs/giant-check.md` lists its members."""
@@ -117,6 +168,7 @@ class Check:
             "program": f"photogram {_photocore.__version__}",
             "title": self.title,
             "grave": len(self.grave),
+            "verdict": self.verdict.document(),
             "sections": [asdict(section) for section in self.sections],
         }
         return json.to_json(document)

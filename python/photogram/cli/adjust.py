@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,23 +10,33 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import print_remark, print_sections
-from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
+from photogram.cli.job import Job, Writes, with_job
+from photogram.cli.maps import CloudFile, Crs, MapFile, check_maps, drawn_maps
 from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Strict,
     Threads,
+    as_data,
     default_out,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.projects import (
-    EXAMPLE,
     NOTHING,
     Additions,
+    Example,
+    ProjectPath,
     described,
+    project_path,
     read_project,
     with_additions,
 )
@@ -58,27 +69,26 @@ class LossName(StrEnum):
 @with_additions()
 def adjust(
     job: Job,
-    path: Annotated[
-        Path | None,
-        Reads.FILE,
-        typer.Argument(
-            metavar="PATH",
-            help="A project: a folder or file of any format that docs/formats.md lists.",
-            show_default=False,
-        ),
-    ] = None,
-    example: Annotated[
-        bool, typer.Option("--example", help="Adjust the packaged example instead, that of `photogram new`.")
-    ] = False,
+    path: ProjectPath = None,
+    example: Example = False,
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
         out_option(
-            "Directory for report.txt, the tables of the result, and the adjusted project in `adjusted/`."
+            "Directory for report.html, report.txt, the tables of the result, and the adjusted project in"
+            " `adjusted/`."
             " Default: PATH-adjusted."
         ),
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
+    parquet: ParquetFolder = None,
+    crs: Crs = None,
+    map: MapFile = None,  # noqa: A002  # as the option is called
+    ply: CloudFile = None,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -115,20 +125,26 @@ def adjust(
     observations with their standard deviations, redundancy numbers and test values, and the adjusted project
     go to --out.
     """
-    if example:
-        path = job.packaged(*EXAMPLE)
-    assert path is not None
+    path = project_path(job, path)
     target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
+    place = html_place(html, no_html, target)
     with job:
         from photogram import Result
         from photogram.formats.additions import self_calibrated
+        from photogram.show.ways import page_of
 
+        check_maps(map)
+        pictures = Pictures(job, plots, plot_format, target)
         project = read_project(job, path, added)
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
         sections = described(project)
         if not quiet:
             print_sections(sections, "`photogram info`")
+        if crs is not None:
+            from photogram.formats.placing import check_place
+
+            check_place(project.block, crs)
         block, remarks = _started(project)
         for remark in remarks:
             if not quiet:
@@ -143,13 +159,21 @@ def adjust(
         else:
             result = _adjusted(job, project, block, datum, loss, ordering, threads)
         files = _files(project, result, sections)
+        if crs is not None:
+            from photogram.formats.placing import placed, placed_files
+
+            found = placed_files(placed(result, crs))
+            files |= {f"in_crs/{name}": content for name, content in found.items()}
         if removed is not None:
             files["removed.csv"] = removed.table().to_csv(index=False).encode()
             files["report.txt"] += removed.report().encode()
         taken = [] if removed is None else removed.sections()
+        page = html_files(job, "adjust", place, html is not None, lambda: page_of(removed or result))
         job.finish(
-            {target / name: content for name, content in files.items()},
+            {target / name: content for name, content in files.items()} | pictures.of(result) | page,
             {} if json is None else {json: result.to_json()},
+            as_data(result, parquet),
+            drawn_maps(result, map, ply, crs, _sizes(project), quiet=quiet),
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )
@@ -239,6 +263,11 @@ def _files(project: Project, result: Result, sections: list[tuple[str, list[str]
         if beside is not None:
             files |= {f"adjusted-{own}/{name}": content for name, content in beside(after, result).items()}
     return files
+
+
+def _sizes(project: Project) -> Sequence[tuple[float, float] | None]:
+    """Return the sizes of pictures where images are in pixels, as they are."""
+    return project.sizes if project.block.image_unit == "px" else ()
 
 
 def _same_format(project: Project, name: str) -> dict[str, bytes]:

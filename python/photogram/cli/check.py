@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, output
+from photogram.cli.console import output
+from photogram.cli.html import HtmlFile, html_files
 from photogram.cli.job import Job, Reads, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
 
@@ -24,6 +25,7 @@ def check(
         typer.Argument(metavar="DIR", help="Directory of the five files, as for adjusting."),
     ],
     json: JsonFile = None,
+    html: HtmlFile = None,
     limits: Annotated[
         str | None,
         typer.Option(metavar="N1=..,N6=..", help="Limits of the 1987 program.", show_default=False),
@@ -38,6 +40,7 @@ def check(
     with job:
         from photogram.giant import Limits, read_project
         from photogram.giant import check as check_project
+        from photogram.show.ways import page_of
 
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
@@ -45,6 +48,7 @@ def check(
             found = check_project(project, limits=allowed, threads=threads)
         job.finish(
             {} if json is None else {json: found.to_json()},
+            html_files(job, "giant check", html, True, lambda: page_of(found)),
             summary=lambda: output.print(escape(found.report()), end=""),
-            code=NOT_CONVERGED if found.grave else 0,
+            code=found.verdict.exit,
         )

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, output, print_sections
-from photogram.cli.job import Job, Reads, with_job
+from photogram.cli.console import output, print_sections
+from photogram.cli.html import HtmlFile, html_files
+from photogram.cli.job import Job, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads
-from photogram.cli.projects import NOTHING, Additions, described, read_project, with_additions
+from photogram.cli.projects import (
+    NOTHING,
+    Additions,
+    Example,
+    ProjectPath,
+    described,
+    project_path,
+    read_project,
+    with_additions,
+)
 
 __all__ = ["check_project"]
 
@@ -20,8 +26,10 @@ __all__ = ["check_project"]
 @with_additions()
 def check_project(
     job: Job,
-    path: Annotated[Path, Reads.FILE, typer.Argument(metavar="PATH", help="A project: a folder or file.")],
+    path: ProjectPath = None,
+    example: Example = False,
     json: JsonFile = None,
+    html: HtmlFile = None,
     added: Additions = NOTHING,
     threads: Threads = None,
     quiet: Quiet = False,
@@ -32,14 +40,16 @@ def check_project(
     """
     with job:
         from photogram import check
+        from photogram.show.ways import page_of
 
-        project = read_project(job, path, added)
+        project = read_project(job, project_path(job, path), added)
         if not quiet:
             print_sections(described(project), "`photogram info`")
         with job.status("checking"):
             found = check(project.block, threads=threads)
         job.finish(
             {} if json is None else {json: found.to_json()},
+            html_files(job, "check", html, True, lambda: page_of(found)),
             summary=lambda: output.print(escape(found.report()), end=""),
-            code=NOT_CONVERGED if found.grave else 0,
+            code=found.verdict.exit,
         )

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.components import COMPONENTS, Components, estimated, with_components
+from photogram.cli.components import COMPONENTS, Components, cleaned, estimated, with_components, with_weights
 from photogram.cli.console import print_sections
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -22,8 +28,10 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
@@ -67,7 +75,8 @@ def collection(
         Path | None,
         Writes.DIRECTORY,
         out_option(
-            "Directory for report.txt and the adjusted collection: adjusted.txt, or adjusted.out for a Bundle"
+            "Directory for report.html, report.txt and the adjusted collection: adjusted.txt, or"
+            " adjusted.out for a Bundle"
             " file, packed as FILE is."
             " Default: no files."
         ),
@@ -76,6 +85,11 @@ def collection(
         Path | None, Writes.FILE, Former("--out DIR writes the report there"), typer.Option(hidden=True)
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
+    parquet: ParquetFolder = None,
     loss: Annotated[
         Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")
     ] = Loss.SQUARES,
@@ -120,6 +134,7 @@ def collection(
         from photogram.collection.formats import recognised
         from photogram.collection.report import summary
         from photogram.collection.snooping import snoop_collection
+        from photogram.show.ways import page_of
 
         if problem is None:
             problem = job.packaged(*EXAMPLE)
@@ -129,11 +144,13 @@ def collection(
         names = [] if out is None else [out / "report.txt", out / f"adjusted{found.suffix}{packing}"]
         if components and out is not None:
             names.append(out / COMPONENTS)
-        job.writes(*names)
+        place = html_place(html, no_html, out)
+        job.writes(*names, *([place] if place else []))
+        pictures = Pictures(job, plots, plot_format, out)
         photos = photos.replace(image_sd=sd)
-        if snoop and (loss is not Loss.SQUARES or components):
-            raise typer.BadParameter("not with a robust loss, nor with --components", param_hint="--snoop")
-        log = None
+        if snoop and loss is not Loss.SQUARES:
+            raise typer.BadParameter("not with a robust loss", param_hint="--snoop")
+        log, made = None, None
         with job.status("adjusting") as status:
             options: dict[str, Any] = {
                 "tolerance": tolerance,
@@ -143,32 +160,40 @@ def collection(
                 "progress": shown(status, "cost", 0.5) if status is not None else None,
             }
             if snoop:
-                log = snoop_collection(photos, level=level, fdr=fdr, unit_weight=unit_weight.value, **options)
+                options |= {"level": level, "fdr": fdr, "unit_weight": unit_weight.value}
+                if components:
+                    made = cleaned(photos, components, options.pop("threads"), options)
+                log = made.snooped if made else snoop_collection(photos, **options)
                 if not isinstance(log.result, AdjustedCollection):
                     raise TypeError("a collection gives the result of a collection")
                 result = log.result
             else:
                 result = adjust(photos, loss=_LOSSES[loss], scale=scale, covariance=covariance, **options)
         told = log or result
-        estimates = estimated(job, photos, components, threads)
-        written = {}
+        estimates = None if made else estimated(job, photos, components, threads)
+        weights = made or estimates
+        written = pictures.of(result)
         if names:
             written[names[0]] = told.report().encode()
             written[names[1]] = to_bytes(result.adjusted(), packing, found.name)
-        if estimates is not None and out is not None:
-            written[out / COMPONENTS] = estimates.report().encode()
+        if weights is not None and out is not None:
+            written[out / COMPONENTS] = weights.report().encode()
         if report is not None:
             written[report] = told.report().encode()
+        written |= html_files(
+            job, "collection", place, html is not None, lambda: replace(page_of(told), title=problem.name)
+        )
         if json is not None:
             written[json] = told.to_json()
         sections = [
             ("File", [f"{problem}: {found.title}"]),
-            *(log.sections() if log else []),
+            *with_weights(log.sections() if log else [], made),
             *with_components(summary(result), estimates)[1 if log else 0 :],
         ]
         whole = (section for section in sections if section[1])
         job.finish(
             written,
+            as_data(result, parquet),
             summary=lambda: print_sections(whole, "the report"),
             code=(estimates or told).verdict.exit_code(strict=strict),
         )

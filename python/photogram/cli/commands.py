@@ -36,7 +36,7 @@ app = typer.Typer(
     name="photogram",
     help="Photogrammetric least-squares adjustment with the covariance of every result.",
     epilog="Exit codes: 0 converged, 1 input or output at fault, 2 usage, 3 not converged, diverged or"
-    " something grave found, 129, 130, 143 ended by a signal.",
+    " something grave found, 4 a result that cannot be used as it is, 129, 130, 143 ended by a signal.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from photogram.cli.job import Job
 
 if TYPE_CHECKING:
+    from photogram.adjustment.cleaning import Cleaned
     from photogram.results.components import VarianceComponents
     from photogram.show.sections import Section
 
-__all__ = ["COMPONENTS", "Components", "UnitVarianceName", "estimated", "with_components"]
+__all__ = [
+    "COMPONENTS",
+    "Components",
+    "UnitVarianceName",
+    "cleaned",
+    "estimated",
+    "with_components",
+    "with_weights",
+]
 
 COMPONENTS = "components.txt"
 """What goes to the output directory where variance components are asked for."""
@@ -46,7 +56,7 @@ Components = Annotated[
         "--components",
         help="Estimate variance components of groups of observations: by which factors their standard"
         " deviations are wrong. Given more than once: of all combinations. The results stay those of the"
-        " given weights.",
+        " given weights; with --snoop those of the weights that what is left bears out.",
         show_default=False,
     ),
 ]
@@ -68,6 +78,20 @@ def estimated(
                 status.update(f"variance components, adjustment {number + 1}")
 
         return variance_components(network, groups, threads=threads, progress=tell)
+
+
+def cleaned(network: object, bases: list[Basis], threads: int | None, options: Mapping[str, Any]) -> Cleaned:
+    """Take gross errors out and estimate weights in turn, with options of snooping."""
+    from photogram.adjustment.cleaning import clean
+
+    return clean(network, [basis.value.replace("-", " ") for basis in bases], threads=threads, **options)
+
+
+def with_weights(sections: list[Section], made: Cleaned | None) -> list[Section]:
+    """Return the sections of snooping, with what became of the weights below its verdict."""
+    if made is None:
+        return sections
+    return [*sections[:1], ("Weights", made.report().splitlines()), *sections[1:]]
 
 
 def with_components(sections: list[Section], found: VarianceComponents | None) -> list[Section]:

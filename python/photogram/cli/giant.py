@@ -9,13 +9,27 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from photogram.cli.components import COMPONENTS, Components, UnitVarianceName, estimated, with_components
+from photogram.cli.components import (
+    COMPONENTS,
+    Components,
+    UnitVarianceName,
+    cleaned,
+    estimated,
+    with_components,
+    with_weights,
+)
 from photogram.cli.console import SHOWN, errors, print_sections
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.maps import CloudFile, MapFile, check_maps, drawn_maps
 from photogram.cli.options import (
     JsonFile,
     Ordering,
     OrderingName,
+    ParquetFolder,
+    PictureFormat,
+    PlotFormat,
+    Plots,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -23,14 +37,17 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    as_data,
     default_out,
     out_option,
 )
+from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
     from photogram import Block, Result, Snooped
+    from photogram.adjustment.cleaning import Cleaned
     from photogram.giant import Project
     from photogram.giant.common import Common
 
@@ -68,6 +85,13 @@ def giant(
         ),
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
+    plots: Plots = False,
+    plot_format: PlotFormat = PictureFormat.PNG,
+    parquet: ParquetFolder = None,
+    map: MapFile = None,  # noqa: A002  # as the option is called
+    ply: CloudFile = None,
     listing: Annotated[
         Path | None,
         Writes.FILE,
@@ -140,31 +164,37 @@ def giant(
 ) -> None:
     """Adjust a GIANT project: photographs, points and their covariances.
 
-    Writes FRAMES and GROUND (adjusted, when converged), RESTART (stations of the last iteration), report.txt.
+    Writes FRAMES and GROUND (adjusted, when converged), RESTART (stations of the last iteration), report.html
+    and report.txt.
     """
     with job:
         from photogram.errors import AdjustmentError
         from photogram.giant import Limits, read_project
         from photogram.results.report import summary
+        from photogram.show.ways import page_of
 
+        check_maps(map)
         if directory is None:
             directory = job.packaged(EXAMPLE)
             job.reads(directory)
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
-        job.writes(*(out / name for name in RESULTS), *([out / COMPONENTS] if components else []))
+        place = html_place(html, no_html, out)
+        others = [*([out / COMPONENTS] if components else []), *([place] if place else [])]
+        job.writes(*(out / name for name in RESULTS), *others)
+        pictures = Pictures(job, plots, plot_format, out)
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         block = _refracted(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
-        if snoop and (as_published or components or project.common.intersection_only):
-            refused = "not with --as-published, --components or an intersection"
+        if snoop and (as_published or project.common.intersection_only):
+            refused = "not with --as-published or an intersection"
             raise typer.BadParameter(refused, param_hint="--snoop")
         options = {"level": level, "fdr": fdr, "unit_weight": unit_weight.value} if snoop else None
         try:
-            result, log = _adjust(
-                job, project, block, as_published, unit_variance, ordering, threads, options
+            result, log, made = _adjust(
+                job, project, block, as_published, unit_variance, ordering, threads, options, components
             )
         except AdjustmentError:
             # What was remarked on while reading is often the reason.
@@ -172,10 +202,12 @@ def giant(
                 errors.print(escape(str(message)))
             raise
         written = _result_files(project, block, result, log, out, as_published)
-        found = estimated(job, block, components, threads)
-        if found is not None:
-            written[out / COMPONENTS] = found.report().encode()
-        documents = {}
+        found = None if made else estimated(job, block, components, threads)
+        weights = made or found
+        if weights is not None:
+            written[out / COMPONENTS] = weights.report().encode()
+        written |= pictures.of(result)
+        documents = html_files(job, "giant", place, html is not None, lambda: page_of(log or result))
         if json is not None:
             documents[json] = (log or result).to_json()
         if listing is not None:
@@ -186,9 +218,11 @@ def giant(
         job.finish(
             written,
             documents,
+            as_data(result, parquet),
+            drawn_maps(result, map, ply, None, quiet=quiet),
             summary=lambda: print_sections(
                 [
-                    *(log.sections() if log else []),
+                    *with_weights(log.sections() if log else [], made),
                     *with_components(summary(result), found)[1 if log else 0 :],
                 ],
                 "report.txt",
@@ -240,7 +274,8 @@ def _adjust(
     ordering: OrderingName,
     threads: int | None,
     snooping: dict[str, Any] | None,
-) -> tuple[Result, Snooped | None]:
+    components: Components,
+) -> tuple[Result, Snooped | None, Cleaned | None]:
     """Adjust the block as COMMON asks, or snoop it, with the progress on standard error."""
     from photogram import AsPublished, Result, adjust, snoop
 
@@ -249,11 +284,13 @@ def _adjust(
         progress = shown(status, "weighted sum of squares", 1.0) if status is not None else None
         if snooping is not None:
             snooping["unit_variance"] = unit_variance.value if unit_variance else common.unit_variance
-            log = snoop(block, threads=threads, progress=progress, **snooping)
+            snooping["progress"] = progress
+            made = cleaned(block, components, threads, snooping) if components else None
+            log = made.snooped if made else snoop(block, threads=threads, **snooping)
             if not isinstance(log.result, Result):
                 raise TypeError("a block gives the result of a block")
             result = replace(log.result, messages=[*project.messages, *log.result.messages])
-            return result, replace(log, result=result)
+            return result, replace(log, result=result), made
         result = adjust(
             block,
             unit_variance=unit_variance.value if unit_variance else common.unit_variance,
@@ -265,7 +302,7 @@ def _adjust(
             progress=progress,
             threads=threads,
         )
-    return replace(result, messages=[*project.messages, *result.messages]), None
+    return replace(result, messages=[*project.messages, *result.messages]), None, None
 
 
 def _result_files(

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
 from photogram.cli.console import print_sections
-from photogram.cli.job import Job, Reads, with_job
+from photogram.cli.job import Job, with_job
 from photogram.cli.options import JsonFile, Quiet
-from photogram.cli.projects import NOTHING, Additions, described, read_project, with_additions
+from photogram.cli.projects import (
+    NOTHING,
+    Additions,
+    Example,
+    ProjectPath,
+    described,
+    project_path,
+    read_project,
+    with_additions,
+)
 
 __all__ = ["info"]
 
 
 @with_job
-@with_additions("images", "names")
+@with_additions()
 def info(
     job: Job,
-    path: Annotated[Path, Reads.FILE, typer.Argument(metavar="PATH", help="A project: a folder or file.")],
+    path: ProjectPath = None,
+    example: Example = False,
     json: JsonFile = None,
     added: Additions = NOTHING,
     quiet: Quiet = False,
@@ -28,7 +33,7 @@ def info(
     with job:
         from photogram.io.json import to_json
 
-        project = read_project(job, path, added)
+        project = read_project(job, project_path(job, path), added)
         sections = described(project)
         job.finish(
             {} if json is None else {json: to_json(dict(sections))},

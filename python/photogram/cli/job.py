@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
+import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from enum import Enum
 from functools import wraps
 from importlib.resources import as_file, files
@@ -18,7 +20,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
-from photogram.cli.console import errors, failures, print_remark, print_written
+from photogram.cli.console import errors, failures, print_remark, print_report, print_written
 from photogram.messages import printable
 
 if TYPE_CHECKING:
@@ -26,7 +28,8 @@ if TYPE_CHECKING:
 
     from rich.status import Status
 
-    from photogram.io.writing import OutputSet
+    from photogram.io.writing import Content, OutputSet
+    from photogram.show.run import Run
 
 __all__ = ["Former", "Job", "Reads", "Writes", "roles", "with_job"]
 
@@ -46,6 +49,7 @@ class Writes(Enum):
 
     FILE = "file"
     DIRECTORY = "directory of results"
+    EITHER = "file or directory, which the command finds out"
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,8 @@ class Job:
         Files, and directories for results, that are written.
     quiet
         Whether nothing but errors is shown.
+    options
+        What was given on the command line, by the names of options: for the report.
     """
 
     def __init__(
@@ -80,7 +86,10 @@ class Job:
         directories: Iterable[Path] = (),
         *,
         quiet: bool = False,
+        options: Mapping[str, Any] | None = None,
     ) -> None:
+        self._began, self._clock = datetime.now(UTC), time.perf_counter()
+        self._options = dict(options or {})
         self._files, self._projects = list(files), list(projects)
         self._outputs, self._directories = list(outputs), list(directories)
         self._failures = failures()
@@ -131,7 +140,7 @@ class Job:
         self._outputs += [path for path in files if path not in self._outputs]
         self._check()
 
-    def write(self, *results: Mapping[Path, bytes]) -> None:
+    def write(self, *results: Mapping[Path, Content]) -> None:
         """Write results: all of them or none, none over an input, and no two to one place.
 
         Those whose names a user chose are given apart from those that have names of their own.
@@ -143,7 +152,7 @@ class Job:
                     outputs.write(path, content)
 
     def finish(
-        self, *results: Mapping[Path, bytes], summary: Callable[[], None] | None = None, code: int = 0
+        self, *results: Mapping[Path, Content], summary: Callable[[], None] | None = None, code: int = 0
     ) -> None:
         """Write the results, as :meth:`write` does, then show what they are, and end.
 
@@ -166,9 +175,19 @@ class Job:
         if not self.quiet:
             if summary is not None:
                 summary()
+            written = list(written)
             print_written(written)
+            print_report(written)
         if code:
             raise typer.Exit(code)
+
+    def run(self, command: str) -> Run:
+        """Return what the report says of the run of a command: options, inputs, times up to now."""
+        from photogram.show.run import Run, input_files
+
+        inputs, others = input_files(self._inputs())
+        seconds = time.perf_counter() - self._clock
+        return Run(f"photogram {command}", self._options, inputs, self._began, seconds, others)
 
     @contextmanager
     def status(self, text: str) -> Iterator[Status | None]:
@@ -271,7 +290,7 @@ def _holds_path(kind: object) -> bool:
 def with_job(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command its :class:`Job` as the parameter `job`, made of its options that are marked.
 
-    Where it has an option `--example`, either that or its first argument must be given.
+    Where it has an option `--example`, that stands for its first argument.
 
     Raises
     ------
@@ -289,6 +308,8 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
     def with_one(**values: Any) -> None:
         for parameter in own:
             _check_value(parameter, values)
+        if "example" in values:
+            _arrange(own, values)
         found: dict[Reads | Writes, list[Path]] = {each: [] for each in (*Reads, *Writes)}
         for name, role in marked.items():
             given = values.get(name)
@@ -300,12 +321,29 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
             found[Writes.FILE],
             found[Writes.DIRECTORY],
             quiet=values.get("quiet", False),
+            options=_given(own, values),
         )
         command(job=job, **values)
 
     with_one.__dict__["__signature__"] = signature(command).replace(parameters=own)
     with_one.__annotations__ = {parameter.name: parameter.annotation for parameter in own}
     return with_one
+
+
+def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[str, str]:
+    """Return options and arguments that are not their defaults, as a user writes them."""
+    found = {}
+    for parameter in parameters:
+        value = values.get(parameter.name, parameter.default)
+        if value == parameter.default or value is None:
+            continue
+        name = _option(parameter)
+        for mark in get_args(parameter.annotation)[1:]:
+            if isinstance(mark, ArgumentInfo):
+                name = str(mark.metavar)
+        each = value if isinstance(value, list) else [value]
+        found[name] = ", ".join(str(getattr(one, "value", one)) for one in each)
+    return found
 
 
 def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
@@ -317,8 +355,25 @@ def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
     for mark in metadata:
         if isinstance(mark, Former) and value != parameter.default and not values.get("quiet"):
             print_remark(f"{_option(parameter)} will go: {mark.now}")
-        if isinstance(mark, ArgumentInfo) and values.get("example") == bool(value):
-            raise typer.BadParameter(f"give {mark.metavar}, or --example", param_hint=mark.metavar)
+
+
+def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
+    """Give arguments their values: with `--example` the first one goes without."""
+    arguments = {
+        parameter.name: mark.metavar
+        for parameter in parameters
+        for mark in get_args(parameter.annotation)[1:]
+        if isinstance(mark, ArgumentInfo)
+    }
+    given = [values[name] for name in arguments if values[name]]
+    example = bool(values["example"])
+    first, *others = arguments.values()
+    if len(given) + example > len(arguments) or not (given or example):
+        raise typer.BadParameter(f"give {first}, or --example", param_hint=first)
+    if len(given) + example < len(arguments):
+        raise typer.BadParameter("is missing", param_hint=others[-1])
+    if example:
+        values.update(zip(arguments, [None, *given], strict=True))
 
 
 def _option(parameter: Parameter) -> str:

@@ -5,17 +5,22 @@ from __future__ import annotations
 import os
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from photogram.cli.job import Former, Writes
+
+if TYPE_CHECKING:
+    from photogram.io.writing import Content
+    from photogram.results.network import AdjustedNetwork
 
 __all__ = [
     "FormerPlot",
     "JsonFile",
     "Ordering",
     "OrderingName",
+    "ParquetFolder",
     "PictureFormat",
     "PlotFormat",
     "Plots",
@@ -26,6 +31,7 @@ __all__ = [
     "Strict",
     "Threads",
     "UnitWeight",
+    "as_data",
     "default_out",
     "out_option",
     "picture_places",
@@ -36,6 +42,16 @@ JsonFile = Annotated[
     Path | None,
     Writes.FILE,
     typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
+]
+ParquetFolder = Annotated[
+    Path | None,
+    Writes.DIRECTORY,
+    typer.Option(
+        "--parquet",
+        metavar="DIR",
+        help="Write the whole result as data: tables in Parquet, which photogram.read_result reads again.",
+        show_default=False,
+    ),
 ]
 Plots = Annotated[bool, typer.Option("--plots", help="Draw the pictures too, into --out (needs matplotlib).")]
 
@@ -111,6 +127,15 @@ Threads = Annotated[
 def out_option(help: str) -> Any:  # noqa: A002  # as typer calls it
     """Return the option `--out DIR`; `help` says what goes there, and what the default is."""
     return typer.Option("--out", metavar="DIR", help=help, show_default=False)
+
+
+def as_data(result: AdjustedNetwork, folder: Path | None) -> dict[Path, Content]:
+    """Return the files of `--parquet DIR`; none without it."""
+    if folder is None:
+        return {}
+    from photogram.show.ways import files_of
+
+    return {folder / name: content for name, content in files_of(result).items()}
 
 
 def picture_places(

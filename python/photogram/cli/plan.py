@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import output, print_remark
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
     FormerPlot,
@@ -59,9 +60,13 @@ def plan(
         typer.Option(help="As --position-sd, for the second pattern. Default: the same.", show_default=False),
     ] = None,
     out: Annotated[
-        Path | None, Writes.DIRECTORY, out_option("Directory for report.txt. Default: no files.")
+        Path | None,
+        Writes.DIRECTORY,
+        out_option("Directory for report.html and report.txt. Default: no files."),
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
     plot: FormerPlot = None,
@@ -74,10 +79,12 @@ def plan(
     """
     with job:
         from photogram.planning import plan as predict
+        from photogram.show.ways import page_of
 
         report = out and out / "report.txt"
         pictures = picture_places("plan", plots, plot_format, out, plot)
-        job.writes(*pictures, *([report] if report else []))
+        place = html_place(html, no_html, out)
+        job.writes(*pictures, *([report] if report else []), *([place] if place else []))
 
         if projects:
             _check_alone(network, against, against_spacing, against_position_sd)
@@ -92,6 +99,7 @@ def plan(
             patterns = _simulated(network, second)
         made = predict(patterns)
         written = {report: made.report().encode()} if report else {}
+        written |= html_files(job, "plan", place, html is not None, lambda: page_of(made))
         job.finish(
             {**written, **_documents(made, json, pictures)},
             summary=lambda: output.print(made.report(), markup=False, end=""),

@@ -19,7 +19,17 @@ if TYPE_CHECKING:
     from photogram.formats import Project
     from photogram.show.sections import Section
 
-__all__ = ["EXAMPLE", "NOTHING", "Additions", "described", "read_project", "with_additions"]
+__all__ = [
+    "EXAMPLE",
+    "NOTHING",
+    "Additions",
+    "Example",
+    "ProjectPath",
+    "described",
+    "project_path",
+    "read_project",
+    "with_additions",
+]
 
 EXAMPLE = ("project",)
 """The packaged example, a directory of photogram.examples."""
@@ -40,6 +50,19 @@ class AngleName(StrEnum):
     RAD = "rad"
 
 
+ProjectPath = Annotated[
+    Path | None,
+    Reads.FILE,
+    typer.Argument(
+        metavar="PATH",
+        help="A project: a folder or file of any format that docs/formats.md lists.",
+        show_default=False,
+    ),
+]
+Example = Annotated[
+    bool,
+    typer.Option("--example", help="Take the packaged example instead, that of `photogram new`."),
+]
 FormatName = Annotated[
     str | None,
     typer.Option(
@@ -149,6 +172,11 @@ def with_additions(*omitted: str) -> Callable[[Callable[..., None]], Callable[..
         return with_them
 
     return decorated
+
+
+def project_path(job: Job, path: Path | None) -> Path:
+    """Return the path that a user gives, or that of the packaged example."""
+    return job.packaged(*EXAMPLE) if path is None else path
 
 
 def read_project(job: Job, path: Path, added: Additions) -> Project:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -11,8 +11,10 @@ from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
 from photogram.collection.core import CollectionOptions, collection_network
 from photogram.collection.failures import named
+from photogram.collection.suspects import collection_trial
 from photogram.results.covariance import Covariances
 from photogram.results.network import AdjustedNetwork
+from photogram.results.reliability import Reliability, reliability_of
 from photogram.results.selection import Adjusted
 
 if TYPE_CHECKING:
@@ -24,7 +26,7 @@ POSE = 6
 """Parameters of a photo that are no camera's."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AdjustedCollection(AdjustedNetwork):
     """An adjusted collection; the arrays that every network has are those of `AdjustedNetwork`.
 
@@ -57,6 +59,16 @@ class AdjustedCollection(AdjustedNetwork):
     datum: list[tuple[int, str]]
     options: CollectionOptions
     state: _photocore.BlockState
+
+    KNOWN: ClassVar[bool] = False
+
+    @property
+    def _what(self) -> str:
+        return "collection"
+
+    @property
+    def _image_unit(self) -> str:
+        return "px"
 
     @property
     def cost(self) -> float:
@@ -109,6 +121,31 @@ class AdjustedCollection(AdjustedNetwork):
             lambda error: named(*error.args),
             self.covariance_scale,
         )
+
+    def reliability(
+        self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
+    ) -> Reliability:
+        """Return which gross errors of every observation are found, and what others do (docs/blunders.md).
+
+        It takes a factorisation and a selected inverse at the adjusted values.
+
+        Parameters
+        ----------
+        level, power
+            Of the test of an observation: alpha0, beta0.
+        unit_weight
+            `known`, or `unknown`: estimated by the adjustment, which makes errors harder to find.
+
+        Raises
+        ------
+        InputError
+            Options that cannot be.
+        KeyboardInterrupt
+            Ctrl-C.
+        """
+        options = replace(self.options, covariance=True, loss=None)
+        trial = collection_trial(self.collection, options, self.state)
+        return reliability_of(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
 
     def adjusted(self) -> Collection:
         """Return the collection at its adjusted values; points that were left out stay as they were."""

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.arguments.arrays import indices, shaped
+from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.show.brief import Brief, Rows
 
 __all__ = ["PARAMETERS", "Collection"]
 
@@ -22,8 +24,8 @@ PARAMETERS = (*POSE, "f", "k1", "k2")
 """Of a photo with the camera of "Bundle Adjustment in the Large": also focal length f (pixels), k1, k2."""
 
 
-@dataclass(frozen=True, eq=False)
-class Collection:
+@dataclass(frozen=True, eq=False, repr=False)
+class Collection(Valued, Brief):
     """P photos with unknown cameras, n points, m image points.
 
     A photo sees a point X in P = R(w) X + t and looks along its -z axis; its camera, of the model that all
@@ -61,6 +63,21 @@ class Collection:
     point_sd: Floats = field(default_factory=lambda: np.array(np.inf))
     camera: str = "bal"
 
+    if TYPE_CHECKING:
+        # What checkers of types are told: more can be given than what the fields then hold.
+        def __init__(
+            self,
+            photo_parameters: ArrayLike,
+            point_positions: ArrayLike,
+            image_photos: ArrayLike,
+            image_points: ArrayLike,
+            image_xy: ArrayLike,
+            image_sd: ArrayLike = ...,
+            photo_sd: ArrayLike = ...,
+            point_sd: ArrayLike = ...,
+            camera: str = "bal",
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         if self.camera not in _photocore.CAMERAS:
             raise InputError(f"camera is one of {', '.join(_photocore.CAMERAS)}, not {self.camera!r}")
@@ -88,14 +105,38 @@ class Collection:
         for name, count in (("image_photos", photos), ("image_points", points)):
             object.__setattr__(self, name, indices(name, getattr(self, name), images, count))
 
+    def brief(self) -> tuple[str, Rows]:
+        """Return what the collection is in a few lines, as its `repr` and notebooks show it."""
+        low, high = self.image_sd.min(initial=np.inf), self.image_sd.max(initial=0.0)
+        return "Collection", [
+            (
+                "photos",
+                f"{len(self.photo_parameters):,}, {int((self.photo_sd == 0).all(axis=1).sum()):,} fixed",
+            ),
+            ("points", f"{len(self.point_positions):,}"),
+            (
+                "images",
+                f"{len(self.image_xy):,}, px, sd "
+                + (f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"),
+            ),
+            ("camera", f"{self.camera}: {', '.join(self.parameters[len(POSE) :])}"),
+        ]
+
     @property
     def _model(self) -> tuple[str, list[tuple[str, int]], int, str, str]:
         return dict(_photocore.camera_models())[self.camera]
 
+    @staticmethod
+    def parameters_of(camera: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Return names and units of the k parameters of a photo with a camera of this model."""
+        powers = dict(_photocore.camera_models())[camera][1]
+        units = ("rad",) * 3 + ("",) * 3 + tuple("px" if power == 1 else "" for _, power in powers)
+        return (*POSE, *(name for name, _ in powers)), units
+
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the k parameters of a photo."""
-        return (*POSE, *(name for name, _ in self._model[1]))
+        return self.parameters_of(self.camera)[0]
 
     @property
     def _constant(self) -> NDArray[np.bool_]:
@@ -105,8 +146,7 @@ class Collection:
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the k parameters: `rad`, `px`; none for numbers and for lengths in the object space."""
-        powers = (power for _, power in self._model[1])
-        return ("rad",) * 3 + ("",) * 3 + tuple("px" if power == 1 else "" for power in powers)
+        return self.parameters_of(self.camera)[1]
 
     @property
     def formula(self) -> str:

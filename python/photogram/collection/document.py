@@ -56,6 +56,7 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         "variance_of_unit_weight": result.variance_of_unit_weight,
         "covariance_scale": result.covariance_scale,
         "verdict": result.verdict.document(),
+        "reliability": summary.document() if (summary := result.reliability_summary) else None,
         "datum": [{"photo": photo, "parameter": parameter} for photo, parameter in result.datum],
         "camera": result.collection.camera,
         "parameters": result.collection.parameters,

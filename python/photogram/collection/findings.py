@@ -6,10 +6,11 @@ import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.results.findings import ROBUST, has_redundancy, unseen
+from photogram.results.groups_tested import groups_tested
 from photogram.results.observed import tested
 from photogram.results.patterns import CameraImages, patterns
 from photogram.show.ways import findings_of
-from photogram.statistics.findings import Findings, Systematic, by_t
+from photogram.statistics.findings import Findings, Systematic, Tested, by_t
 from photogram.statistics.limits import global_test
 from photogram.statistics.outliers import Observations
 
@@ -25,7 +26,7 @@ def collection_findings(result: AdjustedCollection) -> Findings:
     omega, freedom = result.weighted_sum_of_squares, result.degrees_of_freedom
     return Findings(
         status=result.status,
-        observations=[by_t(each, omega, freedom) for each in tested_observations(result)],
+        observations=_tested(result),
         degrees_of_freedom=freedom,
         global_test=None if result.loss else global_test(omega, freedom),
         untested=ROBUST if result.loss else "no degrees of freedom",
@@ -34,6 +35,15 @@ def collection_findings(result: AdjustedCollection) -> Findings:
         remarks=unseen(result),
         snoop="--snoop (photogram.snoop)",
     )
+
+
+def _tested(result: AdjustedCollection) -> list[Tested]:
+    """Return the tests of groups; of single coordinates where a loss has changed the weights."""
+    unit_weight = result.weighted_sum_of_squares, result.degrees_of_freedom
+    summary = result.reliability_summary
+    if summary is None:
+        return [by_t(each, *unit_weight) for each in tested_observations(result)]
+    return groups_tested(summary, unit_weight=unit_weight)
 
 
 def _patterns(result: AdjustedCollection) -> list[Systematic]:

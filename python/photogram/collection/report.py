@@ -16,7 +16,7 @@ from photogram.statistics.limits import externally_studentized, global_test, stu
 from photogram.statistics.outliers import outliers
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["report", "summary"]
+__all__ = ["problems_of", "report", "summary"]
 
 SUSPECTS = 20
 """Image points with large standardized residuals that are listed at most."""
@@ -30,6 +30,7 @@ def report(result: AdjustedCollection) -> str:
     (photos, points), heads = names(result), _heads(result)
     sections = [
         *summary(result),
+        ("Reliability", _reliability(result)),
         ("Iterations", _iterations(result)),
         (
             "Weighted and fixed points: given minus adjusted, redundancy, standardized residual",
@@ -51,13 +52,18 @@ def summary(result: AdjustedCollection) -> list[Section]:
     """Return what a reader wants first, as titled sections: verdict, problems, adjustment, suspects."""
     return [
         verdict_section(result.verdict),
-        ("Problems", _problems(result)),
+        ("Problems", problems_of(result)),
         ("Adjustment", _adjustment(result)),
         (f"Image points with |t| > {NOTABLE:g} (externally studentized), largest first", _suspects(result)),
     ]
 
 
-def _problems(result: AdjustedCollection) -> list[str]:
+def _reliability(result: AdjustedCollection) -> list[str]:
+    summary = result.reliability_summary
+    return [] if summary is None else summary.lines("")
+
+
+def problems_of(result: AdjustedCollection) -> list[str]:
     """Return a failed test and outliers before other remarks.
 
     Standard deviations of pixels are guesses: single residuals are tested against all others.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,29 +15,17 @@ from photogram.arguments.arrays import one_of, truth_value
 from photogram.arguments.types import Indices
 from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.collection import POSE, Collection
-from photogram.collection.core import collection_network
+from photogram.collection.collection import Collection
+from photogram.collection.suspects import collection_trial
 from photogram.errors import AdjustmentError
 from photogram.messages import Message
-from photogram.results.network_trial import (
-    ATTITUDE,
-    CONTROL,
-    IMAGE,
-    KINDS,
-    OBSERVATION,
-    POSITION,
-    NetworkTrial,
-    image_loads,
-)
+from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
 from photogram.results.snooped import Snooped
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.snooping.snooping import snooped
-from photogram.statistics.snooping.suspects import LostSupportError, Out, Suspects
+from photogram.statistics.snooping.suspects import LostSupportError, Out
 
-__all__ = ["collection_trial", "snoop_collection"]
-
-ROUGH, EXACT = 1e-7, 1e-12
-"""A step that lowers the sum of squares by less than this share ends a round; where R of all rows is used."""
+__all__ = ["snoop_collection"]
 
 
 @of_network.register
@@ -60,7 +48,8 @@ def snoop_collection(
     truth_value("parts", parts)
     settings = settings_of(level, fdr, unit_weight, robust, max_rounds)
     first = adjust(collection, covariance=False, threads=threads, progress=progress, **options)
-    trial = collection_trial(first, threads, parts=parts)
+    tried = dataclasses.replace(first.options, covariance=True, loss=None)
+    trial = collection_trial(collection, tried, first.state, core_threads(threads), parts=parts)
     try:
         outcome = snooped(trial, settings)
     except (LostSupportError, _photocore.CollectionError) as error:
@@ -72,25 +61,13 @@ def snoop_collection(
     return Snooped(result=result, outcome=outcome, suspects=trial.suspects, settings=settings)
 
 
-def collection_trial(
-    result: AdjustedCollection, threads: int | None = None, *, parts: bool = True
-) -> NetworkTrial:
-    """Return an adjusted collection as snooping asks it."""
-    collection = result.collection
-    options = dataclasses.replace(result.options, covariance=True, loss=None)
-    core = collection_network(collection, options).trial(result.state, threads=core_threads(threads))
-    return NetworkTrial(
-        core=core,
-        suspects=_Named(collection, core, parts).suspects(),
-        supported=np.asarray(np.isfinite(collection.photo_sd).all(axis=1)),
-        rough=ROUGH,
-        exact=EXACT,
-    )
-
-
 def _without(first: AdjustedCollection, trial: NetworkTrial, out: Out) -> Collection:
     """Return a collection without what is out; what is free starts at adjusted values."""
-    given, adjusted, core = first.collection, first.adjusted(), trial.core
+    given, core = first.collection, trial.core
+    parameters, points = first.photo_parameters.copy(), core.points
+    for own, values in zip(parameters, core.photos, strict=True):
+        own[: len(values)] = values
+    points = np.where(np.isnan(points), given.point_positions, points)
     kinds, subjects = core.subjects
     starts, components = core.row_starts, core.components
     group = np.repeat(np.arange(len(kinds)), np.diff(starts))
@@ -108,8 +85,8 @@ def _without(first: AdjustedCollection, trial: NetworkTrial, out: Out) -> Collec
         photos, own = gone(kind)
         photo_sd[photos, own + shift] = np.inf
     return given.replace(
-        photo_parameters=np.where(np.isinf(photo_sd), adjusted.photo_parameters, given.photo_parameters),
-        point_positions=np.where(np.isinf(point_sd), adjusted.point_positions, given.point_positions),
+        photo_parameters=np.where(np.isinf(photo_sd), parameters, given.photo_parameters),
+        point_positions=np.where(np.isinf(point_sd), points, given.point_positions),
         photo_sd=photo_sd,
         point_sd=point_sd,
         image_photos=given.image_photos[images],
@@ -117,75 +94,3 @@ def _without(first: AdjustedCollection, trial: NetworkTrial, out: Out) -> Collec
         image_xy=given.image_xy[images],
         image_sd=given.image_sd[images],
     )
-
-
-class _Named:
-    """What the groups of observations of a collection are called: photos and points have numbers."""
-
-    def __init__(self, collection: Collection, core: _photocore.NetworkTrial, parts: bool) -> None:
-        self.collection, self.apart = collection, parts
-        self.kinds, self.subjects = core.subjects
-        self.starts, self.components = core.row_starts, core.components
-        self.photos_of_point = image_loads(collection.image_points, collection.image_photos)
-
-    def suspects(self) -> Suspects:
-        kinds, subjects, collection = self.kinds, self.subjects, self.collection
-        points, photos = np.full(len(kinds), -1), np.full(len(kinds), -1)
-        image, control = kinds == IMAGE, kinds == CONTROL
-        points[image] = collection.image_points[subjects[image]]
-        photos[image] = collection.image_photos[subjects[image]]
-        points[control] = subjects[control]
-        station = (kinds == POSITION) | (kinds == ATTITUDE)
-        photos[station] = subjects[station]
-        return Suspects(
-            row_starts=self.starts,
-            kinds=kinds.astype(np.int64),
-            kind_names=KINDS,
-            points=points,
-            photos=photos,
-            loads=self.loads,
-            removable=np.asarray(kinds <= OBSERVATION),
-            parts=self.parts,
-            name=self.name,
-            row_name=self.row_name,
-            unit=self.unit,
-            photo_name=lambda photo: f"photo {photo}",
-        )
-
-    def loads(self, group: int) -> Indices:
-        kind, subject = int(self.kinds[group]), int(self.subjects[group])
-        if kind == IMAGE:
-            return self.photos_of_point(int(self.collection.image_points[subject]))
-        if kind == CONTROL:
-            return self.photos_of_point(subject)
-        return np.array([subject])
-
-    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
-        size = int(self.starts[group + 1] - self.starts[group])
-        if not self.apart or int(self.kinds[group]) == IMAGE or size < 2:
-            return None
-        single = [(row,) for row in range(size)]
-        return [*single, tuple(range(size))] if int(self.kinds[group]) == CONTROL else single
-
-    def name(self, group: int) -> str:
-        kind, subject = int(self.kinds[group]), int(self.subjects[group])
-        if kind == IMAGE:
-            point, photo = self.collection.image_points[subject], self.collection.image_photos[subject]
-            return f"image of point {point} on photo {photo}"
-        if kind == CONTROL:
-            return f"control point {subject}"
-        return f"{KINDS[kind]} of photo {subject}"
-
-    def row_name(self, row: int) -> str:
-        group, component = int(np.searchsorted(self.starts, row, "right")) - 1, int(self.components[row])
-        kind = int(self.kinds[group])
-        if kind == IMAGE:
-            return "xy"[component]
-        if kind == CONTROL:
-            return "XYZ"[component]
-        names = {POSITION: POSE[3:], ATTITUDE: POSE[:3]}.get(kind, self.collection.parameters[6:])
-        return str(names[component])
-
-    def unit(self, row: int) -> str:
-        kind = int(self.kinds[int(np.searchsorted(self.starts, row, "right")) - 1])
-        return {IMAGE: "px", ATTITUDE: "rad"}.get(kind, "")

@@ -19,6 +19,7 @@ from photogram.formats.plain.settings import bare_settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.plain.writing import attitude_matrices
+from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project
 from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, listed
@@ -60,9 +61,9 @@ def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
 def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:
     """Return a project with the standard deviations of image coordinates that a user gives.
 
-    A plain project has them where its tables say nothing.
+    A plain project has them where its tables say nothing; some readers take them in the unit of their files.
     """
-    if "images" not in sd or project.title == "plain project":
+    if "images" not in sd or project.sd_taken:
         return project
     own = np.broadcast_to(sd["images"], (len(project.block.image_xy), 2))
     lacks = tuple(each for each in project.lacks if "--sd images" not in each)
@@ -239,12 +240,14 @@ def with_control(
     full = [each for each in given.observed if each.points[0] in places]
     for each in full:
         positions[places[each.points[0]]] = np.nan
-    return carried.replace(
+    found = carried.replace(
         block=block.replace(
             point_positions=positions, point_sd=deviation, observations=[*block.observations, *full]
         ),
         messages=(*messages, *carried.messages[len(project.messages) :]),
     )
+    planes = [each for each in plane_remarks(found) if each not in found.messages]
+    return found.replace(messages=(*found.messages, *planes))
 
 
 def _carried(

@@ -31,26 +31,8 @@ _TABLES = {
 
 def adjusted(project: Project, result: Result) -> Project:
     """Return a project with what was found where it was unknown: what was observed stays as it was given."""
-    block = result.block
-    cameras = [
-        each.camera.replace(
-            parameters={
-                name: float(value) if np.isinf(deviation) else float(given)
-                for name, value, given, deviation in zip(
-                    each.names, each.values, each.given.values, each.given.deviations, strict=True
-                )
-            }
-        )
-        for each in result.cameras
-    ]
-    free = {name: np.isinf(getattr(block, f"photo_{name}_sd")) for name in ("position", "attitude")}
     starts = np.where(np.isfinite(result.point_positions), result.point_positions, project.starts)
-    own = block.replace(
-        cameras=cameras or block.cameras,
-        photo_positions=np.where(free["position"], result.photo_positions, block.photo_positions),
-        photo_attitudes=np.where(free["attitude"], result.photo_attitudes, block.photo_attitudes),
-    )
-    return project.replace(block=own, starts=starts, lacks=())
+    return project.replace(block=result.restarted(), starts=starts, lacks=())
 
 
 def table_files(result: Result) -> Mapping[str, bytes]:

@@ -16,6 +16,7 @@ from photogram.io.words import pieces
 __all__ = ["FORMAT", "TITLE"]
 
 TITLE = 'problem of "Bundle Adjustment in the Large"'
+FILE = "problem.txt"
 _FIRST = re.compile(
     rb"[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+[0-9]+[ \t\r]*\n[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+\S+[ \t]+\S+"
 )
@@ -39,9 +40,15 @@ def read(path: Path, wishes: Wishes) -> Project:
 
 def write(project: Project) -> Mapping[str, bytes]:
     """Return the file of a problem."""
-    return {"problem.txt": bal.FORMAT.to_bytes(collection_of(project)[0])}
+    return {FILE: bal.FORMAT.to_bytes(collection_of(project)[0])}
 
 
 FORMAT = Format(
-    name="bal", title=TITLE, recognises=_recognises, read=read, write=write, cannot_hold=cannot_hold
+    name="bal",
+    title=TITLE,
+    recognises=_recognises,
+    read=read,
+    write=write,
+    files=(FILE, "problem-*.txt", "*.bal"),
+    cannot_hold=cannot_hold,
 )

@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from photogram.errors import InputError
-from photogram.formats.cards import angle_unit, cards, to_radians
+from photogram.formats.cards import END, angle_unit, cards, to_radians
 from photogram.formats.format import Format, Wishes
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import bare_settings
 from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
 from photogram.formats.reduced import Reduced, project_of, with_fitting_rotations
+from photogram.formats.reduced_writing import (
+    ReducedImages,
+    by_photo,
+    given_control,
+    lost_of_reduced,
+    reduced_images,
+)
+from photogram.io.csv_text import csv_text
 from photogram.messages import Message, quoted
 from photogram.network.attitudes import Attitudes
 
 __all__ = ["FORMAT", "TITLE"]
 
 TITLE = "BINGO block"
-IMAGES, ORIENTATION = "image.dat", "orientation.dat"
+IMAGES, ORIENTATION, CAMERAS = "image.dat", "orientation.dat", "cameras.csv"
 
 
 def read(path: Path, wishes: Wishes) -> Project:
@@ -31,11 +43,14 @@ def read(path: Path, wishes: Wishes) -> Project:
     """
     folder = path if path.is_dir() else path.parent
     images = folder / IMAGES if path.is_dir() else path
-    if wishes.cameras is None:
+    table = wishes.cameras or folder / CAMERAS
+    if wishes.cameras is None and not table.is_file():
         raise InputError(
-            "has no principal distances: --camera FILE gives them, columns camera and c in mm", file=images
+            f"has no principal distances: --camera FILE, or {CAMERAS} beside it, gives them, columns camera"
+            " and c in mm",
+            file=images,
         )
-    given = read_cameras(Tables(bare_settings(images, {"cameras": wishes.cameras}, image="mm"), []))
+    given = read_cameras(Tables(bare_settings(images, {"cameras": table}, image="mm"), []))
     known = {each.name: each for each in given.cameras}
     found = Reduced(cameras=known)
     photo: str | None = None
@@ -85,9 +100,76 @@ def _orientation(path: Path, found: Reduced, wishes: Wishes) -> None:
         found.poses[photo] = card.numbers(3, "X Y Z"), Attitudes.of("omega_phi_kappa", [angles]).matrices[0]
 
 
+def cannot_hold(project: Project) -> list[str]:
+    """Return what of a project the files have no place for."""
+    found = lost_of_reduced(project, reduced_images(project))
+    if any(name != own for name, own in _words(project).items()):
+        found.append("blanks in names: underscores stand for them")
+    if given_control(project):
+        found.append("control: control.csv beside the block is a table for --control")
+    return found
+
+
+def _words(project: Project) -> dict[str, str]:
+    """Return names as words of the files.
+
+    Raises
+    ------
+    InputError
+        Two that would be one word, and such as mean something else there.
+    """
+    found: dict[str, str] = {}
+    cameras = reduced_images(project).names
+    for names in (project.block.photo_ids, project.block.point_ids, cameras):
+        own = {name: "_".join(name.split()) for name in names}
+        if len(set(own.values())) < len(own):
+            raise InputError("names differ by blanks alone, which have no place in words")
+        found |= own
+    if bad := [name for name, word in found.items() if word in (END, "C", "#")]:
+        raise InputError(f"the name {bad[0]} means something else there")
+    return found
+
+
+def write(project: Project) -> Mapping[str, bytes]:
+    """Return images, orientation, the table of cameras that reading them needs, and one of control.
+
+    Raises
+    ------
+    InputError
+        Geographic coordinates, names that have no place.
+    """
+    block, reduced, words = project.block, reduced_images(project), _words(project)
+    lines: list[str] = []
+    owners = [words[reduced.names[row]] for row in reduced.cameras.tolist()]
+    for photo, camera, own in zip(block.photo_ids, owners, by_photo(project, reduced), strict=True):
+        lines.append(f"{words[photo]} {camera}")
+        lines += [f"{words[point]} {x!r} {y!r}" for point, x, y in own]
+        lines.append(END)
+    files = {IMAGES: ("\n".join(lines) + "\n").encode()}
+    if reduced.posed.any():
+        files[ORIENTATION] = "".join(_oriented(project, reduced, words, owners)).encode()
+    files[CAMERAS] = csv_text({"camera": [words[name] for name in reduced.names], "c": reduced.distances})
+    if table := control_table(project):
+        files["control.csv"] = csv_text({**table, "point": [words[name] for name in table["point"]]})
+    return files
+
+
+def _oriented(
+    project: Project, reduced: ReducedImages, words: Mapping[str, str], owners: Sequence[str]
+) -> Iterator[str]:
+    rows = np.flatnonzero(reduced.posed)
+    angles = Attitudes(reduced.matrices[rows]).values("omega_phi_kappa") * (200 / np.pi)
+    for row, own in zip(rows.tolist(), angles.tolist(), strict=True):
+        numbers = [*project.block.photo_positions[row].tolist(), *own]
+        yield f"ORIA {words[project.block.photo_ids[row]]} {owners[row]} {' '.join(map(repr, numbers))}\n"
+
+
 FORMAT = Format(
     name="bingo",
     title=TITLE,
     recognises=lambda path: (path / IMAGES).is_file() if path.is_dir() else path.name.lower() == IMAGES,
     read=read,
+    write=write,
+    files=(IMAGES,),
+    cannot_hold=cannot_hold,
 )

@@ -58,5 +58,11 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 
 FORMAT = Format(
-    name="bundler", title=TITLE, recognises=_recognises, read=read, write=write, cannot_hold=cannot_hold
+    name="bundler",
+    title=TITLE,
+    recognises=_recognises,
+    read=read,
+    write=write,
+    files=(FILE, "*.out"),
+    cannot_hold=cannot_hold,
 )

@@ -15,11 +15,24 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.project import Frame
+from photogram.network.geometry import local_frames
 
 if TYPE_CHECKING:
     import pyproj
 
-__all__ = ["amid", "east_north_up", "enu_origin", "from_frame", "geocentric", "to_frame", "turn_to_frame"]
+__all__ = [
+    "amid",
+    "axes_of",
+    "east_north_up",
+    "enu_origin",
+    "from_frame",
+    "geocentric",
+    "has_place",
+    "is_projected",
+    "to_frame",
+    "to_system",
+    "turn_to_frame",
+]
 
 GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
 ROUND = 1e-4
@@ -173,8 +186,8 @@ def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[
         return earth, turned, remarks
     if frame.kind == "geographic":
         found = _transformed(GEOCENTRIC, GEOGRAPHIC, earth)
-        local = np.array([east_north_up((lat, lon, 0.0)) for lon, lat, _ in found.tolist()])
         found[:, :2] = np.radians(found[:, :2])
+        local = local_frames(found)
         return found, local @ turned @ local.transpose(0, 2, 1), remarks
     if frame.origin is None:
         raise InputError("a topocentric frame has an origin")
@@ -188,22 +201,98 @@ def from_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tupl
     Raises
     ------
     InputError
+        As :func:`to_system`.
+    """
+    found, turns = to_system(crs, xyz, frame)
+    return found, turns @ covariances @ turns.transpose(0, 2, 1)
+
+
+def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
+    """Carry positions of a frame into a system.
+
+    Parameters
+    ----------
+    crs
+        The system.
+    xyz
+        (n, 3) in the frame; of a geographic one longitude and latitude in radians.
+    frame
+        Topocentric with an origin, geocentric, geographic, or cartesian with a system whose numbers it has.
+
+    Returns
+    -------
+    (n, 3) positions: longitude or easting, latitude or northing, height; and (n, 3, 3) what turns vectors
+    along the axes of the frame (of a geographic one east, north and up at each position) into vectors along
+    those of the system.
+
+    Raises
+    ------
+    InputError
         A frame that has no place on the earth, or as for :func:`geocentric`.
     """
-    if frame.kind == "topocentric" and frame.origin is not None:
-        rows = east_north_up(frame.origin)
-        earth, turned = _geocentric_of(frame.origin) + xyz @ rows, rows.T @ covariances @ rows
-    elif frame.kind == "geocentric":
-        earth, turned = xyz, covariances
-    else:
-        raise InputError(f"a frame that is {frame} has no known place on the earth")
+    if frame.kind == "cartesian" and frame.crs == crs and crs:
+        return xyz.copy(), np.broadcast_to(np.eye(3), (len(xyz), 3, 3)).copy()
+    earth, own = _on_earth(xyz, frame)
     if (local := enu_origin(crs)) is not None:
-        rows = east_north_up(local)
-        return (earth - _geocentric_of(local)) @ rows.T, rows @ turned @ rows.T
-    target = _with_heights(crs) if len(_system(crs).axis_info) == 2 else crs
-    found = _transformed(GEOCENTRIC, target, earth)
-    axes = _axes(crs, found, earth)
-    return found, axes @ turned @ axes.transpose(0, 2, 1)
+        found: Floats = (earth - _geocentric_of(local)) @ east_north_up(local).T
+    else:
+        target = _with_heights(crs) if len(_system(crs).axis_info) == 2 else crs
+        found = _transformed(GEOCENTRIC, target, earth)
+    turns: Floats = _axes(crs, found, earth) @ own.transpose(0, 2, 1)
+    return found, turns
+
+
+def has_place(frame: Frame) -> bool:
+    """Whether it is known where on the earth a frame is."""
+    return (
+        (frame.kind == "topocentric" and frame.origin is not None)
+        or frame.kind == "geocentric"
+        or (frame.kind == "geographic" and bool(_geographic(frame)))
+        or (frame.kind == "cartesian" and bool(frame.crs))
+    )
+
+
+def _geographic(frame: Frame) -> str:
+    """Return the system of a geographic frame; nothing where its ellipsoid alone is known."""
+    if frame.crs:
+        return frame.crs
+    return GEOGRAPHIC if np.allclose(frame.ellipsoid, Frame().ellipsoid, rtol=0, atol=1e-3) else ""
+
+
+def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
+    """Return geocentric positions, and (n, 3, 3) rows: the axes of the frame there in geocentric axes."""
+    if not has_place(frame):
+        raise InputError(f"a frame that is {frame} has no known place on the earth")
+    if frame.kind == "topocentric" and frame.origin is not None:
+        rows = np.broadcast_to(east_north_up(frame.origin), (len(xyz), 3, 3))
+        return _geocentric_of(frame.origin) + xyz @ rows[0] if len(xyz) else xyz, rows
+    if frame.kind == "geocentric":
+        return xyz, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
+    if frame.kind == "geographic":
+        degrees = np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]])
+        return geocentric(_geographic(frame), degrees), local_frames(xyz)
+    earth = geocentric(frame.crs, xyz)
+    return earth, _axes(frame.crs, xyz, earth)
+
+
+def is_projected(crs: str) -> bool:
+    """Whether a system is a plane: positions in it are eastings and northings of a projection."""
+    if enu_origin(crs) is not None:
+        return False
+    system = _system(crs)
+    return bool(system.is_projected or (system.is_compound and system.sub_crs_list[0].is_projected))
+
+
+def axes_of(crs: str) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
+    """Return the names and units of the three coordinates of a system: angles in degrees."""
+    if enu_origin(crs) is not None:
+        return ("east", "north", "up"), ("m", "m", "m")
+    system = _system(crs)
+    if system.is_geocentric:
+        return ("x", "y", "z"), ("m", "m", "m")
+    if is_projected(crs):
+        return ("easting", "northing", "height"), ("m", "m", "m")
+    return ("longitude", "latitude", "height"), ("deg", "deg", "m")
 
 
 def _axes(crs: str, xyz: Floats, earth: Floats) -> Floats:
@@ -217,8 +306,8 @@ def _axes(crs: str, xyz: Floats, earth: Floats) -> Floats:
     if system.is_geocentric:
         return np.broadcast_to(np.eye(3), (len(xyz), 3, 3)).copy()
     geographic = _transformed(GEOCENTRIC, GEOGRAPHIC, earth)
-    found = np.array([east_north_up((lat, lon, h)) for lon, lat, h in geographic.tolist()])
-    if system.is_projected or (system.is_compound and system.sub_crs_list[0].is_projected):
+    found: Floats = local_frames(np.radians(geographic))
+    if is_projected(crs):
         north = geocentric(crs, xyz + np.array([0.0, STEP, 0.0])) - earth
         local = np.einsum("nij,nj->ni", found, north)
         angle = np.arctan2(local[:, 0], local[:, 1])

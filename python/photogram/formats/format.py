@@ -57,6 +57,11 @@ class Format:
         What of a project gets lost in the format, in sentences.
     results
         Files with what an adjustment found that go beside an adjusted project in the format; None: none.
+    files
+        The file that is written, the first of them where there are several, and patterns of the names by
+        which a user may say the format; empty for a format that is a folder.
+    folders
+        Names of folders that say the format, beside its own name.
     """
 
     name: str
@@ -66,3 +71,5 @@ class Format:
     write: Callable[[Project], Mapping[str, bytes]] | None = None
     cannot_hold: Callable[[Project], list[str]] = lambda _: []
     results: Callable[[Project, Result], Mapping[str, bytes]] | None = None
+    files: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()

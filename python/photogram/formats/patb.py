@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.formats.cards import Card, angle_unit, cards, names_beside, to_radians
+from photogram.formats.cards import END, Card, angle_unit, cards, names_beside, to_radians
 from photogram.formats.format import Format, Wishes
+from photogram.formats.names import numbered
 from photogram.formats.project import Project
 from photogram.formats.reduced import Reduced, project_of, with_fitting_rotations
+from photogram.formats.reduced_writing import (
+    ReducedImages,
+    by_photo,
+    given_control,
+    lost_of_reduced,
+    reduced_images,
+)
+from photogram.io.csv_text import csv_text
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 
@@ -19,6 +29,8 @@ __all__ = ["FORMAT", "TITLE"]
 TITLE = "PATB block"
 IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
 MICROMETRES = 1e-3
+DIGITS = 6
+"""Of principal distances in millimetres: files have three of the micrometre."""
 
 
 def _one(path: Path, suffix: str) -> Path | None:
@@ -133,7 +145,72 @@ def _control(path: Path, names: dict[str, str], found: Reduced) -> None:
         codes = [card.number(k, "a code") for k in range(4, min(len(card.words), 6))]
         if name in found.control:
             raise card.place.error(f"the point {name} is there twice")
-        found.control[name] = position, all(code > 0 for code in codes) and bool(codes)
+        # One code is that of all coordinates, two are of position and height.
+        level, height = (code > 0 for code in (codes[0], codes[-1])) if codes else (False, False)
+        found.control[name] = position, np.array([level, level, height])
 
 
-FORMAT = Format(name="patb", title=TITLE, recognises=_recognises, read=read)
+def cannot_hold(project: Project) -> list[str]:
+    """Return what of a project the files have no place for."""
+    found = lost_of_reduced(project, reduced_images(project, DIGITS))
+    found.append(
+        "digits: image coordinates are written to 1e-4 micrometres, positions to 1e-5, rotations to 1e-12"
+    )
+    if any((held[0] != held[1]) for _, held in given_control(project).values()):
+        found.append("control that is held in one of x and y: neither is held")
+    return found
+
+
+def write(project: Project) -> Mapping[str, bytes]:
+    """Return image file, orientation, control, and names where they are no numbers.
+
+    Raises
+    ------
+    InputError
+        Geographic coordinates.
+    """
+    block, reduced = project.block, reduced_images(project, DIGITS)
+    numbers = numbered([*block.photo_ids, *block.point_ids])
+    images: list[str] = []
+    distances = reduced.distances[reduced.cameras]
+    for photo, c, own in zip(block.photo_ids, distances, by_photo(project, reduced), strict=True):
+        images.append(f"{numbers[photo]:12d}{c / MICROMETRES:15.3f}")
+        images += [
+            f"{numbers[point]:12d}{x / MICROMETRES:16.4f}{y / MICROMETRES:16.4f}    0" for point, x, y in own
+        ]
+        images.append(f"{END:>12}")
+    files = {f"block{IMAGES}": images, f"block{ORIENTATION}": _oriented(project, reduced, numbers)}
+    control = [
+        f"{numbers[name]:12d}{''.join(f'{0.0 if np.isnan(own) else own:17.5f}' for own in position)}"
+        f"{int(held[:2].all()):5d}{int(held[2]):5d}"
+        for name, (position, held) in given_control(project).items()
+    ]
+    files[f"block{CONTROL}"] = [*control, f"{END:>12}"] if control else []
+    found = {name: ("\n".join(lines) + "\n").encode() for name, lines in files.items() if lines}
+    if any(str(number) != name for name, number in numbers.items()):
+        found[NAMES] = csv_text({"number": list(numbers.values()), "name": list(numbers)})
+    return found
+
+
+def _oriented(project: Project, reduced: ReducedImages, numbers: Mapping[str, int]) -> list[str]:
+    lines = []
+    for row in np.flatnonzero(reduced.posed).tolist():
+        centre = "".join(f"{own:16.5f}" for own in project.block.photo_positions[row])
+        elements = [f"{own:16.12f}" for own in reduced.matrices[row].ravel()]
+        lines += [
+            f"{numbers[project.block.photo_ids[row]]:16d}{'':16}{centre}",
+            "".join(elements[:5]),
+            "".join(elements[5:]),
+        ]
+    return lines
+
+
+FORMAT = Format(
+    name="patb",
+    title=TITLE,
+    recognises=_recognises,
+    read=read,
+    write=write,
+    files=(f"block{IMAGES}", f"*{IMAGES}"),
+    cannot_hold=cannot_hold,
+)

@@ -195,5 +195,11 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 FORMAT = Format(
-    name="pixels", title=TITLE, recognises=_recognises, read=read, write=write, cannot_hold=cannot_hold
+    name="pixels",
+    title=TITLE,
+    recognises=_recognises,
+    read=read,
+    write=write,
+    files=(FILE, "*.csv"),
+    cannot_hold=cannot_hold,
 )

@@ -18,6 +18,7 @@ from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
 from photogram.network.rigs import Mount
@@ -30,36 +31,6 @@ Size = tuple[int, int]
 
 ASSUMED_SD = {"px": 1.0, "mm": 0.010}
 """Of image coordinates where nothing says how good they are."""
-
-
-@dataclass(frozen=True)
-class Frame:
-    """What the coordinates of a project are.
-
-    Attributes
-    ----------
-    kind
-        `cartesian`, `topocentric` (east, north, up at the origin), `geocentric` or `geographic`.
-    crs
-        Coordinate reference system of the origin, or of the coordinates; empty where none is said.
-    origin
-        Latitude and longitude in degrees and ellipsoidal height in metres of a topocentric frame.
-    ellipsoid
-        Semi-axes of the ellipsoid of geographic coordinates; WGS 84.
-    """
-
-    kind: str = "cartesian"
-    crs: str = ""
-    origin: tuple[float, float, float] | None = None
-    ellipsoid: tuple[float, float] = (6378137.0, 6356752.314245179)
-
-    def __str__(self) -> str:
-        at = (
-            ""
-            if self.origin is None
-            else " at latitude {:.9g}, longitude {:.9g}, height {:.9g}".format(*self.origin)
-        )
-        return self.kind + at + (f" ({self.crs})" if self.crs else "")
 
 
 @dataclass(frozen=True)
@@ -90,7 +61,7 @@ class Project:
     starts
         (n, 3) positions that the file gives for points of the block; NaN without.
     frame
-        What coordinates are.
+        What coordinates are; the block has it, too, and takes it to its results.
     options
         How it asks to be adjusted.
     lacks
@@ -99,6 +70,9 @@ class Project:
         What was left out, corrected or doubtful.
     details
         What the writer of the same format wants to know again; other formats do not read it.
+    sd_taken
+        Whether the reader has taken the standard deviations of images that a user gives, in the unit of the
+        files.
     """
 
     block: Block
@@ -112,6 +86,11 @@ class Project:
     lacks: tuple[str, ...] = ()
     messages: tuple[Message, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
+    sd_taken: bool = False
+
+    def __post_init__(self) -> None:
+        if self.block.frame != self.frame:
+            object.__setattr__(self, "block", self.block.in_frame(self.frame))
 
     def replace(self, **changes: Any) -> Self:
         """Return a project with some members replaced."""

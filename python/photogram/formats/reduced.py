@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.intersection import complete_positions
@@ -39,7 +39,7 @@ class Reduced:
     poses
         Centre and attitude A of photos, photo to object.
     control
-        Position of control points, and whether they are held.
+        Position of control points, and which coordinates are held; of check points none.
     cameras
         By name.
     """
@@ -47,14 +47,14 @@ class Reduced:
     photos: dict[str, str] = field(default_factory=dict)
     images: list[tuple[str, str, float, float]] = field(default_factory=list)
     poses: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
-    control: dict[str, tuple[Floats, bool]] = field(default_factory=dict)
+    control: dict[str, tuple[Floats, Bools]] = field(default_factory=dict)
     cameras: dict[str, Camera] = field(default_factory=dict)
 
     def principal_distance(self, c: float, place: Place) -> str:
         """Return the name of the camera of a principal distance in millimetres."""
         if not LEAST < abs(c) < MOST:
             raise place.error(f"a principal distance of {abs(c):g} mm: is the unit another one?")
-        name = f"c {abs(c):.6g} mm"
+        name = f"c {abs(c):.12g} mm"
         # Coordinates are those of the positive plane: the model has c negative there.
         self.cameras.setdefault(name, Camera("perspective", {"c": -abs(c)}, name=name))
         return name
@@ -81,15 +81,16 @@ def project_of(
             centres[rows[name]], matrices[rows[name]] = centre, matrix
     positions, sd = np.full((len(points), 3), np.nan), np.full((len(points), 3), np.inf)
     lacks = []
-    held = [name for name, (_, used) in found.control.items() if used]
+    held = [name for name, (_, used) in found.control.items() if used.any()]
     if held and "control" not in wishes.sd:
         lacks.append(
             f"no standard deviations of control: {len(held)} points are only compared (--sd control=..)"
         )
     for name, (position, used) in found.control.items():
-        positions[places[name]] = position
-        if used and "control" in wishes.sd:
-            sd[places[name]] = wishes.sd["control"]
+        # What is not held of a control point is not known; a check point is known altogether.
+        positions[places[name]] = np.where(used | ~used.any(), position, np.nan)
+        if used.any() and "control" in wishes.sd:
+            sd[places[name]] = np.where(used, wishes.sd["control"], np.inf)
     cameras = list(found.cameras)
     return assembled(
         path=path,

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
 from photogram.errors import InputError, PhotogramError
 from photogram.formats.format import Format, Wishes
+from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
 from photogram.io.files import reading
 from photogram.memory import turned
 from photogram.messages import listed
 
-__all__ = ["FORMATS", "cannot_hold", "read", "recognised", "to_files"]
+__all__ = ["FORMATS", "cannot_hold", "read", "recognised", "target", "to_files"]
 
 FORMATS: dict[str, Format] = {
     name: import_module(f"photogram.formats.{name}").FORMAT
@@ -29,6 +31,7 @@ FORMATS: dict[str, Format] = {
         "pixels",
         "patb",
         "bingo",
+        "dbat",
         "giant",
     )
 }
@@ -77,7 +80,8 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     chosen = recognised(path) if file_format is None else _named(file_format)
     with turned(f"reading {path}"):
         try:
-            return chosen.read(path, wishes or Wishes())
+            project = chosen.read(path, wishes or Wishes())
+            return project.replace(messages=(*project.messages, *plane_remarks(project)))
         except InputError as error:
             # What refuses arrays or systems of coordinates does not know where they came from.
             raise (error if error.file else InputError(error.message, file=path)) from None
@@ -101,6 +105,87 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
         writable = ", ".join(name for name, each in FORMATS.items() if each.write)
         raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
     return chosen.write(project)
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a project is to be written, and in which format.
+
+    Attributes
+    ----------
+    format
+        The format.
+    folder
+        Where its files go.
+    file
+        Name of the first of them, where a user gave it one.
+    """
+
+    format: Format
+    folder: Path
+    file: str | None = None
+
+    def files(self, project: Project) -> Mapping[Path, bytes]:
+        """Return the files of a project by their paths; those called as the first one share its new name.
+
+        Raises
+        ------
+        InputError
+            As for :func:`to_files`.
+        """
+        found = to_files(project, self.format.name)
+        if self.file is None:
+            return {self.folder / name: content for name, content in found.items()}
+        own, new = Path(self.format.files[0]), Path(self.file)
+        names = {
+            name: new.name
+            if name == own.name
+            else f"{new.stem}{Path(name).suffix}"
+            if Path(name).stem == own.stem
+            else name
+            for name in found
+        }
+        return {self.folder / names[name]: content for name, content in found.items()}
+
+
+def target(path: Path, file_format: str | None = None) -> Target:
+    """Return what a user means by the name of a file or folder to be written.
+
+    Files say their format by their names (`bundle.out`, `*.im`), folders by that of the format
+    (`model-colmap`, `opensfm`, `sparse/0`); other folders are plain projects.
+
+    Parameters
+    ----------
+    path
+        What the user calls it.
+    file_format
+        The name of the format; None: found out.
+
+    Raises
+    ------
+    InputError
+        A name that several formats have.
+    """
+    path = Path(path)
+    among = list(FORMATS.values()) if file_format is None else [_named(file_format)]
+    if not path.is_dir():
+        exact = [each for each in among if each.files[:1] == (path.name,)]
+        found = exact or [each for each in among if any(path.match(pattern) for pattern in each.files)]
+        if len(found) > 1:
+            names = " or ".join(f"{each.title} (--to {each.name})" for each in found)
+            raise InputError(f"may be {names}: say which", file=path)
+        if found:
+            return Target(found[0], path.parent, path.name)
+    if file_format is not None:
+        return Target(among[0], path)
+    name = path.parent.name if path.name.isdigit() else path.name
+    called = [
+        each
+        for each in among
+        if name in (each.name, *each.folders) or name.endswith(tuple(f"{mark}{each.name}" for mark in "-_."))
+    ]
+    # `_text` of colmap_text is no word of its own: the longest name is what was meant.
+    return Target(max(called, key=lambda each: len(each.name), default=FORMATS["plain"]), path)
 
 
 def cannot_hold(project: Project, file_format: str) -> list[str]:

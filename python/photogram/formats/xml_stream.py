@@ -99,22 +99,17 @@ class Element:
         return np.array([self._number(word) for word in words])
 
 
-def root_of(path: Path) -> str:
-    """Return the name of the root element of a file; nothing for what is no XML."""
-    found = ""
-
-    def start(name: str, _: dict[str, str]) -> None:
-        nonlocal found
-        found = found or name
-
+def root_of(path: Path) -> tuple[str, Mapping[str, str]]:
+    """Return name and attributes of the root element of a file; nothing for what is no XML."""
+    found: list[tuple[str, Mapping[str, str]]] = []
     parser = xml.parsers.expat.ParserCreate()
-    parser.StartElementHandler = start
+    parser.StartElementHandler = lambda name, attributes: found.append((name, attributes))
     try:
         with path.open("rb") as file:
             parser.Parse(file.read(PIECE), False)
     except (OSError, xml.parsers.expat.ExpatError):
-        return found
-    return found
+        pass
+    return found[0] if found else ("", {})
 
 
 def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: str) -> Element:

@@ -27,7 +27,7 @@ from photogram.io.places import Place
 from photogram.io.rows import LONGEST_RECORD
 from photogram.messages import listed, quoted
 
-__all__ = ["ColumnTable", "Names", "read_columns"]
+__all__ = ["ColumnTable", "Names", "read_columns", "read_rows"]
 
 DELIMITERS = ("\t", ";", ",", "|")
 """In this order; blanks where a header has none of them."""
@@ -247,6 +247,40 @@ def read_columns(
     for column in columns:
         if column and columns.count(column) > 1:
             raise head.error(f"the column {quoted(column)} is there twice")
+    return _below(path, text, head, columns, delimiter, numbers)
+
+
+def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = ()) -> ColumnTable:
+    """Read a table without a header, whose columns are known, after any comments.
+
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Their names; empty for those that nobody asks for.
+    numbers
+        As in :func:`read_columns`.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or a row has more or fewer cells than there are columns.
+    """
+    text = _text(path)
+    lines = text.split("\n")
+    first = next(
+        (row for row, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENT)), 0
+    )
+    head = Place(path, first)
+    sample = Place(path, first + 1, lines[first])
+    return _below(path, text, head, tuple(columns), _delimiter(sample), numbers)
+
+
+def _below(
+    path: Path, text: str, head: Place, columns: tuple[str, ...], delimiter: str, numbers: Collection[str]
+) -> ColumnTable:
+    """Read what stands below the record of the header."""
     assert head.record is not None
     if len(text) > LARGE and delimiter != " ":
         fast = _by_pandas(path, text, head, columns, delimiter, numbers)

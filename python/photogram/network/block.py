@@ -3,37 +3,49 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence, Sized
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.arrays import frozen, indices, length, names, shaped, shown, text, truth_value
+from photogram.arguments.arrays import frozen, indices, length, shaped, shown, text, truth_value
+from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_cameras, photo_indices
+from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation, observation_rows
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
+from photogram.network.tables import (
+    ATTITUDE_COLUMNS,
+    GEOGRAPHIC_COLUMNS,
+    RECTANGULAR_COLUMNS,
+    Table,
+    different,
+    numbered,
+    table_arguments,
+)
 from photogram.network.unknowns import Unknown, different_unknowns
+from photogram.show.brief import Brief, Rows, few
 
-__all__ = ["Block"]
+__all__ = ["ATTITUDE_COLUMNS", "Block"]
 
 
-RECTANGULAR_COLUMNS = ("X", "Y", "Z")
-GEOGRAPHIC_COLUMNS = ("longitude_deg", "latitude_deg", "height")
-ATTITUDE_COLUMNS = ("omega_deg", "phi_deg", "kappa_deg")
-
+_NUMBERS: Any = None
+"""Names that are not given."""
 _ANGLES = 1e6
 """Radians: larger angles have lost the digits that an attitude needs."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Block:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Block(Valued, Brief):
     """A block of photographs with its measurements and everything known beforehand.
 
     P photos, n points, m image observations. Positions are X, Y, Z in the linear unit of the object space
@@ -46,7 +58,7 @@ class Block:
     Parameters
     ----------
     photo_ids
-        P names, all different: strings that print, or whole numbers.
+        P names, all different: strings that print, or whole numbers. None: 0, 1, 2 ...
     photo_positions, photo_attitudes
         (P, 3) initial positions, and omega, phi, kappa in radians: M = M_kappa M_phi M_omega (GIANT guide,
         section 5). Components whose standard deviation is 0 stay at these values. NaN where unknown:
@@ -56,7 +68,7 @@ class Block:
         cameras that are known and free of distortion, image coordinates counted from the principal point.
         None where there are `cameras`.
     point_ids
-        n names, all different.
+        n names, all different; None: 0, 1, 2 ...
     point_positions
         (n, 3); NaN where unknown: intersected from the initial rays.
     image_photos, image_points
@@ -96,6 +108,8 @@ class Block:
         One for all photos; None where there is one camera, or one for each photo.
     mounts
         Which photos are on a frame with others, and in which pose (:mod:`photogram.network.rigs`).
+    frame
+        Where on the earth the coordinates are, for maps and other systems; the adjustment does not ask.
 
     Raises
     ------
@@ -106,11 +120,11 @@ class Block:
         principal distances and cameras, or neither.
     """
 
-    photo_ids: list[str]
+    photo_ids: list[str] = _NUMBERS
     photo_positions: Floats
     photo_attitudes: Floats
     principal_distances: Floats | None = None
-    point_ids: list[str]
+    point_ids: list[str] = _NUMBERS
     point_positions: Floats
     image_photos: Indices
     image_points: Indices
@@ -130,10 +144,45 @@ class Block:
     cameras: Sequence[Camera] = ()
     photo_cameras: Indices | None = None
     mounts: Sequence[Mount] = ()
+    frame: Frame = field(default_factory=Frame)
+
+    if TYPE_CHECKING:
+        # What checkers of types are told: more can be given than what the fields then hold.
+        def __init__(
+            self,
+            *,
+            photo_ids: Iterable[str | int] | None = None,
+            photo_positions: ArrayLike,
+            photo_attitudes: ArrayLike,
+            principal_distances: ArrayLike | None = None,
+            point_ids: Iterable[str | int] | None = None,
+            point_positions: ArrayLike,
+            image_photos: ArrayLike,
+            image_points: ArrayLike,
+            image_xy: ArrayLike,
+            image_sd: ArrayLike,
+            photo_position_sd: ArrayLike = ...,
+            photo_attitude_sd: ArrayLike = ...,
+            point_sd: ArrayLike = ...,
+            spheroid: Spheroid | None = None,
+            photo_to_ground: bool = False,
+            title: str = "",
+            linear_unit: str = "m",
+            refraction: Refraction | None = None,
+            photo_positions_observed: ArrayLike | None = None,
+            photo_attitudes_observed: ArrayLike | None = None,
+            observations: Sequence[Observation] = (),
+            cameras: Sequence[Camera] = (),
+            photo_cameras: ArrayLike | Sequence[str] | None = None,
+            mounts: Sequence[Mount] = (),
+            frame: Frame = ...,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
-        for name in ("photo_ids", "point_ids"):
-            self._set(name, _different(name, getattr(self, name)))
+        for name, of in (("photo_ids", "photo_positions"), ("point_ids", "point_positions")):
+            given = getattr(self, name)
+            given = numbered(length(of, getattr(self, of))) if given is None else given
+            self._set(name, different(name, given))
         photos, points = len(self.photo_ids), len(self.point_ids)
         images = length("image_photos", self.image_photos)
         shapes: dict[str, tuple[int, ...]] = {
@@ -240,6 +289,8 @@ class Block:
         self._set("photo_to_ground", truth_value("photo_to_ground", self.photo_to_ground))
         if self.spheroid is not None and not isinstance(self.spheroid, Spheroid):
             raise InputError(f"spheroid is a Spheroid or None, not {shown(self.spheroid)}")
+        if not isinstance(self.frame, Frame):
+            raise InputError(f"frame is a Frame, not {shown(self.frame)}")
         if self.refraction is not None:
             if not isinstance(self.refraction, Refraction):
                 raise InputError(f"refraction is a Refraction or None, not {shown(self.refraction)}")
@@ -273,6 +324,31 @@ class Block:
                 point, photo = self.image_points[row], self.image_photos[row]
                 of = f"{self.point_ids[point]} on photo {self.photo_ids[photo]}"
             raise InputError(f"{name} of {of} {why}: {getattr(self, name)[row].tolist()}")
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return what the block is in a few lines, as its `repr` and notebooks show it."""
+        held, known = np.isfinite(self.point_sd).any(axis=1), np.isfinite(self.point_positions).any(axis=1)
+        counts = {"control": held.sum(), "with known coordinates": (known & ~held).sum()}
+        told = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+        distances = self.principal_distances
+        spheroid = self.spheroid
+        kinds = Counter(each.label for each in self.observations)
+        rows = [
+            ("photos", few(self.photo_ids)),
+            ("points", few(self.point_ids)),
+            ("", told),
+            ("images", f"{len(self.image_xy):,}, {self.image_unit}, sd {_span(self.image_sd)}"),
+            ("cameras", few(self.camera_names) if distances is None else f"c {_span(distances)} mm"),
+            ("space", f"geographic, a = {spheroid.a:g}" if spheroid else "rectangular"),
+            ("unit", self.linear_unit),
+        ]
+        if kinds:
+            rows.append(("observations", ", ".join(f"{count} {name}" for name, count in kinds.items())))
+        if self.mounts:
+            rows.append(("on frames", few([each.photo for each in self.mounts])))
+        if self.refraction is not None:
+            rows.append(("refraction", str(self.refraction)))
+        return f"Block: {self.title}" if self.title else "Block", rows
 
     @property
     def geographic(self) -> bool:
@@ -332,9 +408,9 @@ class Block:
     @classmethod
     def from_tables(
         cls,
-        photos: Mapping[str, Any],
-        images: Mapping[str, Any],
-        points: Mapping[str, Any] | None = None,
+        photos: Table,
+        images: Table,
+        points: Table | None = None,
         *,
         principal_distance: float | None = None,
         cameras: Sequence[Camera] = (),
@@ -350,10 +426,10 @@ class Block:
         Parameters
         ----------
         photos
-            `photo`; `X`, `Y`, `Z` (or `longitude_deg`, `latitude_deg`, `height` when a spheroid is given);
-            `omega_deg`, `phi_deg`, `kappa_deg`. Optional: `principal_distance_mm` or, with cameras, `camera`
-            (index or name), and before any of the six names `sd_` (same units) and `observed_`, the observed
-            value where it is not the initial one.
+            `photo` (without it 0, 1, 2 ...); `X`, `Y`, `Z` (or `longitude_deg`, `latitude_deg`, `height` when
+            a spheroid is given); `omega_deg`, `phi_deg`, `kappa_deg`. Optional: `principal_distance_mm` or,
+            with cameras, `camera` (index or name), and before any of the six names `sd_` (same units) and
+            `observed_`, the observed value where it is not the initial one.
         images
             `photo`, `point`, `x_mm`, `y_mm`. Optional: `sd_x_mm`, `sd_y_mm`. With cameras in pixels all four
             end in `_px`.
@@ -375,40 +451,8 @@ class Block:
         InputError
             A column that is missing, a photo that `photos` does not name, or whatever the class refuses.
         """
-        axes = RECTANGULAR_COLUMNS if spheroid is None else GEOGRAPHIC_COLUMNS
-        photo_ids = _name_column(photos, "photos", "photo")
-        image_point_names = _name_column(images, "images", "point")
-        control_ids = _name_column(points, "points", "point") if points is not None else []
-        control_ids = _different("points", control_ids)
-        point_ids = list(dict.fromkeys([*control_ids, *image_point_names]))
-
-        positions = np.full((len(point_ids), 3), np.nan)
-        sd = np.full((len(point_ids), 3), np.inf)
-        if points is not None:
-            positions[: len(control_ids)] = _columns(points, "points", axes)
-            sd[: len(control_ids)] = _columns(points, "points", [f"sd_{axis}" for axis in axes], np.inf)
-            sd[np.isnan(sd) | np.isnan(positions)] = np.inf
-        unit = str(cameras[0].unit) if cameras else "mm"
-        if image_sd is None and unit == "mm":
-            image_sd = 0.010
         return cls(
-            photo_ids=photo_ids,
-            photo_positions=_columns(photos, "photos", axes),
-            photo_attitudes=_columns(photos, "photos", ATTITUDE_COLUMNS),
-            principal_distances=_distances(photos, principal_distance, cameras),
-            cameras=cameras,
-            photo_cameras=_camera_column(photos, cameras),
-            point_ids=point_ids,
-            point_positions=positions,
-            image_photos=_lookup("photo", photo_ids, _name_column(images, "images", "photo")),
-            image_points=_lookup("point", point_ids, image_point_names),
-            image_xy=_columns(images, "images", [f"x_{unit}", f"y_{unit}"]),
-            image_sd=_columns(images, "images", [f"sd_x_{unit}", f"sd_y_{unit}"], image_sd),
-            photo_position_sd=_columns(photos, "photos", [f"sd_{axis}" for axis in axes], np.inf),
-            photo_attitude_sd=_columns(photos, "photos", [f"sd_{axis}" for axis in ATTITUDE_COLUMNS], np.inf),
-            point_sd=sd,
-            photo_positions_observed=_observed(photos, axes),
-            photo_attitudes_observed=_observed(photos, ATTITUDE_COLUMNS),
+            **table_arguments(photos, images, points, principal_distance, cameras, image_sd, spheroid),
             spheroid=spheroid,
             photo_to_ground=photo_to_ground,
             title=title,
@@ -429,12 +473,24 @@ class Block:
             raise InputError(f"a block has no {', '.join(sorted(unknown))}")
         return type(self)(**{**values, **changes})
 
+    def in_frame(self, frame: Frame) -> Self:
+        """Return the block with another frame; the coordinates are the same."""
+        own = copy.copy(self)
+        own._set("frame", frame)
+        return own
+
     def kept(self) -> Self:
         """Return the block as a result keeps it: with lists of names of its own, the arrays shared."""
         own = copy.copy(self)
         own._set("photo_ids", list(self.photo_ids))
         own._set("point_ids", list(self.point_ids))
         return own
+
+
+def _span(values: Floats) -> str:
+    """Return a number that stands for all, or the least and the largest."""
+    low, high = (float(values.min()), float(values.max())) if values.size else (math.nan, math.nan)
+    return f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
 
 
 def of_images_alone(block: Block, what: str) -> Block:
@@ -475,84 +531,3 @@ def checked(block: Block) -> Block:
 def position_columns(block: Block) -> tuple[str, str, str]:
     """Names of the three columns of positions in tables."""
     return GEOGRAPHIC_COLUMNS if block.geographic else RECTANGULAR_COLUMNS
-
-
-def _different(name: str, values: Sequence[str]) -> list[str]:
-    """Return names that are all different."""
-    found = names(name, values)
-    if len(set(found)) != len(found):
-        seen: set[str] = set()
-        repeated = next(value for value in found if value in seen or seen.add(value))  # type: ignore[func-returns-value]
-        raise InputError(f"{name}: {repeated!r} stands there more than once")
-    return found
-
-
-def _column(table: Mapping[str, Any], table_name: str, name: str) -> Sequence[Any]:
-    try:
-        there = name in table
-        column: Sequence[Any] = table[name] if there else ()
-    except (TypeError, KeyError, IndexError):
-        raise InputError(f"{table_name} is no table, a mapping of column names to columns") from None
-    if not there:
-        raise InputError(f"{table_name} has no column {name}")
-    return column
-
-
-def _name_column(table: Mapping[str, Any], table_name: str, name: str) -> list[str]:
-    return names(f"{table_name}, column {name}", _column(table, table_name, name))
-
-
-def _columns(
-    table: Mapping[str, Any], table_name: str, columns: Sequence[str], default: ArrayLike | None = None
-) -> Floats:
-    """Stack columns as (rows, len(columns)), `_deg` ones in radians; absent ones get the default."""
-    key = "photo" if table_name == "photos" else "point"
-    named = _column(table, table_name, key)
-    if not isinstance(named, Sized):
-        raise InputError(f"{table_name}, column {key} is not a list of names: {shown(named)}")
-    rows = len(named)
-    stacked = []
-    for name in columns:
-        values = default if name not in table and default is not None else _column(table, table_name, name)
-        column = shaped(f"{table_name}, column {name}", values, (rows,), missing=True)
-        stacked.append(np.radians(column) if name.endswith("_deg") else column)
-    return np.stack(stacked, axis=1)
-
-
-def _distances(
-    photos: Mapping[str, Any], principal_distance: float | None, cameras: Sequence[Camera]
-) -> Floats | None:
-    name = "principal_distance_mm"
-    if cameras:
-        if name in photos or principal_distance is not None:
-            raise InputError("principal distances and cameras are both given: the cameras have them")
-        return None
-    if name not in photos and principal_distance is None:
-        raise InputError(f"photos has no column {name} and no principal_distance was given")
-    return _columns(photos, "photos", [name], principal_distance)[:, 0]
-
-
-def _camera_column(photos: Mapping[str, Any], cameras: Sequence[Camera]) -> Indices | None:
-    """Return (P,) indices of the cameras that photos name; None where they name none."""
-    if not cameras or "camera" not in photos:
-        return None
-    return photo_indices(list(_column(photos, "photos", "camera")), cameras, len(photos["photo"]))
-
-
-def _observed(photos: Mapping[str, Any], columns: Sequence[str]) -> Floats | None:
-    """Return the columns of observed values, the initial ones where there are none; None without any."""
-    observed = [f"observed_{name}" for name in columns]
-    if not any(name in photos for name in observed):
-        return None
-    present = [own if own in photos else name for own, name in zip(observed, columns, strict=True)]
-    return _columns(photos, "photos", present)
-
-
-def _lookup(kind: str, ids: Sequence[str], images: Sequence[str]) -> Indices:
-    index = {name: i for i, name in enumerate(ids)}
-    try:
-        return np.array([index[name] for name in images], dtype=np.int64)
-    except KeyError as error:
-        raise InputError(
-            f"images names the {kind} {error.args[0]!r}, which the {kind}s do not list"
-        ) from None

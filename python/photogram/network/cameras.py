@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import is_covariance, number, one_of, shaped, shown, text
+from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.show.brief import Brief, Rows
 
 __all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "checked_cameras", "images_of", "photo_indices"]
 
@@ -47,8 +49,8 @@ def _names() -> tuple[str, ...]:
     return tuple(name for name in _photocore.CAMERAS if not name.endswith(_MEASURED))
 
 
-@dataclass(frozen=True, eq=False)
-class Camera:
+@dataclass(frozen=True, eq=False, repr=False)
+class Camera(Valued, Brief):
     """A camera of one photo or of many.
 
     Parameters
@@ -109,6 +111,18 @@ class Camera:
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return what the camera is in a few lines, as its `repr` and notebooks show it."""
+        title = f"Camera {self.name}: {self.model}" if self.name else f"Camera: {self.model}"
+        rows = []
+        for name, value, sd in zip(self.names, self.values, self.deviations, strict=True):
+            if value != 0 or sd > 0 or name in _GIVEN:
+                known = "" if sd == 0 else ", free" if math.isinf(sd) else f", sd {sd:.3g}"
+                rows.append((name, f"{value:.8g} {self.unit_of(name)}".rstrip() + known))
+        if len(rows) < len(self.names):
+            rows.append(("", f"all {len(self.names) - len(rows)} others are 0 and held"))
+        return f"{title}, {self.unit}", rows
 
     @property
     def names(self) -> tuple[str, ...]:

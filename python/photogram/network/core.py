@@ -15,7 +15,11 @@ __all__ = ["CoreOptions", "block_network"]
 
 @dataclass(frozen=True)
 class CoreOptions:
-    """How the core adjusts a block: the options of :func:`photogram.adjust` as it knows them."""
+    """How the core adjusts a block: the options of :func:`photogram.adjust` as it knows them.
+
+    With `points_given` points start from their given coordinates where these are known, not from the
+    intersection of their rays: of a block that starts where another adjustment has ended.
+    """
 
     criterion: str
     limit: float
@@ -25,6 +29,7 @@ class CoreOptions:
     ordering: str
     unit_variance: str
     minimum: tuple[int, tuple[int, int] | None] | None
+    points_given: bool = False
 
 
 def block_network(block: Block, options: CoreOptions) -> _photocore.BlockNetwork:
@@ -62,6 +67,7 @@ def block_network(block: Block, options: CoreOptions) -> _photocore.BlockNetwork
         ordering=options.ordering,
         unit_variance=options.unit_variance,
         minimum=options.minimum,
+        points_given=options.points_given,
         memory=None if fits_anywhere(block) else available_memory(),
     )
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.show.pictures import arrows, drawn, new_figure, open_frame, round_length
+from photogram.show.style import INK, MARKED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +27,7 @@ WIDTH, ROW = 11.0, 5.0
 """Inches of a figure, and of one set in it."""
 LONGEST = 0.12
 """The longest residual vector, as part of the extent of the grid."""
-INK, ACCENT, BAND = "#1b2a41", "#c8553d", "#dfe5ec"
+ACCENT, BAND = MARKED, "#e4e4e4"
 SAME_RADIUS = 0.02
 """Points whose radii differ by less than this part of the largest are averaged into one point of the
 curve."""

@@ -17,6 +17,7 @@ from photogram.io import json
 from photogram.network.block import Block
 from photogram.planning.pattern import Pattern
 from photogram.planning.text import report
+from photogram.show.ways import html_of
 from photogram.statistics.reliability import TESTABLE, noncentrality
 
 if TYPE_CHECKING:
@@ -61,6 +62,13 @@ class Plan:
     def report(self) -> str:
         """Return the tables a planner needs as text."""
         return report(self.patterns)
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     def plot(self) -> Figure:
         """Return a figure: the patterns in plan, the expected standard deviation in height as colour.

@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import PhotogramError
 from photogram.show.pictures import new_figure
+from photogram.show.style import ORDERED, VERMILION
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -78,6 +79,7 @@ def _panel(axes: Axes, pattern: Pattern, heights: Floats) -> PathCollection:
         s=float(np.clip(2e4 / max(1, len(sd)), 2, 30)),
         vmin=heights.min(),
         vmax=heights.max(),
+        cmap=ORDERED,
         linewidths=0,
     )
     axes.plot(*pattern.photo_plan.T, "+", color="0.4", markersize=4, label="photo")
@@ -89,7 +91,7 @@ def _panel(axes: Axes, pattern: Pattern, heights: Floats) -> PathCollection:
         if chosen.any():
             x, y = pattern.point_plan[chosen].T
             axes.scatter(
-                x, y, marker=marker, s=60, c="white", edgecolors="crimson", linewidths=1.6, label=name
+                x, y, marker=marker, s=60, c="white", edgecolors=VERMILION, linewidths=1.6, label=name
             )
     quality = pattern.points[-1]
     figures = f"rms {quality.rms_sd[2]:#.3g} {unit}, largest {quality.max_sd[2]:#.3g} {unit}"

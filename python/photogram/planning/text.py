@@ -14,7 +14,7 @@ from photogram.show.sections import composed, headline
 if TYPE_CHECKING:
     from photogram.planning.pattern import Pattern
 
-__all__ = ["report"]
+__all__ = ["remarks", "report"]
 
 _NOTICED = 1.005
 """Ratio of standard deviations that two decimals show."""
@@ -55,10 +55,10 @@ def _network(patterns: Sequence[Pattern]) -> list[str]:
     ]
     blocks = [[pattern.name, *(cell(pattern) for _, cell in rows)] for pattern in patterns]
     labels = ["", *(name for name, _ in rows)]
-    return [*_labelled(labels, [_column(block) for block in blocks]), *_remarks(patterns)]
+    return [*_labelled(labels, [_column(block) for block in blocks]), *remarks(patterns)]
 
 
-def _remarks(patterns: Sequence[Pattern]) -> list[str]:
+def remarks(patterns: Sequence[Pattern]) -> list[str]:
     """List each remark once, with the patterns that it is about unless it is about all."""
     about: dict[str, list[str]] = {}
     for pattern in patterns:

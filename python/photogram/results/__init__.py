@@ -1,3 +1,12 @@
 """What an adjustment gives, as arrays, tables, text and JSON."""
 
-from photogram.results import document, findings, judged, report, tables  # noqa: F401  (the ways to show a result)
+from photogram.results import (  # noqa: F401  (the ways to show a result)
+    document,
+    findings,
+    html,
+    judged,
+    pictured,
+    report,
+    saved_block,
+    tables,
+)

@@ -98,6 +98,11 @@ class AdjustedCamera:
         covariance = (names, self.covariance[np.ix_(rows, rows)]) if names else None
         return self.camera.replace(sd=0.0, covariance=covariance)
 
+    def restarted(self) -> Camera:
+        """Return the camera as it was given, but with adjusted values of free parameters."""
+        found = np.where(np.isinf(self.given.deviations), self.values, self.given.values)
+        return self.given.replace(parameters=dict(zip(self.names, found.tolist(), strict=True)))
+
     def value(self, name: str) -> float:
         """Return an adjusted parameter."""
         return self.camera.parameters[name]

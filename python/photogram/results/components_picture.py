@@ -10,6 +10,7 @@ import numpy as np
 from photogram.io.writing import write_whole
 from photogram.results.components import VarianceComponents
 from photogram.show.pictures import drawn, new_figure, open_frame
+from photogram.show.style import FAINT, INK, MARKED
 from photogram.show.ways import picture_of
 
 if TYPE_CHECKING:
@@ -45,13 +46,13 @@ def figure_of_components(found: VarianceComponents) -> Figure:
     figure = new_figure(6.4, 1.6 + INCHES * len(found.components))
     axes = figure.add_subplot()
     for place, each in enumerate(found.components):
-        color = "tab:red" if each.worth_changing else "black"
+        color = MARKED if each.worth_changing else INK
         if each.held:
-            axes.plot(each.factor_of_sd, place, "o", color="grey", fillstyle="none")
+            axes.plot(each.factor_of_sd, place, "o", color=FAINT, fillstyle="none")
             continue
         axes.plot(np.sqrt(each.interval), [place, place], color=color)
         axes.plot(each.factor_of_sd, place, "o", color=color)
-    axes.axvline(1.0, color="grey", linewidth=0.8)
+    axes.axvline(1.0, color=FAINT, linewidth=0.8)
     axes.set_yticks(range(len(found.components)), [each.name for each in found.components])
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -22,11 +22,23 @@ from photogram.network.cameras import Camera
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 
-__all__ = ["INTERIOR", "DistortionCurve", "distortion_curve", "largest_radius", "own_images"]
+__all__ = [
+    "INTERIOR",
+    "RADIAL",
+    "DistortionCurve",
+    "added_along",
+    "distortion_curve",
+    "largest_radius",
+    "own_images",
+    "radial_part",
+]
 
 DISTANCES = ("c", "f", "fx")
 INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy"})
 """Principal distance and principal point; all other parameters are terms of the lens."""
+
+RADIAL = re.compile(r"[KkA]\d")
+"""Names of radial terms."""
 
 BALANCED_AT = 2.0 / 3.0
 """r0, of the largest observed radius."""
@@ -106,7 +118,7 @@ def distortion_curve(
     radii
         (n,) in the unit of image coordinates; evenly to a quarter beyond the largest observed when None.
     """
-    terms = [k for k, name in enumerate(camera.names) if re.fullmatch(r"[KkA]\d", name)]
+    terms = [k for k, name in enumerate(camera.names) if RADIAL.fullmatch(name)]
     used = any(camera.values[k] != 0 or k in camera.estimated for k in terms)
     observed = largest_radius(result, camera)
     if not used or observed == 0:
@@ -142,13 +154,12 @@ def _deviations(camera: AdjustedCamera, terms: list[int], partials: Floats) -> F
 
 def _radial(camera: AdjustedCamera, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
     """Return the curve of the radial terms alone, and its partials by these: the curve is linear in them."""
-    own = camera.camera
-    keep = {"c", "f", "fx", "fy", *own.constants, *(camera.names[k] for k in terms)}
-    bare = {name: value if name in keep else 0.0 for name, value in own.parameters.items()}
+    own = radial_part(camera.camera)
+    bare = own.parameters
     largest = radii.max()
 
     def at(changes: dict[str, float]) -> Floats:
-        return _along(own.replace(parameters={**bare, **changes}), radii)
+        return added_along(own.replace(parameters={**bare, **changes}), radii)
 
     partials = np.empty((len(radii), len(terms)))
     for column, k in enumerate(terms):
@@ -160,7 +171,17 @@ def _radial(camera: AdjustedCamera, terms: list[int], radii: Floats) -> tuple[Fl
     return at({}), partials
 
 
-def _along(camera: Camera, radii: Floats) -> Floats:
+def radial_part(camera: Camera) -> Camera:
+    """Return a camera without what is not radial: principal point, decentring, affinity."""
+    keep = {"c", "f", "fx", "fy", *camera.constants, *filter(RADIAL.fullmatch, camera.names)}
+    return camera.replace(
+        parameters={name: value if name in keep else 0.0 for name, value in camera.parameters.items()},
+        sd=0.0,
+        covariance=None,
+    )
+
+
+def added_along(camera: Camera, radii: Floats) -> Floats:
     """Return what is added to a radius along x: to measured coordinates, or to ideal ones."""
     zero = np.zeros_like(radii)
     if _is_backward(camera):

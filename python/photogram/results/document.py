@@ -66,6 +66,7 @@ def _document(result: Result) -> dict[str, Any]:
         "variance_of_unit_weight": result.variance_of_unit_weight,
         "global_test": _global_test(result),
         "verdict": result.verdict.document(),
+        "reliability": summary.document() if (summary := result.reliability_summary) else None,
         "covariance_scale": result.covariance_scale,
         "photos": _photos(result),
         **(

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram.results.groups_tested import groups_tested
 from photogram.results.kinds import tested_kind
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observed import tested
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.result import Result
+from photogram.results.suspects import observations_of_core
 from photogram.show.ways import findings_of
-from photogram.statistics.findings import Findings, Systematic, by_w
+from photogram.statistics.findings import Findings, Systematic, Tested, by_w
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
@@ -25,15 +27,24 @@ def block_findings(result: Result) -> Findings:
     """Return the tests of a block: standard deviations are given, so the unit weight is known."""
     return Findings(
         status=result.status,
-        observations=[by_w(each) for each in tested_observations(result)],
+        observations=_tested(result),
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=None if result.loss else result.global_test,
         untested=ROBUST if result.loss else "no degrees of freedom",
         computed=has_redundancy(result),
         systematic=_patterns(result),
         remarks=unseen(result),
+        hints=result.hints,
         snoop="--snoop (photogram.snoop)",
     )
+
+
+def _tested(result: Result) -> list[Tested]:
+    """Return the tests of groups; of single coordinates where a loss has changed the weights."""
+    summary = result.reliability_summary
+    if summary is None:
+        return [by_w(each) for each in tested_observations(result)]
+    return groups_tested(summary, [each.label for each in observations_of_core(result.block)])
 
 
 def _patterns(result: Result) -> list[Systematic]:

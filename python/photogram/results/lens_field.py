@@ -6,7 +6,6 @@ at a position and the block Q of their cofactors, the vector there has the covar
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.distortion import INTERIOR, own_images
+from photogram.results.distortion import INTERIOR, RADIAL, own_images
 from photogram.results.result import Result
 
 __all__ = ["LensField", "lens_field"]
@@ -57,7 +56,7 @@ def lens_field(result: Result, camera: AdjustedCamera) -> LensField | None:
         name
         for k, name in enumerate(camera.names)
         if name not in INTERIOR | camera.camera.constants
-        and not re.fullmatch(r"[KkA]\d", name)
+        and not RADIAL.fullmatch(name)
         and (camera.values[k] != 0 or k in camera.estimated)
     )
     xy = own_images(result, camera)

@@ -2,29 +2,45 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Self
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram import _photocore
 from photogram.arguments.arrays import standard_deviations
+from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.io.writing import write_whole
 from photogram.messages import Message
 from photogram.results.covariance import Covariances, Propagated
 from photogram.results.iteration import Iteration
+from photogram.results.reliability import Reliability
+from photogram.results.reliability_summary import ReliabilitySummary, reliability_summary
 from photogram.results.selection import Selection
-from photogram.show.ways import Shown
+from photogram.show.brief import Brief, Rows
+from photogram.show.ways import Shown, files_of
 from photogram.statistics.reliability import standardized
+from photogram.statistics.snooping.suspects import LostSupportError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram import _photocore
+    from photogram.plots import Plots
 
 __all__ = ["AdjustedNetwork", "Observed"]
+
+JUDGED = 100_000
+"""Images of a network whose `repr` tells the verdict, at most."""
+REMARKS = 5
+"""That its `repr` tells at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +66,8 @@ class Observed:
     standardized: Floats
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class AdjustedNetwork(Shown, ABC):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class AdjustedNetwork(Valued, Brief, Shown, ABC):
     """An adjusted network of P photos with k unknowns each, n points and m image points.
 
     All are in the order in which they were given; what was left out of the adjustment is NaN. Residuals are
@@ -123,11 +139,53 @@ class AdjustedNetwork(Shown, ABC):
     formations: int
     seconds: Mapping[str, float]
 
+    KNOWN: ClassVar[bool] = True
+    """Whether standard deviations are given, so that the unit weight is known."""
+
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
+
+    BESIDE: ClassVar[frozenset[str]] = frozenset(
+        {"seconds", "operations", "predictions", "formations", "state"}
+    )
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return how the adjustment ended in a few lines, as its `repr` and notebooks show it."""
+        used = self.used_images
+        rms = np.sqrt((self.residuals[used] ** 2).mean(axis=0)) if used.any() else np.zeros(2)
+        s0 = self.variance_of_unit_weight
+        rows = [
+            ("status", f"{self.status}, {len(self.iterations)} iterations"),
+            ("photos", f"{len(self.photo_cofactors):,}"),
+            ("points", f"{int(self.used_points.sum()):,} of {len(self.point_rays):,} took part"),
+            ("images", f"{int(used.sum()):,} of {len(used):,} took part"),
+            ("residuals", f"rms {rms[0]:.3g}, {rms[1]:.3g} {self._image_unit}"),
+            ("freedom", f"{self.degrees_of_freedom:,.6g}"),
+            ("sigma0", "a priori: there are no degrees of freedom" if s0 is None else f"{math.sqrt(s0):.4g}"),
+        ]
+        # Tests of all observations take a while where they are many.
+        if len(used) <= JUDGED:
+            rows.insert(0, ("verdict", self.verdict.headline))
+        if self.loss is not None:
+            rows.append(("loss", f"{self.loss[0]}, scale {self.loss[1]:g}"))
+        rows += [("remark", str(message).splitlines()[0]) for message in self.messages[:REMARKS]]
+        if len(self.messages) > REMARKS:
+            rows.append(("", f"and {len(self.messages) - REMARKS} more remarks"))
+        rows.append(("see", ".report(), .plot, .photo_table(), .point_table(), .image_table(), .to_json()"))
+        return f"Adjusted {self._what}", rows
+
+    @property
+    @abstractmethod
+    def _what(self) -> str:
+        """What was adjusted, with its title."""
+
+    @property
+    @abstractmethod
+    def _image_unit(self) -> str:
+        """Unit of image coordinates."""
 
     @classmethod
     def taken_over(cls, solution: _photocore._NetworkSolution, **found: Any) -> Self:
@@ -136,6 +194,33 @@ class AdjustedNetwork(Shown, ABC):
         found["iterations"] = [Iteration(*row) for row in solution.iterations]
         same = {each.name: getattr(solution, each.name) for each in fields(cls) if each.name not in found}
         return cls(**found, **same)
+
+    @property
+    def geographic(self) -> bool:
+        """Whether plan coordinates are angles."""
+        return False
+
+    @abstractmethod
+    def reliability(
+        self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
+    ) -> Reliability:
+        """Return which gross errors of every observation are found, and what others do."""
+
+    @cached_property
+    def reliability_summary(self) -> ReliabilitySummary | None:
+        """What the report says of reliability, with the tests of all groups of observations.
+
+        None where there are no redundancy numbers, or the adjustment has not converged or has a loss.
+        """
+        computed = bool(np.isfinite(self.redundancy[self.used_images]).all())
+        if not (computed and self.converged and self.loss is None and self.degrees_of_freedom > 0):
+            return None
+        try:
+            found = self.reliability(unit_weight="known" if self.KNOWN else "unknown")
+        except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
+            # Everything else stands; a network that rounding makes singular here has said so before.
+            return None
+        return reliability_summary(found, heights=self.geographic)
 
     @property
     @abstractmethod
@@ -264,6 +349,28 @@ class AdjustedNetwork(Shown, ABC):
     ) -> Propagated:
         """Return a function of adjusted unknowns with its covariance; see `Covariances.propagate`."""
         return self.covariances().propagate(function, unknowns, bias=bias)
+
+    @property
+    def plot(self) -> Plots:
+        """Pictures: `plot.network()`, `.residuals()`, `.redundancy()`, `.tests()` ... (docs/pictures.md)."""
+        from photogram.plots import Plots
+
+        return Plots(self)
+
+    def to_parquet(self, directory: str | PathLike[str]) -> None:
+        """Write the result as data: tables in Parquet, from which `photogram.read_result` makes it again.
+
+        `docs/results.md` lists files and columns. Either all files are there in the end or none has changed.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            pyarrow is not installed.
+        OSError
+            A file cannot be written.
+        """
+        folder = Path(directory)
+        write_whole({folder / name: content for name, content in files_of(self).items()})
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""

@@ -20,7 +20,16 @@ from photogram.statistics.snooping.suspects import (
     Tests,
 )
 
-__all__ = ["ATTITUDE", "CONTROL", "IMAGE", "KINDS", "OBSERVATION", "POSITION", "NetworkTrial"]
+__all__ = [
+    "ATTITUDE",
+    "CONTROL",
+    "IMAGE",
+    "KINDS",
+    "OBSERVATION",
+    "POSITION",
+    "NamedSuspects",
+    "NetworkTrial",
+]
 
 KINDS = ("image", "control", "position", "attitude", "observation", "camera", "unknown")
 """What the suspects of the core are of, by their numbers."""
@@ -163,6 +172,14 @@ class NetworkTrial:
             found.append(self._without_out(*own) if own[0] else self._alone(group))
         return found
 
+    def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
+        """Return, for points that are out, all groups there with residuals and R as if they took part.
+
+        Empty for points that observations beside images touch, and for those whose rays do not determine
+        them.
+        """
+        return self.core.on_points(list(points), gone=True)
+
     def _without_out(
         self, groups: list[int], residuals: Floats, response: Floats
     ) -> tuple[list[int], Floats, Floats]:
@@ -191,14 +208,21 @@ class NetworkTrial:
         response[:, out] = 0.0
         return np.where(out, 0.0, residuals), response
 
-    def resist(self, scale: float) -> Floats:
-        """Adjust by Huber's loss, then by Cauchy's from there: (G,) lengths of residuals of unit weight."""
-        self._asked(self.core.resist, "huber", HUBER * scale, iterations=ROBUST_ITERATIONS, progress=None)
-        weights = self._asked(
-            self.core.resist, "cauchy", CAUCHY * scale, iterations=ROBUST_ITERATIONS, progress=None
-        )
-        # Its weight is 1 / (1 + (size / scale)^2).
-        return np.asarray(CAUCHY * scale * np.sqrt(np.maximum(1.0 / np.maximum(weights, 1e-12) - 1.0, 0.0)))
+    def resist(self, scale: float) -> Floats | None:
+        """Adjust by Huber's loss, then by Cauchy's from there: (G,) lengths of residuals of unit weight.
+
+        None where either diverges; the next trial then begins where the last good one has ended.
+        """
+        weights: Floats | None = None
+        for loss, limit in (("huber", HUBER), ("cauchy", CAUCHY)):
+            weights = self._asked(
+                self.core.resist, loss, limit * scale, iterations=ROBUST_ITERATIONS, progress=None
+            )
+            if weights is None:
+                return None
+        # The weight of Cauchy's loss is 1 / (1 + (size / scale)^2).
+        least = np.maximum(np.asarray(weights), 1e-12)
+        return np.asarray(CAUCHY * scale * np.sqrt(np.maximum(1.0 / least - 1.0, 0.0)))
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
         """Return points left with too few rays, and photos left without support, when a group is out."""
@@ -231,13 +255,96 @@ class NetworkTrial:
         return int(self._are_in(out, images).sum() - gone) < SUPPORT
 
 
-def image_loads(points: Indices, photos: Indices) -> Callable[[int], Indices]:
-    """Return a function that tells from which photos a point is seen, its images being given by both."""
-    order = np.argsort(points, kind="stable")
-    sorted_points, sorted_photos = points[order], photos[order]
+class NamedSuspects:
+    """The groups of observations of a network as the core has them, with what each is called.
 
-    def of(point: int) -> Indices:
-        first, last = np.searchsorted(sorted_points, [point, point + 1])
-        return np.asarray(sorted_photos[first:last])
+    It keeps arrays, not the core, so that names last longer than what was tested. Classes of networks say
+    what their points and photos are called, and what may go alone.
 
-    return of
+    Parameters
+    ----------
+    core
+        The network in the core.
+    image_points, image_photos
+        (m,) the point and the photo of each image.
+    apart
+        Whether parts of a control point or of a station may go alone.
+    """
+
+    def __init__(
+        self, core: _photocore.NetworkTrial, image_points: Indices, image_photos: Indices, *, apart: bool
+    ) -> None:
+        self.kinds, self.subjects = core.subjects
+        self.starts, self.components = core.row_starts, core.components
+        self.image_points, self.image_photos, self.apart = image_points, image_photos, apart
+        order = np.argsort(image_points, kind="stable")
+        self._points, self._photos = image_points[order], image_photos[order]
+
+    def suspects(self) -> Suspects:
+        """Return the groups."""
+        kinds, subjects = self.kinds, self.subjects
+        points, photos = np.full(len(kinds), -1), np.full(len(kinds), -1)
+        image, control = kinds == IMAGE, kinds == CONTROL
+        points[image] = self.image_points[subjects[image]]
+        photos[image] = self.image_photos[subjects[image]]
+        points[control] = subjects[control]
+        station = (kinds == POSITION) | (kinds == ATTITUDE)
+        photos[station] = subjects[station]
+        return Suspects(
+            row_starts=self.starts,
+            kinds=kinds.astype(np.int64),
+            kind_names=KINDS,
+            points=points,
+            photos=photos,
+            loads=self.loads,
+            removable=np.asarray(kinds <= OBSERVATION),
+            parts=self.parts,
+            name=self.name,
+            row_name=self.row_name,
+            unit=self.unit,
+            photo_name=self.photo_name,
+        )
+
+    def photos_of_point(self, point: int) -> Indices:
+        """Return the photos that a point is seen from."""
+        first, last = np.searchsorted(self._points, [point, point + 1])
+        return np.asarray(self._photos[first:last])
+
+    def loads(self, group: int) -> Indices:
+        """Return the photos that a group has to do with."""
+        kind, subject = int(self.kinds[group]), int(self.subjects[group])
+        if kind == IMAGE:
+            return self.photos_of_point(int(self.image_points[subject]))
+        if kind == CONTROL:
+            return self.photos_of_point(subject)
+        if kind in (POSITION, ATTITUDE):
+            return np.array([subject])
+        return self.other_loads(kind, subject)
+
+    def group_of(self, row: int) -> int:
+        """Return the group of a row."""
+        return int(np.searchsorted(self.starts, row, "right")) - 1
+
+    def other_loads(self, kind: int, subject: int) -> Indices:
+        """Return the same for what is neither an image, nor control, nor of a station."""
+        raise NotImplementedError
+
+    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
+        """Return the rows that may go alone, of a group by its number; None where it goes as a whole."""
+        raise NotImplementedError
+
+    def name(self, group: int) -> str:
+        """Return what a group is called."""
+        raise NotImplementedError
+
+    def row_name(self, row: int) -> str:
+        """Return what a row is."""
+        raise NotImplementedError
+
+    def unit(self, row: int) -> str:
+        """Return the unit of a row."""
+        raise NotImplementedError
+
+    def photo_name(self, photo: int) -> str:
+        """Return what a photo is called."""
+        raise NotImplementedError

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram.arguments.arrays import number, one_of
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.results.covariance import Covariances
@@ -33,7 +34,7 @@ from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Inseparable", "Moved", "Reliability"]
+__all__ = ["Inseparable", "Moved", "Reliability", "reliability_of"]
 
 FEW = 50
 """Degrees of freedom below which an estimated unit weight makes errors notably harder to find."""
@@ -115,7 +116,7 @@ class Reliability:
     def __init__(
         self,
         trial: NetworkTrial,
-        covariances: Callable[[], Covariances] | None,
+        covariances: Callable[[], Covariances],
         *,
         level: float,
         power: float,
@@ -206,6 +207,24 @@ class Reliability:
         """(M, 6) the same of the pose of its own photo: position, omega, phi, kappa."""
         return np.asarray(self._effects[:, 3:] * (self.detectable / self.sd)[:, np.newaxis])
 
+    def own_points(self, groups: list[int], *, heights: bool = False) -> list[float]:
+        """Return how far the minimal detectable error of the worst row of some groups moves their own points.
+
+        In the unit of the object space; `heights` alone, where plan coordinates are angles. NaN without a
+        point.
+        """
+        effects = self._trial.core.effects(groups)[:, :3]
+        starts = self.suspects.row_starts
+        found, first = [], 0
+        for group in groups:
+            rows = np.arange(starts[group], starts[group + 1])
+            own = effects[first : first + len(rows)] * (self.detectable[rows] / self.sd[rows])[:, np.newaxis]
+            first += len(rows)
+            moved = np.abs(own[:, 2]) if heights else np.sqrt((own**2).sum(axis=1))
+            moved = moved[np.isfinite(moved)]
+            found.append(float(moved.max()) if moved.size else math.nan)
+        return found
+
     def influence(self, selection: Selection) -> tuple[list[tuple[str, str, str]], Floats]:
         """Return what minimal detectable errors do to chosen unknowns, each observation by itself.
 
@@ -224,10 +243,9 @@ class Reliability:
         Raises
         ------
         InputError
-            A selection that is not there; a network without covariances on demand.
+            A selection that is not there.
         """
-        covariances = self._asked()
-        labels, found = covariances.influences(self._trial.core, selection, None)
+        labels, found = self._covariances().influences(self._trial.core, selection, None)
         return labels, np.asarray(found * (self.detectable / self.sd))
 
     def influence_of(self, function: Callable[..., Any], unknowns: Selection) -> Floats:
@@ -235,13 +253,8 @@ class Reliability:
 
         `function` and `unknowns` are those of :meth:`photogram.Result.propagate`.
         """
-        _, found = self._asked().influences(self._trial.core, unknowns, function)
+        _, found = self._covariances().influences(self._trial.core, unknowns, function)
         return np.asarray(found * (self.detectable / self.sd))
-
-    def _asked(self) -> Covariances:
-        if self._covariances is None:
-            raise InputError("this network has no covariances on demand")
-        return self._covariances()
 
     def most_moved(self, count: int = SEARCHED) -> list[Moved]:
         """Return the unknowns that undetected errors move most, the gravest first.
@@ -268,7 +281,10 @@ class Reliability:
 
     def inseparable(self, limit: float = 0.9) -> list[Inseparable]:
         """Return pairs of observations on one point that cannot be told apart: images, and its control."""
-        points = np.unique(self.suspects.points[self.suspects.points >= 0]).tolist()
+        return self.inseparable_on(np.unique(self.suspects.points[self.suspects.points >= 0]).tolist(), limit)
+
+    def inseparable_on(self, points: list[int], limit: float = 0.9) -> list[Inseparable]:
+        """Return the same of some points by their numbers."""
         return [self._pair(*pair) for pair in self._trial.core.inseparable(points, limit)]
 
     def partners(self, group: int, limit: float = 0.3) -> list[Inseparable]:
@@ -367,6 +383,29 @@ class Reliability:
             "unit_weight": "known" if self.known else "unknown",
             "observations": self.table().to_dict(orient="records"),
         }
+
+
+def reliability_of(
+    trial: NetworkTrial,
+    covariances: Callable[[], Covariances],
+    *,
+    level: float,
+    power: float,
+    unit_weight: str,
+) -> Reliability:
+    """Return the reliability of a network that is adjusted, with checked options.
+
+    Raises
+    ------
+    InputError
+        Options that cannot be.
+    """
+    one_of("unit_weight", unit_weight, ("known", "unknown"))
+    for name, value in (("level", level), ("power", power)):
+        if not 0 < number(name, value) < 1:
+            raise InputError(f"{name} is a probability between 0 and 1, not {value:g}")
+    known = unit_weight == "known"
+    return Reliability(trial, covariances, level=level, power=power, known=known)
 
 
 def _shown(redundancy: Floats) -> Floats:

@@ -48,6 +48,7 @@ def report(result: Result) -> str:
     sections = [
         *summary(result),
         ("Redundancy by kind of observation", _redundancy(result)),
+        ("Reliability", _reliability(result)),
         ("Iterations", _iterations(result)),
         ("Check points: adjusted minus supplied", _difference_table(result, _check_differences(result))),
         (
@@ -186,6 +187,11 @@ def _redundancy(result: Result) -> list[str]:
         lines.append(f"{'cameras and common unknowns':<36}{'':>8}{others:>14.4f}")
     lines.append(f"{'all':<36}{'':>8}{result.redundancies.total:>14.4f}{result.sums_of_squares.total:>14.4f}")
     return lines
+
+
+def _reliability(result: Result) -> list[str]:
+    summary = result.reliability_summary
+    return [] if summary is None else summary.lines(result.block.linear_unit)
 
 
 def _iterations(result: Result) -> list[str]:

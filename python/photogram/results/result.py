@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -29,7 +28,7 @@ from photogram.results.datum import (
 )
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.reliability import Reliability
+from photogram.results.reliability import Reliability, reliability_of
 from photogram.results.selection import Adjusted, photo_components, point_components
 from photogram.results.suspects import network_trial
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
@@ -81,7 +80,7 @@ class Redundancies(SumsByKind):
     """Sums of redundancy numbers."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(AdjustedNetwork):
     """An adjusted block; the arrays that every network has are those of `AdjustedNetwork`, with k = 6.
 
@@ -121,6 +120,9 @@ class Result(AdjustedNetwork):
         What coordinates and standard deviations refer to.
     options, state
         How the core adjusted the block, and where that ended: what covariances are computed from.
+    hints
+        Mistakes in conventions (units, axes, signs, angles) that would explain why images do not fit, as
+        sentences; see :func:`photogram.hints`. They head the verdict.
     """
 
     block: Block
@@ -139,6 +141,7 @@ class Result(AdjustedNetwork):
     datum: ResultDatum
     options: CoreOptions
     state: _photocore.BlockState
+    hints: tuple[str, ...] = ()
 
     @classmethod
     def from_solution(
@@ -158,6 +161,7 @@ class Result(AdjustedNetwork):
             block=block.kept(),
             messages=messages,
             loss=options.loss,
+            hints=(),
             options=options,
             datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
@@ -169,6 +173,14 @@ class Result(AdjustedNetwork):
             unknowns=adjusted_unknowns(block, solution, scale),
             dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
         )
+
+    @property
+    def _what(self) -> str:
+        return f"block: {self.block.title}" if self.block.title else "block"
+
+    @property
+    def _image_unit(self) -> str:
+        return self.block.image_unit
 
     def covariances(self) -> Covariances:
         """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`."""
@@ -201,11 +213,24 @@ class Result(AdjustedNetwork):
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
-        one_of("unit_weight", unit_weight, ("known", "unknown"))
         core = block_network(self.block, self.options).trial(self.state, threads=0)
         trial = network_trial(self.block, core)
-        known = unit_weight == "known"
-        return Reliability(trial, self.covariances, level=level, power=power, known=known)
+        return reliability_of(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
+
+    def restarted(self) -> Block:
+        """Return the block as it was given, but with free photos and cameras where the adjustment has ended.
+
+        What was observed or held is as it was given.
+        `photogram.adjust(result.restarted())` goes on from there: with other options, or with other weights,
+        after :meth:`photogram.Block.replace`.
+        """
+        block = self.block
+        free = {name: np.isinf(getattr(block, f"photo_{name}_sd")) for name in ("position", "attitude")}
+        return block.replace(
+            cameras=[each.restarted() for each in self.cameras] or block.cameras,
+            photo_positions=np.where(free["position"], self.photo_positions, block.photo_positions),
+            photo_attitudes=np.where(free["attitude"], self.photo_attitudes, block.photo_attitudes),
+        )
 
     def in_datum(self, datum: InnerConstraints) -> Self:
         """Return the result in another datum, without adjusting again (S-transformation, docs/datum.md).
@@ -267,6 +292,11 @@ class Result(AdjustedNetwork):
         table = super()._table(what)
         table.attrs["datum"] = str(self.datum)
         return table
+
+    @property
+    def geographic(self) -> bool:
+        """Whether plan coordinates are angles."""
+        return self.block.geographic
 
     @property
     def image_points(self) -> Indices:

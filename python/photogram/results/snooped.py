@@ -11,7 +11,7 @@ import orjson
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
 from photogram.show.sections import Section, composed, headline, verdict_section
-from photogram.show.ways import Judged
+from photogram.show.ways import Judged, html_of
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome, Settings
@@ -106,6 +106,13 @@ class Snooped(Judged):
         """Return the whole result with its verdict and the log, `snooping`, as one JSON document (UTF-8)."""
         own = {"verdict": self.verdict.document(), "snooping": self.document()}
         return json.to_json({**orjson.loads(self.result.to_json()), **own})
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     def sections(self) -> list[Section]:
         """Return the log as titled sections of a report."""

@@ -17,8 +17,8 @@ from photogram.results.network_trial import (
     KINDS,
     OBSERVATION,
     POSITION,
+    NamedSuspects,
     NetworkTrial,
-    image_loads,
 )
 from photogram.statistics.snooping.suspects import Suspects
 
@@ -38,8 +38,9 @@ def block_suspects(block: Block, core: _photocore.NetworkTrial, *, parts: bool =
     return _Named(block, core, parts).suspects()
 
 
-ROUGH = 1.0
-"""Standard deviations: a step that moves no unknown by more is the last of a round."""
+ROUGH = 2.0
+"""Standard deviations: a step after which the next would move no unknown by more is the last of a round. The
+rounds that follow start there, and the last takes nothing out: what it decides on is as good as exact."""
 EXACT = 1e-7
 """The same where R of all rows is used: a small network."""
 
@@ -62,57 +63,27 @@ def observations_of_core(block: Block) -> list[Observation]:
     return [block.observations[row] for rows, _ in groups for row in rows]
 
 
-class _Named:
+class _Named(NamedSuspects):
     def __init__(self, block: Block, core: _photocore.NetworkTrial, parts: bool) -> None:
-        self.block, self.apart = block, parts
-        self.kinds, self.subjects = core.subjects
-        self.starts, self.components = core.row_starts, core.components
+        super().__init__(core, block.image_points, block.image_photos, apart=parts)
+        self.block = block
         self.axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
-        self.photos_of_point = image_loads(block.image_points, block.image_photos)
         self.point_row = {name: row for row, name in enumerate(block.point_ids)}
         self.photo_row = {name: row for row, name in enumerate(block.photo_ids)}
         self.observations = observations_of_core(block)
 
-    def suspects(self) -> Suspects:
-        kinds, subjects, block = self.kinds, self.subjects, self.block
-        points = np.full(len(kinds), -1)
-        photos = np.full(len(kinds), -1)
-        image = kinds == IMAGE
-        points[image] = block.image_points[subjects[image]]
-        photos[image] = block.image_photos[subjects[image]]
-        points[kinds == CONTROL] = subjects[kinds == CONTROL]
-        station = (kinds == POSITION) | (kinds == ATTITUDE)
-        photos[station] = subjects[station]
-        return Suspects(
-            row_starts=self.starts,
-            kinds=kinds.astype(np.int64),
-            kind_names=KINDS,
-            points=points,
-            photos=photos,
-            loads=self.loads,
-            removable=np.asarray(kinds <= OBSERVATION),
-            parts=self.parts,
-            name=self.name,
-            row_name=self.row_name,
-            unit=self.unit,
-            photo_name=lambda photo: f"photo {block.photo_ids[photo]}",
-        )
-
-    def loads(self, group: int) -> Indices:
-        """Return the photos that a group has to do with."""
-        kind, subject = int(self.kinds[group]), int(self.subjects[group])
-        if kind == IMAGE:
-            return self.photos_of_point(int(self.block.image_points[subject]))
-        if kind == CONTROL:
-            return self.photos_of_point(subject)
-        if kind in (POSITION, ATTITUDE):
-            return np.array([subject])
+    def other_loads(self, kind: int, subject: int) -> Indices:
+        """Return the photos that an observation beside images has to do with; of what is common, all."""
         if kind != OBSERVATION:
             return np.arange(len(self.block.photo_ids))
         observation = self.observations[subject]
         seen = [self.photos_of_point(self.point_row[name]) for name in observation.points]
         own = np.array([self.photo_row[name] for name in observation.photos], dtype=np.int64)
         return np.unique(np.concatenate([own, *seen]))
+
+    def photo_name(self, photo: int) -> str:
+        """Return what a photo is called."""
+        return f"photo {self.block.photo_ids[photo]}"
 
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
         """Return what may go alone: plan, height or all of control, single components of stations."""
@@ -143,12 +114,9 @@ class _Named:
             return f"parameters of {block.camera_names[subject]}"
         return f"unknown {block.unknowns[subject].name}"
 
-    def _group(self, row: int) -> int:
-        return int(np.searchsorted(self.starts, row, "right")) - 1
-
     def row_name(self, row: int) -> str:
         """Return what a row is."""
-        group, component = self._group(row), int(self.components[row])
+        group, component = self.group_of(row), int(self.components[row])
         kind = int(self.kinds[group])
         if kind == IMAGE:
             return "xy"[component]
@@ -163,7 +131,7 @@ class _Named:
 
     def unit(self, row: int) -> str:
         """Return the unit of a row."""
-        group, component = self._group(row), int(self.components[row])
+        group, component = self.group_of(row), int(self.components[row])
         kind, linear = int(self.kinds[group]), self.block.linear_unit
         if kind == IMAGE:
             return self.block.image_unit

@@ -16,6 +16,7 @@ from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
 from photogram.show.pictures import drawn, new_figure, open_frame
 from photogram.show.sections import composed, headline
+from photogram.show.style import FAINT, INK, MARKED
 from photogram.show.ways import Shown, columns_of, document_of, picture_of, report_of
 from photogram.statistics.variance_function import FunctionEstimate
 
@@ -194,10 +195,10 @@ def _figure(found: VarianceFunction) -> Figure:
     x = np.array([each.value for each in found.bins])
     y = np.array([each.factor for each in found.bins])
     ends = np.array([each.interval for each in found.bins]).T
-    axes.errorbar(x, y, np.abs(ends - y), fmt="o", color="black", capsize=3, label="residuals, 95 percent")
+    axes.errorbar(x, y, np.abs(ends - y), fmt="o", color=INK, capsize=3, label="residuals, 95 percent")
     line = np.linspace(0.0, found.largest, 100)
-    axes.plot(line, [found.factor(value) for value in line], color="tab:red", label="function")
-    axes.axhline(1.0, color="grey", linewidth=0.8, label="given variance")
+    axes.plot(line, [found.factor(value) for value in line], color=MARKED, label="function")
+    axes.axhline(1.0, color=FAINT, linewidth=0.8, label="given variance")
     axes.set_xlabel(found.name)
     axes.set_ylabel("factor of the given variance")
     axes.set_ylim(bottom=0.0)

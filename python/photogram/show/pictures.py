@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.show.style import need_matplotlib, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,10 +23,17 @@ __all__ = ["arrows", "drawn", "ellipses", "files", "new_figure", "open_frame", "
 
 DPI = 120
 """Dots an inch of pictures that are made of dots."""
+SILENT: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None},
+}
+"""What formats would say of version and time."""
 
 
 def new_figure(width: float, height: float) -> Figure:
     """Return a figure that belongs to no window (inches)."""
+    need_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # takes long to import
     from matplotlib.figure import Figure
 
@@ -47,8 +55,9 @@ def drawn(figure: Figure, path: Path | None = None) -> bytes:
     if suffix not in figure.canvas.get_supported_filetypes():
         raise InputError(f"matplotlib draws no {suffix!r}; png, pdf and svg are possible", file=path)
     content = io.BytesIO()
-    # Equal figures give equal files, whatever version draws them.
-    figure.savefig(content, format=suffix, metadata={"Software": None} if suffix == "png" else None)
+    # Equal figures give equal files, whatever version draws them, and whenever.
+    with styled():
+        figure.savefig(content, format=suffix, metadata=SILENT.get(suffix))
     return content.getvalue()
 
 

@@ -8,9 +8,9 @@ they are there as soon as the class is.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property, singledispatch
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn
 
 from photogram.statistics.findings import Findings
 from photogram.statistics.verdict import Verdict, verdict
@@ -18,7 +18,21 @@ from photogram.statistics.verdict import Verdict, verdict
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Judged", "Shown", "columns_of", "document_of", "findings_of", "picture_of", "report_of"]
+    from photogram.show.page import Page
+    from photogram.show.run import Run
+
+__all__ = [
+    "Judged",
+    "Shown",
+    "columns_of",
+    "document_of",
+    "files_of",
+    "findings_of",
+    "html_of",
+    "page_of",
+    "picture_of",
+    "report_of",
+]
 
 
 @singledispatch
@@ -40,9 +54,33 @@ def columns_of(result: object, what: str) -> Mapping[str, Any]:
 
 
 @singledispatch
+def files_of(result: object) -> Mapping[str, bytes | Callable[[BinaryIO], None]]:
+    """Return a result as files of a folder, by their names, from which it can be read again.
+
+    Large ones write themselves to the file that they are given.
+    """
+    _undefined(result, "files")
+
+
+@singledispatch
 def picture_of(result: object) -> bytes:
     """Return the picture of a result (PNG)."""
     _undefined(result, "picture")
+
+
+@singledispatch
+def page_of(result: object) -> Page:
+    """Return the report of a result for the browser, without its last section."""
+    _undefined(result, "page")
+
+
+def html_of(result: object, run: Run | None = None) -> bytes:
+    """Return the report of a result as one HTML file; `run` is the run of the command that made it."""
+    from photogram.show.html import page_html
+    from photogram.show.run import reproducibility
+
+    page = page_of(result)
+    return page_html(page.with_sections(reproducibility(run, page.phases)))
 
 
 @singledispatch
@@ -74,6 +112,13 @@ class Shown(Judged):
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
         return document_of(self)
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return what the result says about one kind of thing as a data frame.

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.messages import listed
 from photogram.statistics.distributions import (
     bonferroni,
@@ -16,7 +17,7 @@ from photogram.statistics.distributions import (
     critical_normal,
     critical_student,
 )
-from photogram.statistics.findings import Findings, Systematic, Tested, by_t
+from photogram.statistics.findings import Findings, Systematic, Tested, by_f, by_t
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.statistics.outliers import Observations
 
@@ -37,10 +38,13 @@ MEDIAN = 0.6744897501960817
 STATISTICS = {
     "w": "w (Baarda; the unit weight is known)",
     "t": "t (externally studentized, Pope; the unit weight is estimated)",
-    "T": "T of groups (chi-square; the unit weight is known)",
-    "F": "F of groups (the unit weight is estimated)",
+    "T": "T (chi-square; the unit weight is known)",
+    "F": "F (the unit weight is estimated)",
 }
 """What the test values of observations are called."""
+
+GROUPS = "groups of observations (x and y of an image, all of a control point)"
+"""What is tested where all test values are T or F."""
 
 Beyond = tuple[float, Tested, tuple[int, ...]]
 """Logarithm of the probability, kind, and place of an observation whose test rejects."""
@@ -126,13 +130,9 @@ class Evidence:
     @cached_property
     def robust(self) -> float | None:
         """The factor of the median test value, unharmed by a quarter of gross errors; None of few."""
-        values = [
-            np.abs(each.values[~np.isnan(each.values)])
-            for each in self.found.observations
-            if each.statistic == "w"
-        ]
+        values = [_relative(each) for each in self.found.observations if each.statistic in "wT"]
         together = np.concatenate(values) if values else np.zeros(0)
-        return float(np.median(together)) / MEDIAN if together.size >= ENOUGH else None
+        return float(np.median(together)) if together.size >= ENOUGH else None
 
     def beyond(self, factor: float = 1.0) -> list[Beyond]:
         """Return tests beyond their limit, had all standard deviations been larger by the factor, by p."""
@@ -156,15 +156,21 @@ class Evidence:
         if not self.rejected or not self.single:
             return self.single
         if self.robust is not None:
-            return self.beyond(max(self.robust, 1.0))
+            return self.beyond(self._common(self.robust))
         test = self.test
         assert test is not None
         omega, f = test.weighted_sum_of_squares, test.degrees_of_freedom
-        studentized = [
-            by_t(Observations(each.kind, each.values, each.name), omega, f) if each.statistic == "w" else each
-            for each in self.found.observations
-        ]
+        studentized = [_studentized(each, omega, f) for each in self.found.observations]
         return Evidence(replace(self.found, observations=studentized)).beyond()
+
+    def _common(self, robust: float) -> float:
+        """Return the common factor of all standard deviations beside which observations are tested.
+
+        Where the median says that there is one, and all residuals together say about the same, these decide:
+        the median of a few hundred may be off by a tenth.
+        """
+        alike = NOTABLE_FACTOR <= robust <= self.factor <= NOTABLE_FACTOR * robust
+        return self.factor if alike else max(robust, 1.0)
 
     @cached_property
     def pattern(self) -> bool:
@@ -214,6 +220,8 @@ class Evidence:
                 f"the global test rejects, but residuals are only {self.factor:.3g} times as expected"
             )
         lines += [each.sentence for each in self.found.systematic if each.significant and not each.large]
+        if self.found.hints:
+            lines.append("nothing was corrected: put right what the data mean, and adjust again")
         f = self.found.degrees_of_freedom
         if 0 < f < FEW:
             lines.append(f"with {f:g} degrees of freedom only gross disagreement can be seen")
@@ -228,7 +236,8 @@ class Evidence:
         found = {each.statistic for each in self.found.observations if self._count(each)}
         what = " and ".join(meaning for statistic, meaning in STATISTICS.items() if statistic in found)
         return [
-            f"single observations are judged by {what}: level {self.found.level:g} for all"
+            f"{'single observations' if found & {'w', 't'} else GROUPS} are judged by {what}:"
+            f" level {self.found.level:g} for all"
             f" {self.number} tests together"
         ]
 
@@ -238,6 +247,23 @@ class Evidence:
         largest = (_largest(each, self.level, self.number) for each in self.found.observations)
         patterns = [_of_pattern(each) for each in self.found.systematic]
         return [*whole, *(each for each in largest if each is not None), *patterns]
+
+
+def _relative(tested: Tested) -> Floats:
+    """Return test values over the median of their distribution, as factors of standard deviations."""
+    values = tested.values[~np.isnan(tested.values)]
+    if tested.statistic == "w":
+        return np.asarray(np.abs(values) / MEDIAN)
+    dimension = np.broadcast_to(np.asarray(tested.dimension), tested.values.shape)[~np.isnan(tested.values)]
+    medians = {each: critical_chi_square(0.5, each) for each in np.unique(dimension).tolist()}
+    return np.asarray(np.sqrt(values / np.array([medians[each] for each in dimension.tolist()])))
+
+
+def _studentized(tested: Tested, omega: float, f: float) -> Tested:
+    """Return tests with the unit weight that the others give."""
+    if tested.statistic == "w":
+        return by_t(Observations(tested.kind, tested.values, tested.name), omega, f)
+    return by_f(tested, omega, f) if tested.statistic == "T" else tested
 
 
 def _distribution(

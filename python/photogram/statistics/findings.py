@@ -19,7 +19,17 @@ from photogram.statistics.groups import GroupTests
 from photogram.statistics.limits import GlobalTest, externally_studentized
 from photogram.statistics.outliers import Observations
 
-__all__ = ["Findings", "GroupFactor", "Removed", "Systematic", "Tested", "by_t", "by_w", "of_groups"]
+__all__ = [
+    "Findings",
+    "GroupFactor",
+    "Removed",
+    "Systematic",
+    "Tested",
+    "by_f",
+    "by_t",
+    "by_w",
+    "of_groups",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +122,16 @@ def by_t(observations: Observations, weighted_sum_of_squares: float, degrees_of_
     """Return observations tested with the unit weight that the others give; their values are w."""
     t = externally_studentized(observations.values, weighted_sum_of_squares, degrees_of_freedom)
     return Tested(observations.kind, t, observations.name, "t", second=max(degrees_of_freedom - 1, 1))
+
+
+def by_f(tested: Tested, weighted_sum_of_squares: float, degrees_of_freedom: float) -> Tested:
+    """Return groups tested by T with the unit weight that the others give: F."""
+    dimension = np.asarray(tested.dimension, dtype=np.float64)
+    others = degrees_of_freedom - dimension
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left = np.maximum(weighted_sum_of_squares - tested.values, 1e-12 * weighted_sum_of_squares) / others
+        values = np.where(others > 0, tested.values / dimension / left, math.nan)
+    return replace(tested, values=values, statistic="F", second=np.where(others > 0, others, math.nan))
 
 
 def of_groups(

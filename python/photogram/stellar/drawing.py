@@ -8,6 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.pictures import arrows, new_figure
+from photogram.show.style import COLOURS, SKY
 from photogram.stellar.curves import histogram
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 __all__ = ["COLOURS", "band", "bell", "panels", "vectors"]
 
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _LENGTH = 0.05
 """Length of a residual of the mean size, of the extent of the picture."""
 
@@ -67,7 +67,7 @@ def bell(axes: Any, values: Floats, title: str, unit: str) -> None:
     """Draw the histogram of residuals with the normal curve."""
     found = histogram(values)
     middle, width = 0.5 * (found.edges[1:] + found.edges[:-1]), np.diff(found.edges)
-    axes.bar(middle, found.counts, width=width, color="#9ecae1", edgecolor="white")
+    axes.bar(middle, found.counts, width=width, color=SKY, alpha=0.6, edgecolor="white")
     curve = np.linspace(found.edges[0], found.edges[-1], 200)
     density = np.exp(-0.5 * ((curve - found.mean) / found.sd) ** 2) / (found.sd * np.sqrt(2 * np.pi))
     axes.plot(curve, len(values) * width[0] * density, color=COLOURS[1])

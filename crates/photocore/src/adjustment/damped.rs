@@ -104,7 +104,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let number = self.iterations.len() + 1;
         let largest_change = solved.change;
         let iteration = Iteration { number, sum_of_squares: control.best, largest_change, damping };
-        if damping == 0.0 && self.is_last(control.stop, solved.change) {
+        if damping == 0.0
+            && (self.is_last(control.stop, solved.change) || self.is_foreseen(control, &unknowns, &solved))
+        {
             let end = if curved {
                 self.stay_after(iteration, &unknowns, &solved.step)?
             } else {
@@ -187,6 +189,18 @@ impl<'a, M: Model> Run<'a, '_, M> {
     fn is_last(&self, stop: Stop, change: f64) -> bool {
         stop.at_change(change)
             || matches!(stop, Stop::Fraction(fraction) if self.leaves_less_than(fraction, change))
+    }
+
+    /// Whether the next step after a full one would be negligible, by the sum of squares that this one leads to.
+    fn is_foreseen(&self, control: &Control, unknowns: &[f64], solved: &Solved<'a, M>) -> bool {
+        let Stop::Foreseen(limit) = control.stop else { return false };
+        let foreseen = control.best - solved.change.powi(2);
+        // A smaller difference than this one is rounding.
+        if limit.powi(2) <= ROUNDING * control.best {
+            return false;
+        }
+        let reached = self.objective(&self.problem.advanced(unknowns, &solved.step));
+        (reached - foreseen).abs() <= limit.powi(2)
     }
 
     /// Whether the sum of squares has stood still between two full steps that failed, `refused` at the first and `sum` at the second:

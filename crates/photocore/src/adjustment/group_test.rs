@@ -6,9 +6,13 @@
 //! of observations where an error in some direction shows in no residual: across the only base of a point, for one.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use smallvec::SmallVec;
 
 /// Redundancy of a direction from which on an error along it shows.
 pub const VISIBLE: f64 = 1e-6;
+
+/// The values of a group: nearly all have two rows, and there are as many groups as images.
+pub type Few = SmallVec<[f64; 4]>;
 
 /// A group of observations as the hypothesis that it holds a gross error.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,9 +22,9 @@ pub struct GroupTest {
     /// T: by how much the sum of squares falls without the group.
     pub statistic: f64,
     /// ~d: the estimated error, in standard deviations; in directions that do not show it is zero.
-    pub error: Vec<f64>,
+    pub error: Few,
     /// R^-, row by row: the cofactors of the estimated error.
-    pub cofactors: Vec<f64>,
+    pub cofactors: Few,
     /// The smallest redundancy of a direction that shows; NaN where none does.
     pub least: f64,
     /// The largest part of a direction's redundancy that others than the own point take up, in that redundancy: h of the sharp bound of
@@ -59,8 +63,8 @@ impl GroupTest {
         Self {
             rank: (0..2).filter(|&k| shown(k)).count(),
             statistic: (0..2).map(|k| along[k] * scaled(k)).sum(),
-            error: error.as_slice().to_vec(),
-            cofactors: inverse_matrix.as_slice().to_vec(),
+            error: error.as_slice().into(),
+            cofactors: inverse_matrix.as_slice().into(),
             least: (0..2).rev().find(|&k| shown(k)).map_or(f64::NAN, |k| values[k]),
             shared,
         }
@@ -84,8 +88,8 @@ impl GroupTest {
         Self {
             rank: shown.len(),
             statistic: along.component_div(&values).dot(&along),
-            error: error.as_slice().to_vec(),
-            cofactors: (&half * half.transpose()).as_slice().to_vec(),
+            error: error.as_slice().into(),
+            cofactors: (&half * half.transpose()).as_slice().into(),
             least: values.iter().copied().reduce(f64::min).unwrap_or(f64::NAN),
             shared,
         }

@@ -2,7 +2,7 @@
 
 /// How an adjustment goes to the solution: the control of its steps, each with the rules by which it can stop.
 ///
-/// Where a rule looks at a step before it is taken ([`Stop::Fraction`], [`Published::Length`]) the last one is taken nevertheless, and the
+/// Where a rule looks at a step before it is taken ([`Stop::Fraction`], [`Stop::Foreseen`], [`Published::Length`]) the last one is taken nevertheless, and the
 /// cofactors are those of the normal equations that gave it; where it looks at the sum of squares after a step ([`Stop::Decrease`],
 /// [`Published::Percent`]) the normal equations are formed once more, at the values reached. A trust region, whose last equations may
 /// be damped, always forms them once more.
@@ -37,12 +37,16 @@ pub enum Stop {
     Fraction(f64),
     /// When a step lowers the sum of squares, or would by the linearized equations, by less than this fraction of it.
     Decrease(f64),
+    /// When a full step moves no unknown by more than this multiple of its standard deviation, or when the next one would not: with c^2
+    /// the decrease of the sum of squares that the linearized equations foresee, what it falls short of that is, in the order that counts,
+    /// the decrease that the next step would bring. For adjustments that are gone on from, where a step is dearer than its last digits.
+    Foreseen(f64),
 }
 
 impl Stop {
     /// Whether a step is the last one that changes no unknown by more than `change` standard deviations.
     pub(super) fn at_change(self, change: f64) -> bool {
-        matches!(self, Self::Fraction(fraction) if change <= fraction)
+        matches!(self, Self::Fraction(fraction) | Self::Foreseen(fraction) if change <= fraction)
     }
 
     /// Whether a step is the last one that lowers a sum of squares by `decrease`.

@@ -85,7 +85,7 @@ pub use distributions::{
     student_limit,
 };
 pub use factored::{CofactorError, Factored};
-pub use group_test::{GroupTest, VISIBLE, canonical_correlation};
+pub use group_test::{Few, GroupTest, VISIBLE, canonical_correlation};
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
 pub use noncentral::{

@@ -201,16 +201,12 @@ impl<M: Model> Problem<M> {
         let open: Vec<usize> = (0..count).filter(|&k| eigen.S()[k] < NULL).collect();
         let combinations =
             Mat::from_fn(count, open.len(), |k, column| scale[k] * eigen.U()[(k, open[column])]);
-        let along = |unknown: usize, column: usize| -> f64 {
-            (0..count).map(|k| motions.vectors[k][unknown] * combinations[(k, column)]).sum()
-        };
-        let vectors = Mat::from_fn(values.len(), open.len(), along);
         let length = |&unknown: &usize| {
             let square = |k: usize| (motions.vectors[k][unknown] * scale[k]).powi(2);
             (unknown, (0..count).map(square).sum::<f64>().sqrt())
         };
         let free = motions.preferred.iter().filter(|&&unknown| self.sd[unknown] != 0.0);
-        let hold = to_hold(&vectors, free.map(length));
+        let hold = to_hold(motions, &combinations, free.map(length));
         (!open.is_empty()).then_some(Open { combinations, hold })
     }
 
@@ -261,7 +257,7 @@ impl<M: Model> Problem<M> {
             let before = together.partition_point(|own| own.unknowns().end <= *unknown);
             together.get(before).is_none_or(|own| own.first > *unknown)
         };
-        for unknown in (0..values.len()).filter(|&i| self.is_weighted(i)).filter(stays).filter(apart) {
+        for unknown in self.weighted_among(0..values.len()).filter(stays).filter(apart) {
             let (weight, moved) = (self.sd[unknown].powi(2).recip(), candidates.of(unknown));
             add_square(&mut sums.together, weight, moved);
             let apart = moved.as_flattened().iter().zip(sums.apart.as_flattened_mut());
@@ -271,15 +267,24 @@ impl<M: Model> Problem<M> {
     }
 }
 
+/// How a combination of motions moves an unknown.
+fn along(motions: &Motions, combinations: &Mat<f64>, unknown: usize, column: usize) -> f64 {
+    motions.vectors.iter().enumerate().map(|(k, vector)| vector[unknown] * combinations[(k, column)]).sum()
+}
+
 /// The first of some unknowns, with the lengths of what moves them, that tell the null vectors apart (Gram and Schmidt).
-fn to_hold(vectors: &Mat<f64>, unknowns: impl Iterator<Item = (usize, f64)>) -> Vec<usize> {
-    let d = vectors.ncols();
+fn to_hold(
+    motions: &Motions,
+    combinations: &Mat<f64>,
+    unknowns: impl Iterator<Item = (usize, f64)>,
+) -> Vec<usize> {
+    let d = combinations.ncols();
     let (mut basis, mut held): (Vec<Vec<f64>>, _) = (vec![], vec![]);
     for (unknown, length) in unknowns {
         if held.len() == d {
             break;
         }
-        let mut row: Vec<f64> = (0..d).map(|k| vectors[(unknown, k)]).collect();
+        let mut row: Vec<f64> = (0..d).map(|k| along(motions, combinations, unknown, k)).collect();
         for direction in &basis {
             let along: f64 = row.iter().zip(direction).map(|(x, y)| x * y).sum();
             row.iter_mut().zip(direction).for_each(|(x, y)| *x -= along * y);

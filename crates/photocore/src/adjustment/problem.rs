@@ -143,14 +143,24 @@ impl<M> Problem<M> {
     pub fn is_weighted(&self, unknown: usize) -> bool {
         self.sd[unknown] > 0.0 && self.sd[unknown].is_finite()
     }
+
+    /// The weighted ones of some unknowns. Nearly all are free: these are passed over a stretch at a time.
+    pub(super) fn weighted_among(&self, of: Range<usize>) -> impl Iterator<Item = usize> {
+        const STRETCH: usize = 64;
+        let stretches = of.clone().step_by(STRETCH).map(move |first| first..of.end.min(first + STRETCH));
+        let free = |stretch: &Range<usize>| {
+            let not_free = |all: u64, sd: &f64| all | (sd.to_bits() ^ f64::INFINITY.to_bits());
+            self.sd[stretch.clone()].iter().fold(0, not_free) == 0
+        };
+        stretches.filter(move |stretch| !free(stretch)).flatten().filter(|&unknown| self.is_weighted(unknown))
+    }
 }
 
 impl<M: Model> Problem<M> {
     /// Weighted sum of squares of observed minus computed unknowns, of some of them.
     pub fn prior_sum_of_squares(&self, values: &[f64], of: Range<usize>) -> f64 {
         let square = |i: usize| ((self.prior[i] - values[i]) / self.sd[i]).powi(2);
-        // Free unknowns are many: they are passed over, not added as zeros.
-        let plain = |range: Range<usize>| range.filter(|&i| self.is_weighted(i)).map(square).sum::<f64>();
+        let plain = |range: Range<usize>| self.weighted_among(range).map(square).sum::<f64>();
         let (mut sum, mut from) = (0.0, of.start);
         for own in self.weighted(values).iter().filter(|own| of.contains(&own.first)) {
             sum += plain(from..own.first) + own.constant.iter().map(|value| value * value).sum::<f64>();
@@ -170,9 +180,10 @@ impl<M: Model> Problem<M> {
         let mut weight: Vec<f64> =
             self.sd.iter().map(|&sd| if sd == 0.0 { 1.0 } else { (sd * sd).recip() }).collect();
         held.iter().for_each(|&unknown| weight[unknown] = 1.0);
-        let right = (0..values.len())
-            .map(|i| if self.is_weighted(i) { weight[i] * (self.prior[i] - values[i]) } else { 0.0 })
-            .collect();
+        let mut right = vec![0.0; values.len()];
+        for i in self.weighted_among(0..values.len()) {
+            right[i] = weight[i] * (self.prior[i] - values[i]);
+        }
         let mut prior = Prior { weight, right, between: vec![] };
         let is_held = |unknown: usize| self.sd[unknown] == 0.0 || held.contains(&unknown);
         self.weighted(values).iter().for_each(|own| add_weighted(&mut prior, own, &is_held));
@@ -224,6 +235,14 @@ impl<'a, M: Model> Linearized<'a, M> {
     /// The same equations with other standard deviations of the observations.
     pub fn with_deviations(self, observation_sd: &'a [f64]) -> Self {
         Self { observation_sd, ..self }
+    }
+
+    /// The same with some unknowns as they are given by other standard deviations: the others stay as they are.
+    pub fn with_unknowns(mut self, unknowns: impl Iterator<Item = usize>, sd: &[f64]) -> Self {
+        if let Some(fixed) = &mut self.fixed {
+            unknowns.for_each(|unknown| fixed[unknown] = sd[unknown] == 0.0);
+        }
+        self
     }
 
     /// With the columns of fixed unknowns, and without a loss.

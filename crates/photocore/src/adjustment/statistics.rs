@@ -54,7 +54,7 @@ impl<M> Problem<M> {
     pub(super) fn counts(&self, held: usize) -> Counts {
         Counts {
             observations: self.observation_sd.len(),
-            weighted: (0..self.sd.len()).filter(|&unknown| self.is_weighted(unknown)).count(),
+            weighted: self.weighted_among(0..self.sd.len()).count(),
             unknowns: self.sd.iter().filter(|&&sd| sd != 0.0).count() - held,
         }
     }

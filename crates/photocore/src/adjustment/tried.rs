@@ -3,6 +3,7 @@
 //! What is left out has an infinite standard deviation: its equations stand in the normal equations with weight zero, so that pattern,
 //! order and symbolic factorisation stay, and cofactors of what is out are inside the pattern too.
 
+use nalgebra::DMatrix;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -136,6 +137,45 @@ impl Tried {
         pool.install(|| locals.par_iter().map(of).collect())
     }
 
+    /// What all equations of some local blocks, which take no part, have to do with each other if they did: for each two of them the
+    /// inverse of their variances as the others predict them, but for what the local block takes up.
+    ///
+    /// With C = I + b Q b^T these variances and a the equations of the local block, P = C^-1 - C^-1 a^T (a C^-1 a^T)^-1 a C^-1 leads from errors
+    /// to what all rows together show of them: P l are residuals of unit weight and P their cofactors, as R is of what takes part. It is
+    /// (I + a' Q a'^T - H)^-1 - H, H the share of the local block alone in its equations and Q that of the others.
+    ///
+    /// * `observation_sd`, `sd`: as they would take part;
+    /// * `further`: the equations of the weighted unknowns of each, of unit weight.
+    ///
+    /// Empty where the local block would not be determined.
+    pub fn of_gone<M: Model>(
+        &self,
+        problem: &Problem<M>,
+        (observation_sd, sd): (&[f64], &[f64]),
+        locals: &[usize],
+        further: impl Fn(usize) -> Vec<f64> + Sync,
+        pool: &ThreadPool,
+    ) -> Vec<Vec<f64>> {
+        let layout = problem.layout();
+        let unknowns = || locals.iter().flat_map(|&local| layout.local_range(local));
+        let (_, asked, mut prior) = self.equations(problem, observation_sd, pool);
+        let asked = asked.with_unknowns(unknowns(), sd);
+        for unknown in unknowns() {
+            let own = sd[unknown];
+            prior.weight[unknown] = if own == 0.0 { 1.0 } else { (own * own).recip() };
+        }
+        let of = |&local: &usize| {
+            let further = further(local);
+            let own = problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &further);
+            let rows = own.rows();
+            let alone = DMatrix::from_row_slice(rows, rows, &own.by_local);
+            let all = DMatrix::from_row_slice(rows, rows, &own.equations);
+            let factor = (DMatrix::identity(rows, rows) + all - &alone).cholesky();
+            factor.map_or(vec![], |factor| (factor.inverse() - alone).as_slice().to_vec())
+        };
+        pool.install(|| locals.par_iter().map(of).collect())
+    }
+
     /// Cofactors of the equations of some ties, with the given standard deviations.
     pub fn of_ties<M: Model>(
         &self,
@@ -144,6 +184,9 @@ impl Tried {
         ties: &[usize],
         pool: &ThreadPool,
     ) -> Vec<TieCofactors> {
+        if ties.is_empty() {
+            return vec![];
+        }
         let (_, asked, _) = self.equations(problem, observation_sd, pool);
         ties.iter().map(|&tie| self.of_tie(problem, &asked, tie)).collect()
     }

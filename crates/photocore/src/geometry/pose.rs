@@ -25,7 +25,9 @@ impl Pose {
     /// u, a point in the photo's axes.
     #[inline(always)]
     pub fn sight(&self, point: &Vector3) -> Vector3 {
-        self.attitude.tr_mul(&(point - self.position))
+        // A^T d axis by axis: nalgebra's product with a transpose is too general to be inlined here, of all places.
+        let d = point - self.position;
+        Vector3::from_fn(|k, _| self.attitude.column(k).dot(&d))
     }
 
     /// Distance of a point from the projection centre along the optical axis: negative behind the camera.

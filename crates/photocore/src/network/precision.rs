@@ -23,12 +23,13 @@ pub struct Coarse {
 }
 
 impl Coarse {
-    /// Refuses photos and points that are too coarse.
+    /// Refuses photos, ascending, and points that are too coarse.
     ///
     /// # Errors
     /// There are any.
     fn refuse(photos: impl Iterator<Item = usize>, points: impl Iterator<Item = usize>) -> Result<(), Self> {
-        let (photos, points): (Vec<usize>, Vec<usize>) = (photos.collect(), points.collect());
+        let (photos, mut points): (Vec<usize>, Vec<usize>) = (photos.collect(), points.collect());
+        points.sort_unstable();
         if photos.is_empty() && points.is_empty() { Ok(()) } else { Err(Self { photos, points }) }
     }
 }
@@ -73,9 +74,7 @@ impl Network {
         };
         let point = |&i: &usize| coarse(&self.points[i].coordinates, &self.points[i].sd);
         let photos = (0..self.photos.len()).filter(|&photo| uses(photo));
-        let mut points = screened.points.clone();
-        points.sort_unstable();
-        Coarse::refuse(photos.filter(photo), points.into_iter().filter(point))
+        Coarse::refuse(photos.filter(photo), screened.points.iter().copied().filter(point))
     }
 
     /// Refuses photos and points whose values rounding has changed by more than image coordinates show: their standard deviation
@@ -115,9 +114,7 @@ impl Network {
             let given = start == Start::Given || self.points[i].held() == [true; 3];
             given && too_far(self.points[i].coordinates, middle_angle)
         };
-        let mut points = screened.points.clone();
-        points.sort_unstable();
-        Coarse::refuse((0..self.photos.len()).filter(photo), points.into_iter().filter(point))
+        Coarse::refuse((0..self.photos.len()).filter(photo), screened.points.iter().copied().filter(point))
     }
 }
 

@@ -12,7 +12,7 @@ use super::problem::Assembled;
 use super::suspects::{Home, Row, Subject, Suspect};
 use super::{Network, NetworkError, Options};
 use crate::adjustment::{
-    self, AdjustError, GroupTest, Loss, Method, Status, Stop, TieCofactors, Tried, Watch, Weighted,
+    self, AdjustError, Few, GroupTest, Loss, Method, Status, Stop, TieCofactors, Tried, Watch, Weighted,
     canonical_correlation,
 };
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
@@ -32,6 +32,8 @@ pub struct Trial {
     sd: Vec<f64>,
     /// The place in the model of each point that takes part.
     place: Vec<Option<usize>>,
+    /// The suspects at each local point, by its place.
+    on_place: Vec<Vec<usize>>,
     /// What was held for a datum where the adjustment has ended.
     held: Vec<usize>,
     found: Option<Tried>,
@@ -100,7 +102,7 @@ pub struct Prediction {
 }
 
 /// The observations of one point, that of its coordinates and all its images.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct OnPoint {
     /// The suspects, each with its number of rows.
     pub suspects: Vec<usize>,
@@ -138,6 +140,15 @@ impl Network {
         }
         let mut place = vec![None; self.points.len()];
         assembled.points.iter().enumerate().for_each(|(index, &point)| place[point] = Some(index));
+        let locals = assembled.problem.model.locals;
+        let mut on_place: Vec<Vec<usize>> = vec![vec![]; locals];
+        for (index, suspect) in suspects.iter().enumerate() {
+            match suspect.home {
+                Home::Group { point, .. } => on_place[point].push(index),
+                Home::Point(place) if place < locals => on_place[place].push(index),
+                _ => {}
+            }
+        }
         let mut own = options.adjustment;
         if let Method::Full(_) = own.method {
             own.method = Method::default();
@@ -151,6 +162,7 @@ impl Network {
             row_starts,
             block_starts,
             place,
+            on_place,
             held: state.map_or(vec![], |state| state.held.clone()),
             found: None,
         })
@@ -209,7 +221,8 @@ impl Trial {
     }
 
     /// Adjusts with a robust loss from where the last trial has ended, and stays there: the factors by which it has changed the weights
-    /// of each image and observation that takes part, in the order of all tests; 1 for others.
+    /// of each image and observation that takes part, in the order of all tests; 1 for others. None where it diverges: then its weights
+    /// say nothing, and the next trial begins where this one has.
     ///
     /// # Errors
     /// Those of [`Trial::adjust`].
@@ -219,7 +232,7 @@ impl Trial {
         iterations: usize,
         pool: &ThreadPool,
         watch: Watch<'_>,
-    ) -> Result<Vec<f64>, NetworkError> {
+    ) -> Result<Option<Vec<f64>>, NetworkError> {
         let options = adjustment::Options {
             loss: Some(loss),
             covariance: false,
@@ -229,6 +242,9 @@ impl Trial {
         let problem = &self.assembled.problem;
         let found = adjustment::adjust(problem, &options, pool, watch)
             .map_err(|error| NetworkError::new(error, &self.assembled))?;
+        if found.status == Status::Diverged {
+            return Ok(None);
+        }
         let (groups, all) = (problem.layout().groups(), found.weights.unwrap_or_default());
         let weight = |suspect: &Suspect| match suspect.home {
             Home::Group { group, .. } => all.get(group).copied(),
@@ -237,7 +253,17 @@ impl Trial {
         };
         let weights = self.suspects.iter().map(|suspect| weight(suspect).unwrap_or(1.0)).collect();
         self.assembled.problem.initial = found.unknowns;
-        Ok(weights)
+        Ok(Some(weights))
+    }
+
+    /// Where all points of the network are; NaN for those that do not take part.
+    pub fn points(&self) -> Vec<[f64; 3]> {
+        let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
+        let mut all = vec![[f64::NAN; 3]; self.place.len()];
+        for (&point, at) in self.assembled.points.iter().zip(model.coordinates(&problem.initial)) {
+            all[point] = std::array::from_fn(|k| at[k] + model.origin[k]);
+        }
+        all
     }
 
     /// The values of the unknowns of all photos as they are given: pose, and camera where it is the photo's own.
@@ -258,7 +284,7 @@ impl Trial {
             (Method::TrustRegion(Stop::Decrease(_)), Some(limit)) => {
                 Method::TrustRegion(Stop::Decrease(limit))
             }
-            (_, Some(limit)) => Method::Damped(Stop::Fraction(limit)),
+            (_, Some(limit)) => Method::Damped(Stop::Foreseen(limit)),
         }
     }
 
@@ -354,10 +380,10 @@ struct Around {
 /// A test of a suspect, in its units.
 struct Tested {
     test: GroupTest,
-    residual: Vec<f64>,
-    cofactors: Vec<f64>,
-    error: Vec<f64>,
-    error_sd: Vec<f64>,
+    residual: Few,
+    cofactors: Few,
+    error: Few,
+    error_sd: Few,
 }
 
 impl Trial {
@@ -434,9 +460,9 @@ impl Trial {
         let (error, error_sd) = in_units(&units, &test.error, &test.cofactors);
         let whole = taking.len() == size;
         let spread = |values: Vec<f64>| match whole {
-            true => values,
+            true => Few::from_vec(values),
             false => {
-                let mut all = vec![f64::NAN; size];
+                let mut all = Few::from_elem(f64::NAN, size);
                 taking.iter().zip(values).for_each(|(&k, value)| all[k] = value);
                 all
             }
@@ -455,7 +481,7 @@ impl Trial {
         Some(Tested {
             test,
             residual: spread(residual),
-            cofactors: block,
+            cofactors: Few::from_vec(block),
             error: spread(error),
             error_sd: spread(error_sd),
         })
@@ -476,10 +502,10 @@ impl Trial {
         let of = |k: usize| (test.error[k] * sd[k], test.cofactors[3 * k].sqrt() * sd[k]);
         let [first, second] = [of(0), of(1)];
         Some(Tested {
-            residual: residual.to_vec(),
-            cofactors: cofactors.to_vec(),
-            error: vec![first.0, second.0],
-            error_sd: vec![first.1, second.1],
+            residual: Few::from_slice(&residual),
+            cofactors: Few::from_buf(cofactors),
+            error: Few::from_slice(&[first.0, second.0]),
+            error_sd: Few::from_slice(&[first.1, second.1]),
             test,
         })
     }
@@ -677,65 +703,90 @@ impl Trial {
     /// # Errors
     /// Nothing was adjusted before.
     pub fn on_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
-        let found = self.found()?;
-        let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
-        let mut of_place: Vec<Vec<usize>> = vec![vec![]; model.locals];
-        for (index, suspect) in self.suspects.iter().enumerate() {
-            match suspect.home {
-                Home::Group { point, .. } => of_place[point].push(index),
-                Home::Point(place) if place < model.locals => of_place[place].push(index),
-                _ => {}
-            }
-        }
-        let local = |&point: &usize| self.place.get(point).copied().flatten().filter(|&at| at < model.locals);
-        let places: Vec<usize> = points.iter().filter_map(local).collect();
-        let weighted = self.weighted(&problem.sd, &found.values);
-        let control = |place: usize| {
-            of_place[place].iter().map(|&i| &self.suspects[i]).find(|s| matches!(s.home, Home::Point(_)))
-        };
-        let further = |place: usize| -> Vec<f64> {
-            let Some(suspect) = control(place) else { return vec![] };
-            let all: Vec<usize> = (0..suspect.rows.len()).collect();
-            let rows = self.prior_rows(suspect, &all, &problem.sd, &found.values, &weighted);
-            rows.transpose().as_slice().to_vec()
-        };
-        let cofactors = found.of_locals(problem, &problem.observation_sd, &places, further, pool);
+        let (found, problem) = (self.found()?, &self.assembled.problem);
+        let (observation_sd, sd) = (&problem.observation_sd[..], &problem.sd[..]);
+        let weighted = self.weighted(sd, &found.values);
+        let further = |place: usize| self.further(place, sd, &found.values, &weighted);
+        let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
+        let cofactors = found.of_locals(problem, observation_sd, &places, further, pool);
         let mut found_at = places.iter().zip(cofactors);
-        let empty = || OnPoint { suspects: vec![], residual: vec![], cofactors: vec![] };
-        let of = |point: &usize| {
-            if local(point).is_none() {
-                return empty();
-            }
-            let Some((&place, own)) = found_at.next() else { return empty() };
-            let (mut rows, mut residual) = (vec![], vec![]);
-            for &index in &of_place[place] {
-                let suspect = &self.suspects[index];
-                let first = match suspect.home {
-                    Home::Group { group, .. } => 2 * (group - problem.layout().groups_of(place).start),
-                    _ => 2 * problem.layout().groups_of(place).len(),
-                };
-                for (k, &(row, _)) in suspect.rows.iter().enumerate() {
-                    rows.push(first + k);
-                    residual.push(match row {
-                        Row::Equation(equation) => {
-                            found.residuals[equation] / problem.observation_sd[equation]
-                        }
-                        Row::Unknown(unknown) => {
-                            problem.prior_row(&problem.sd, &found.values, &weighted, unknown).1
-                        }
-                    });
-                }
-            }
-            let count = rows.len();
-            let shares = sub(&own.equations, own.rows(), &rows);
-            let identity = |k: usize| f64::from(u8::from(k / count == k % count));
-            OnPoint {
-                suspects: of_place[place].clone(),
-                residual,
-                cofactors: shares.iter().enumerate().map(|(k, share)| identity(k) - share).collect(),
-            }
+        let of = |&point: &usize| {
+            let known = self.local(point).and_then(|_| found_at.next());
+            known.map_or_else(OnPoint::default, |(&place, own)| {
+                let (rows, residual) = self.rows_at(place, (observation_sd, sd), found, &weighted);
+                let (count, shares) = (rows.len(), sub(&own.equations, own.rows(), &rows));
+                let identity = |k: usize| f64::from(u8::from(k / count == k % count));
+                let cofactors = shares.iter().enumerate().map(|(k, share)| identity(k) - share).collect();
+                OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
+            })
         };
         Ok(points.iter().map(of).collect())
+    }
+
+    /// The same of points that are out with all that was observed of them, as if they took part: each by itself against the photos as
+    /// the others determine them. Empty also for points that their rays do not determine.
+    ///
+    /// # Errors
+    /// Nothing was adjusted before.
+    pub fn on_gone_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
+        let (found, problem) = (self.found()?, &self.assembled.problem);
+        let given = (&self.observation_sd[..], &self.sd[..]);
+        let weighted = self.weighted(&self.sd, &found.values);
+        let further = |place: usize| self.further(place, &self.sd, &found.values, &weighted);
+        let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
+        let cofactors = found.of_gone(problem, given, &places, further, pool);
+        let mut found_at = places.iter().zip(cofactors);
+        let of = |&point: &usize| {
+            let known = self.local(point).and_then(|_| found_at.next()).filter(|(_, own)| !own.is_empty());
+            known.map_or_else(OnPoint::default, |(&place, own)| {
+                let (rows, observed) = self.rows_at(place, given, found, &weighted);
+                let cofactors = sub(&own, own.len().isqrt(), &rows);
+                let residual = cofactors.chunks_exact(rows.len()).map(|row| dot(row, &observed)).collect();
+                OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
+            })
+        };
+        Ok(points.iter().map(of).collect())
+    }
+
+    /// The place of a point in the model, where no observation beside images touches it.
+    fn local(&self, point: usize) -> Option<usize> {
+        self.place.get(point).copied().flatten().filter(|&place| place < self.assembled.problem.model.locals)
+    }
+
+    /// The equations of the coordinates of a local point that are observations themselves.
+    fn further(&self, place: usize, sd: &[f64], values: &[f64], weighted: &[Weighted]) -> Vec<f64> {
+        let mut own = self.on_place[place].iter().map(|&index| &self.suspects[index]);
+        let Some(suspect) = own.find(|suspect| matches!(suspect.home, Home::Point(_))) else { return vec![] };
+        let all: Vec<usize> = (0..suspect.rows.len()).collect();
+        self.prior_rows(suspect, &all, sd, values, weighted).transpose().as_slice().to_vec()
+    }
+
+    /// The place of each row of the suspects at a local point among its equations, and how much each is off, of unit weight.
+    fn rows_at(
+        &self,
+        place: usize,
+        (observation_sd, sd): (&[f64], &[f64]),
+        found: &Tried,
+        weighted: &[Weighted],
+    ) -> (Vec<usize>, Vec<f64>) {
+        let problem = &self.assembled.problem;
+        let groups = problem.layout().groups_of(place);
+        let (mut rows, mut off) = (vec![], vec![]);
+        for &index in &self.on_place[place] {
+            let suspect = &self.suspects[index];
+            let first = match suspect.home {
+                Home::Group { group, .. } => 2 * (group - groups.start),
+                _ => 2 * groups.len(),
+            };
+            for (k, &(row, _)) in suspect.rows.iter().enumerate() {
+                rows.push(first + k);
+                off.push(match row {
+                    Row::Equation(equation) => found.residuals[equation] / observation_sd[equation],
+                    Row::Unknown(unknown) => problem.prior_row(sd, &found.values, weighted, unknown).1,
+                });
+            }
+        }
+        (rows, off)
     }
 
     /// How an error of one standard deviation in each row of some suspects moves its own point and its own photo: for each row the three
@@ -872,6 +923,11 @@ impl Trial {
         }
         found
     }
+}
+
+/// The product of two vectors.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// Some rows and columns of a square matrix of so many rows, row by row.

@@ -169,23 +169,23 @@ impl AtHome {
         let start = Instant::now();
         let layout = &system.layout;
         let stacks = system.incidence.stacks_at(index);
-        let part = |stacks: Stacks<'_>| {
-            let (mut stack, mut others) = (Stack::default(), Others { by_group, ..Others::default() });
+        let room = || (Stack::default(), Others { by_group, ..Others::default() });
+        let part = |(stack, others): &mut (Stack, Others), stacks: Stacks<'_>| {
             let mut part = Self::default();
             for run in stacks.iter().take_while(|_| !control.stopped()) {
                 stack.gather(system, equations, run);
                 stack.eliminate(layout, prior, 0.0);
-                others.gather(&stack, front, height);
-                others.cofactors(&stack, layout, &mut part);
-                known.solve(system, &stack, &mut part.further);
+                others.gather(stack, front, height);
+                others.cofactors(stack, layout, &mut part);
+                known.solve(system, stack, &mut part.further);
                 control.count(run.len());
             }
             part
         };
         let mut found = if stacks.locals() < MANY {
-            part(stacks)
+            part(&mut room(), stacks)
         } else {
-            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map(part).collect();
+            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map_init(room, part).collect();
             parts.into_iter().fold(Self::default(), |mut all, part| {
                 all.local.extend(part.local);
                 all.equations.extend(part.equations);
@@ -337,18 +337,26 @@ impl Others {
     ) {
         let rows = size::<R>(rows);
         let local = stack.local_rows::<L>(t, p, rows);
-        let diagonal = found.equations.len() - rows;
+        let (diagonal, first) = (found.equations.len() - rows, found.shares.len());
+        let along: SmallVec<[[f64; L]; 4]> = local[..rows]
+            .iter()
+            .map(|&(mut row)| {
+                stack.triangles[t].forward::<L>(&mut row, 1);
+                row
+            })
+            .collect();
+        found.by_local.resize(first + rows * rows, 0.0);
+        found.shares.resize(first + rows * rows, 0.0);
         for i in 0..rows {
-            let mut first = local[i];
-            stack.triangles[t].forward::<L>(&mut first, 1);
-            for j in 0..rows {
-                let mut second = local[j];
-                stack.triangles[t].forward::<L>(&mut second, 1);
-                found.by_local.push(dot(&first, &second));
-                found.shares.push(match i == j {
+            for j in 0..=i {
+                let share = match i == j {
                     true => found.equations[diagonal + i],
                     false => self.between::<R, L, D>(stack, slot, start, (t, k, p), (i, j), rows, own),
-                });
+                };
+                for at in [first + i * rows + j, first + j * rows + i] {
+                    found.by_local[at] = dot(&along[i], &along[j]);
+                    found.shares[at] = share;
+                }
             }
         }
     }

@@ -22,6 +22,8 @@ struct Own {
 pub struct LocalCofactors {
     /// a Q a^T of every two equations: square, row by row.
     pub equations: Vec<f64>,
+    /// The same with all unknowns known but those of the local block.
+    pub by_local: Vec<f64>,
     /// Q a^T of the unknowns of the local block, those of each equation together.
     pub local: Vec<f64>,
     /// The same of each kept block that the groups of the local block touch; the border is counted after the last.
@@ -36,7 +38,8 @@ impl LocalCofactors {
 
     fn unknown(dim: usize, rows: usize, blocks: &BTreeMap<usize, usize>) -> Self {
         let others = blocks.keys().map(|&block| (block, vec![f64::NAN; rows])).collect();
-        Self { equations: vec![f64::NAN; rows * rows], local: vec![f64::NAN; rows * dim], others }
+        let square = vec![f64::NAN; rows * rows];
+        Self { equations: square.clone(), by_local: square, local: vec![f64::NAN; rows * dim], others }
     }
 }
 
@@ -80,7 +83,8 @@ impl System {
             }
         }
         let others = q * c.transpose();
-        let found = &c * &others + &a * &by_local;
+        let alone = &a * &by_local;
+        let found = &c * &others + &alone;
         let own = by_local - coupling * &others;
         let of_block = |(&block, &first): (&usize, &usize)| {
             let width = self.block_dim(block);
@@ -88,6 +92,7 @@ impl System {
         };
         LocalCofactors {
             equations: (0..rows * rows).map(|k| found[(k / rows, k % rows)]).collect(),
+            by_local: (0..rows * rows).map(|k| alone[(k / rows, k % rows)]).collect(),
             local: (0..rows * dim).map(|k| own[(k % dim, k / dim)]).collect(),
             others: blocks.iter().map(of_block).collect(),
         }

@@ -34,8 +34,7 @@ impl System {
         watched(pool, between, |control| {
             let mut others = factor.right.clone();
             factor.solve_backward(&mut others);
-            let solve = |stacks: Stacks<'_>| {
-                let mut stack = Stack::default();
+            let solve = |stack: &mut Stack, stacks: Stacks<'_>| {
                 let mut found = Vec::with_capacity(stacks.locals() * layout.local_dim());
                 for run in stacks.iter().take_while(|_| !control.stopped()) {
                     stack.gather(self, equations, run);
@@ -45,7 +44,7 @@ impl System {
                 found
             };
             let parts = self.incidence.stacks().parts(CHUNK);
-            let found: Vec<Vec<f64>> = parts.into_par_iter().map(solve).collect();
+            let found: Vec<Vec<f64>> = parts.into_par_iter().map_init(Stack::default, solve).collect();
             let mut values = control.allocated(zeros(layout.unknowns()))?;
             for position in 0..symbolic.blocks() {
                 let range = symbolic.unknowns_at(layout, position);

@@ -36,7 +36,7 @@ fn camera((model, parameters, sd, covariance): CameraRow) -> PyResult<Camera> {
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
     photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, unknowns, mounts, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
-    covariance, loss, ordering, unit_variance, minimum, memory
+    covariance, loss, ordering, unit_variance, minimum, memory, points_given
 ))]
 fn block_network(
     photo_positions: PyReadonlyArrayDyn<'_, f64>,
@@ -68,6 +68,7 @@ fn block_network(
     unit_variance: &str,
     minimum: Option<(usize, Option<(usize, usize)>)>,
     memory: Option<usize>,
+    points_given: bool,
 ) -> PyResult<BlockNetwork> {
     let positions = rows("photo_positions", &photo_positions)?;
     let attitudes = rows("photo_attitudes", &photo_attitudes)?;
@@ -121,7 +122,7 @@ fn block_network(
             "redundancy" => UnitVariance::Redundancy,
             other => return Err(unknown("unit_variance", other)),
         },
-        start: Start::Intersected,
+        start: if points_given { Start::Given } else { Start::Intersected },
         hold_unused: false,
         memory,
         minimum: minimum.map(|(photo, coordinate)| Minimum { photo, coordinate }),

@@ -92,6 +92,11 @@ impl NetworkTrial {
         self.trial.photos()
     }
 
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, self.trial.points())
+    }
+
     fn stand(&mut self, py: Python<'_>) -> PyResult<StandingRow> {
         let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
         let found = watched(py, workers, None, |pool, watch| trial.stand(pool, watch))?;
@@ -123,14 +128,15 @@ impl NetworkTrial {
         scale: f64,
         iterations: usize,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
         let Some(loss): Option<Loss> = named_loss(Some((loss, scale)))? else {
-            return Ok(PyArray1::from_vec(py, vec![]));
+            return Ok(None);
         };
         let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
         let found =
             watched(py, workers, progress, |pool, watch| trial.resist(loss, iterations, pool, watch))?;
-        Ok(PyArray1::from_vec(py, found.map_err(|error| refused(&error))?))
+        let weights = found.map_err(|error| refused(&error))?;
+        Ok(weights.map(|weights| PyArray1::from_vec(py, weights)))
     }
 
     fn tests<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -163,13 +169,18 @@ impl NetworkTrial {
             .collect())
     }
 
+    #[pyo3(signature = (points, *, gone = false))]
     #[allow(clippy::type_complexity, reason = "a tuple of arrays for each point")]
     fn on_points<'py>(
         &self,
         py: Python<'py>,
         points: Vec<usize>,
+        gone: bool,
     ) -> PyResult<Vec<(Vec<usize>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)>> {
-        let found = watched(py, self.workers(), None, |pool, _| self.trial.on_points(&points, pool))?;
+        let found = watched(py, self.workers(), None, |pool, _| match gone {
+            true => self.trial.on_gone_points(&points, pool),
+            false => self.trial.on_points(&points, pool),
+        })?;
         let rows = found.map_err(|error| (self.refused)(&error))?;
         rows.into_iter()
             .map(|own| {

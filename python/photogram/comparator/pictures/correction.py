@@ -9,6 +9,7 @@ import numpy as np
 from photogram.comparator.correction_table import table_nodes
 from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, plain
 from photogram.show.pictures import new_figure, round_length
+from photogram.show.style import signed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,7 +50,7 @@ def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: 
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
     for axis, panel in enumerate(axes):
         x, y = places[..., 0] / MM, places[..., 1] / MM
-        filled = panel.contourf(x, y, values[..., axis], levels=levels, cmap="RdBu_r")
+        filled = panel.contourf(x, y, values[..., axis], levels=levels, cmap=signed())
         lines = panel.contour(x, y, values[..., axis], levels=levels, colors="k", linewidths=0.4)
         panel.clabel(lines, fontsize=7, fmt="%g")
         panel.plot(*measured.T, ".", color="k", markersize=3, alpha=0.7, clip_on=False)

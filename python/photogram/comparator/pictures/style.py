@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.show import pictures
+from photogram.show.style import BLUE, FAINT, VERMILION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,9 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ACCENT", "FAINT", "MAIN", "arrows", "key", "panels", "plain"]
 
-MAIN = "#1f4e79"
-ACCENT = "#b5432a"
-FAINT = "#9aa5b1"
+MAIN, ACCENT = BLUE, VERMILION
 MM = 1000.0
 
 

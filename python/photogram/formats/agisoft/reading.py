@@ -155,10 +155,9 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
             )
     else:
         values |= {"f": calibration.number("f")} | {term: calibration.number(term, 0.0) for term in _TERMS}
-    if calibration is not None:
-        for term in ("p3", "p4"):
-            if calibration.number(term, 0.0):
-                raise calibration.error(f"{term} is not zero: no camera of ours has it")
+    further = {term: 0.0 if calibration is None else calibration.number(term, 0.0) for term in ("p3", "p4")}
+    if any(further.values()):
+        return _Sensor(Camera(f"agisoft_{kind}_p4", values | further, name=name), size, pixel)
     return _Sensor(Camera(f"agisoft_{kind}", values, name=name), size, pixel)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from photogram.formats.blocks_exchange.reading import TITLE, read
-from photogram.formats.blocks_exchange.writing import cannot_hold, write
+from photogram.formats.blocks_exchange.writing import FILE, cannot_hold, write
 from photogram.formats.format import Format
 from photogram.formats.xml_stream import root_of
 
@@ -13,7 +13,7 @@ __all__ = ["FORMAT"]
 
 
 def _recognises(path: Path) -> bool:
-    return path.is_file() and root_of(path) == "BlocksExchange"
+    return path.is_file() and root_of(path)[0] == "BlocksExchange"
 
 
 FORMAT = Format(
@@ -22,5 +22,6 @@ FORMAT = Format(
     recognises=_recognises,
     read=read,
     write=write,
+    files=(FILE, "*.xml"),
     cannot_hold=cannot_hold,
 )

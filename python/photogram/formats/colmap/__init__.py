@@ -17,4 +17,5 @@ FORMAT = Format(
     write=write,
     cannot_hold=cannot_hold,
     results=covariance_files,
+    folders=("sparse",),
 )

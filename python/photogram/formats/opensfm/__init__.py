@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from photogram.formats.format import Format
-from photogram.formats.opensfm.reading import TITLE, place_of, read
+from photogram.formats.opensfm.reading import MODEL, TITLE, place_of, read
 from photogram.formats.opensfm.writing import cannot_hold, write
 
 __all__ = ["FORMAT"]
@@ -14,5 +14,6 @@ FORMAT = Format(
     recognises=lambda path: place_of(path) is not None,
     read=read,
     write=write,
+    files=(MODEL,),
     cannot_hold=cannot_hold,
 )

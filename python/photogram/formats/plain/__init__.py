@@ -22,4 +22,5 @@ FORMAT = Format(
     read=read,
     write=write,
     cannot_hold=cannot_hold,
+    files=(SETTINGS, "*.toml"),
 )

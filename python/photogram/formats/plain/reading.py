@@ -98,7 +98,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         spheroid=Spheroid(*transform.frame.ellipsoid) if transform.frame.kind == "geographic" else None,
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
         details={"settings": settings},
-    )
+    ).replace(sd_taken=True)
 
 
 def _with_cameras(tables: Tables, path: Path) -> Tables:

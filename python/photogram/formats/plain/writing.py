@@ -20,7 +20,7 @@ from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Control, Difference, Distance, Observation, Position
 from photogram.network.unknowns import Boresight, LeverArm
 
-__all__ = ["attitude_matrices", "cannot_hold", "known_cameras", "write"]
+__all__ = ["attitude_matrices", "cannot_hold", "control_table", "known_cameras", "write"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _COVARIANCES = (("cov_xy", 0, 1), ("cov_xz", 0, 2), ("cov_yz", 1, 2))
@@ -98,7 +98,7 @@ def write(project: Project) -> Mapping[str, bytes]:
         "photos": _photos(block, [cameras[row].name for row in photo_cameras]),
         "images": _images(block, names, xy),
         "points": _points(project),
-        "control": _control(project),
+        "control": control_table(project),
         **_observed(block.observations, block),
         **_rigs(block, cameras, photo_cameras),
     }
@@ -213,7 +213,8 @@ def _images(block: Block, names: list[str], xy: Floats) -> dict[str, Any]:
     return columns
 
 
-def _control(project: Project) -> dict[str, Any]:
+def control_table(project: Project) -> dict[str, Any]:
+    """Return the columns of control and check points; none where there are no such points."""
     block = project.block
     held = np.isfinite(block.point_sd)
     rows = {int(row): "control" for row in np.flatnonzero(held.any(axis=1))} | dict.fromkeys(

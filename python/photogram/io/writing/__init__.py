@@ -4,6 +4,6 @@ How it looks from outside stands in `docs/command-line.md`.
 """
 
 from photogram.io.writing.guard import check_outputs
-from photogram.io.writing.outputs import OutputSet, write_whole
+from photogram.io.writing.outputs import Content, OutputSet, write_whole
 
-__all__ = ["OutputSet", "check_outputs", "write_whole"]
+__all__ = ["Content", "OutputSet", "check_outputs", "write_whole"]

@@ -7,12 +7,12 @@ import io
 import os
 import stat
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, BinaryIO, Self
 
 from photogram.io.writing.guard import Guard
 from photogram.io.writing.interruption import deferred
@@ -23,7 +23,10 @@ from photogram.io.writing.targets import Target, naming
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-__all__ = ["OutputSet", "abandon_all", "write_whole"]
+__all__ = ["Content", "OutputSet", "abandon_all", "write_whole"]
+
+Content = bytes | Callable[[BinaryIO], None]
+"""What goes into a file: bytes, or what writes them piece by piece to the file that it is given."""
 
 PERMISSIONS = 0o777
 
@@ -127,7 +130,7 @@ class OutputSet:
         self._guard = Guard(inputs)
         self._staged: list[_Staged] = []
         self._streams: list[io.BufferedWriter] = []
-        self._late: list[tuple[Target, bytes]] = []
+        self._late: list[tuple[Target, Content]] = []
         self._stagings: dict[str, Staging] = {}
         self._made: list[str] = []
 
@@ -153,11 +156,11 @@ class OutputSet:
         self._streams.append(file)
         return file
 
-    def write(self, path: Path, content: bytes) -> None:
+    def write(self, path: Path, content: Content) -> None:
         """Write a file."""
         target = self._target(path)
         if target.regular:
-            self._stage(target).write(content)
+            _put(self._stage(target), content)
             self._staged[-1].complete()
         else:
             self._late.append((target, content))
@@ -210,7 +213,7 @@ class OutputSet:
             file.close()
         for target, content in self._late:
             with _stream(target) as file:
-                file.write(content)
+                _put(file, content)
         with deferred():
             self._place()
 
@@ -271,7 +274,7 @@ def abandon_all() -> None:
         _live[-1].abandon()
 
 
-def write_whole(files: Mapping[Path, bytes], inputs: Iterable[Path] = ()) -> None:
+def write_whole(files: Mapping[Path, Content], inputs: Iterable[Path] = ()) -> None:
     """Write files so that all are there, or none; see :class:`OutputSet`.
 
     Parameters
@@ -291,6 +294,13 @@ def write_whole(files: Mapping[Path, bytes], inputs: Iterable[Path] = ()) -> Non
     with OutputSet(inputs) as outputs:
         for path, content in files.items():
             outputs.write(path, content)
+
+
+def _put(file: io.BufferedWriter, content: Content) -> None:
+    if callable(content):
+        content(file)
+    else:
+        file.write(content)
 
 
 def _stream(target: Target) -> io.BufferedWriter:

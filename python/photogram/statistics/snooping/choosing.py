@@ -11,6 +11,7 @@ chosen do to it. Only what shares a photo counts. Groups of one point are condit
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -22,7 +23,7 @@ from photogram.statistics.distributions import LEVEL, critical_chi_square, criti
 from photogram.statistics.snooping.conditioning import Chosen, Conditional, UnitWeight
 from photogram.statistics.snooping.suspects import Suspects, Tests, Trial
 
-__all__ = ["Choice", "Level", "choose", "hides"]
+__all__ = ["Choice", "Choosing", "Level", "hides"]
 
 ON_POINT = 2
 """Groups that go from one point in a round, at the most, where R of all rows is too large."""
@@ -76,20 +77,14 @@ class Choice:
     limit: float
 
 
-def choose(
-    trial: Trial,
-    tests: Tests,
-    unit: UnitWeight,
-    scales: Floats,
-    allowed: Bools,
-    level: Level,
-    out: int,
-    ahead: bool,
-) -> list[Choice]:
-    """Choose what goes in a round, in the order in which it goes.
+@dataclass(frozen=True, eq=False)
+class Choosing:
+    """What a round chooses from, and how.
 
-    Parameters
+    Attributes
     ----------
+    trial
+        The network.
     tests
         Of all groups, nothing of this round being out.
     unit
@@ -105,67 +100,145 @@ def choose(
     ahead
         Whether to look for groups that hide each other where none is significant.
     """
-    allowed = allowed & tests.active
-    if trial.whole:
-        residuals, response = trial.response()
-        suspects = trial.suspects
-        rows = [suspects.rows(group) for group in range(len(suspects))]
-        every = np.arange(len(suspects))[np.newaxis]
-        conditional = Conditional(residuals[np.newaxis], response[np.newaxis], rows, scales[np.newaxis], unit)
-        return _sequences(suspects, conditional, every, tests, allowed, level, out, ahead)[0]
-    return _bounded(trial, tests, unit, scales, allowed, level, out, ahead)
 
+    trial: Trial
+    tests: Tests
+    unit: UnitWeight
+    scales: Floats
+    allowed: Bools
+    level: Level
+    out: int
+    ahead: bool
 
-def _sequences(
-    suspects: Suspects,
-    conditional: Conditional,
-    groups: Indices,
-    tests: Tests,
-    allowed: Bools,
-    level: Level,
-    out: int,
-    ahead: bool,
-    most: float = math.inf,
-) -> list[list[Choice]]:
-    """Take out of each block one group after the other while the next is significant, or hides one that is.
+    @property
+    def suspects(self) -> Suspects:
+        """The groups."""
+        return self.trial.suspects
 
-    `groups`: (n, K) the numbers of the groups of each block.
-    """
-    found: list[list[Choice]] = [[] for _ in groups]
-    sure = np.zeros(len(groups), dtype=np.int64)
-    left = allowed[groups]
-    going = np.arange(len(groups))
-    step = 0
-    while going.size and step < most:
-        limit = level.limit(out + step)
-        places = conditional.best(left)[going]
-        going, places = going[places >= 0], places[places >= 0]
-        significant = conditional.log_probability[going, places] < math.log(limit)
-        further = significant.copy()
-        if ahead:
-            within = step - sure[going] < AHEAD
-            hidden = [
-                hides(conditional.units[block], float(conditional.scales[block, place]))
-                for block, place in zip(going, places, strict=True)
-            ]
-            further |= within & np.array(hidden, dtype=bool)
-        going, places, significant = going[further], places[further], significant[further]
-        if not going.size:
-            break
-        rows = conditional.rows[places].copy()
-        for i, (block, place) in enumerate(zip(going.tolist(), places.tolist(), strict=True)):
-            parts = suspects.parts(int(groups[block, place]))
-            if parts is not None:
-                rows[i] = conditional.part(block, place, parts)
-        limits = np.full(len(going), math.log(limit))
-        chosen = conditional.choose(going, places, rows, left, limits)
-        left[going, places] = False
-        step += 1
-        sure[going[significant]] = step
-        for block, own in zip(going.tolist(), chosen, strict=True):
-            group = int(groups[block, own.group])
-            found[block].append(Choice(group, float(tests.statistic[group]), own, limit))
-    return [own[: sure[block]] for block, own in enumerate(found)]
+    def choose(self) -> list[Choice]:
+        """Choose what goes in a round, in the order in which it goes."""
+        if not self.trial.whole:
+            return self._bounded()
+        residuals, response = self.trial.response()
+        groups = range(len(self.suspects))
+        rows = [self.suspects.rows(group) for group in groups]
+        conditional = Conditional(
+            residuals[np.newaxis], response[np.newaxis], rows, self.scales[np.newaxis], [self.unit]
+        )
+        return self._sequences(conditional, np.array([groups]))[0]
+
+    def on_gone_points(self, points: Sequence[int]) -> tuple[list[Choice], set[int]]:
+        """Choose on points that are out with all that was observed of them.
+
+        Each is tested against the photos as the others determine them. Returns what goes, and the points that
+        could be judged so.
+        """
+        blocks = [own for own in self.trial.gone_blocks(points) if own[0]]
+        units = [self._with_own(residuals, response) for _, residuals, response in blocks]
+        judged = {int(self.suspects.points[groups[0]]) for groups, _, _ in blocks}
+        return self._on_blocks(blocks, units), judged
+
+    def _with_own(self, residuals: Floats, response: Floats) -> UnitWeight:
+        """Return the unit weight with a point that takes no part in it yet."""
+        unit, own = self.unit, float(residuals @ np.linalg.pinv(response, hermitian=True) @ residuals)
+        return UnitWeight(
+            unit.known,
+            unit.weighted_sum_of_squares + own,
+            unit.degrees_of_freedom + np.linalg.matrix_rank(response, hermitian=True),
+        )
+
+    def _sequences(
+        self, conditional: Conditional, groups: Indices, most: float = math.inf
+    ) -> list[list[Choice]]:
+        """Take groups out of each block while the next is significant, or hides one that is.
+
+        `groups`: (n, K) the numbers of the groups of each block.
+        """
+        found: list[list[Choice]] = [[] for _ in groups]
+        sure = np.zeros(len(groups), dtype=np.int64)
+        left = self.allowed[groups]
+        going = np.arange(len(groups))
+        step = 0
+        while going.size and step < most:
+            limit = self.level.limit(self.out + step)
+            places = conditional.best(left)[going]
+            going, places = going[places >= 0], places[places >= 0]
+            significant = conditional.log_probability[going, places] < math.log(limit)
+            further = significant.copy()
+            if self.ahead:
+                for at in np.flatnonzero(~significant & (step - sure[going] < AHEAD)).tolist():
+                    block, place = going[at], places[at]
+                    further[at] = hides(conditional.units[block], float(conditional.scales[block, place]))
+            going, places, significant = going[further], places[further], significant[further]
+            if not going.size:
+                break
+            rows = conditional.rows[places].copy()
+            for i, (block, place) in enumerate(zip(going.tolist(), places.tolist(), strict=True)):
+                parts = self.suspects.parts(int(groups[block, place]))
+                if parts is not None:
+                    rows[i] = conditional.part(block, place, parts)
+            limits = np.full(len(going), math.log(limit))
+            chosen = conditional.choose(going, places, rows, left, limits)
+            left[going, places] = False
+            step += 1
+            sure[going[significant]] = step
+            for block, own in zip(going.tolist(), chosen, strict=True):
+                group = int(groups[block, own.group])
+                found[block].append(Choice(group, float(self.tests.statistic[group]), own, limit))
+        return [own[: sure[block]] for block, own in enumerate(found)]
+
+    def _bounded(self) -> list[Choice]:
+        limit = self.level.limit(self.out)
+        beyond = _beyond(self.tests, self.unit, self.scales, limit)
+        candidates = np.flatnonzero(self.allowed & beyond)
+        if not candidates.size and self.ahead:
+            ratio = np.where(self.allowed, self.tests.statistic / self.scales, -math.inf)
+            candidates = np.argsort(-np.nan_to_num(ratio, nan=-math.inf), kind="stable")[:AHEAD]
+            candidates = candidates[self.allowed[candidates]]
+        found = self._on_points(candidates)
+        found.sort(key=lambda choice: (choice.chosen.log_probability, -choice.chosen.statistic, choice.group))
+        load = _Load(self.suspects, self.tests)
+        kept = []
+        for choice in found:
+            critical = _critical(self.unit, choice.chosen.dimension, limit) * self.scales[choice.group]
+            if load.leaves(choice, critical):
+                load.add(choice)
+                kept.append(choice)
+        return kept
+
+    def _on_points(self, candidates: Indices) -> list[Choice]:
+        """Choose on the point of each candidate; of a candidate without a point, itself."""
+        first: dict[int, int] = {}
+        for group in candidates.tolist():
+            point = int(self.suspects.points[group])
+            first.setdefault(point if point >= 0 else -1 - group, group)
+        blocks = self.trial.blocks(list(first.values()))
+        return self._on_blocks(blocks, [self.unit] * len(blocks), most=ON_POINT)
+
+    def _on_blocks(
+        self,
+        blocks: Sequence[tuple[list[int], Floats, Floats]],
+        units: Sequence[UnitWeight],
+        most: float = math.inf,
+    ) -> list[Choice]:
+        """Choose in blocks of groups whose R is known, those with groups of the same sizes together."""
+        all_sizes = np.diff(self.suspects.row_starts)
+        alike: dict[tuple[int, ...], list[int]] = {}
+        for place, (groups, _, _) in enumerate(blocks):
+            alike.setdefault(tuple(all_sizes[groups].tolist()), []).append(place)
+        found = []
+        for sizes, places in alike.items():
+            starts = np.concatenate([[0], np.cumsum(sizes)])
+            rows = [np.arange(a, b) for a, b in pairwise(starts.tolist())]
+            own = [blocks[place] for place in places]
+            numbers = np.array([each[0] for each in own], dtype=np.int64)
+            residuals, response = np.stack([each[1] for each in own]), np.stack([each[2] for each in own])
+            unit = [units[place] for place in places]
+            conditional = Conditional(residuals, response, rows, self.scales[numbers], unit)
+            for every, choices in zip(numbers, self._sequences(conditional, numbers, most), strict=True):
+                offsets = self.suspects.row_starts[every] - starts[:-1]
+                found += [_among_all(choice, every, offsets) for choice in choices]
+        return found
 
 
 def hides(unit: UnitWeight, scale: float) -> bool:
@@ -179,36 +252,6 @@ def hides(unit: UnitWeight, scale: float) -> bool:
         return False
     critical = _critical_sum(unit.degrees_of_freedom)
     return unit.weighted_sum_of_squares / scale > critical
-
-
-def _bounded(
-    trial: Trial,
-    tests: Tests,
-    unit: UnitWeight,
-    scales: Floats,
-    allowed: Bools,
-    level: Level,
-    out: int,
-    ahead: bool,
-) -> list[Choice]:
-    suspects = trial.suspects
-    limit = level.limit(out)
-    beyond = _beyond(tests, unit, scales, limit)
-    candidates = np.flatnonzero(allowed & beyond)
-    if not candidates.size and ahead:
-        ratio = np.where(allowed, tests.statistic / scales, -math.inf)
-        candidates = np.argsort(-np.nan_to_num(ratio, nan=-math.inf), kind="stable")[:AHEAD]
-        candidates = candidates[allowed[candidates]]
-    found = _on_points(trial, tests, unit, scales, allowed, level, out, candidates, ahead)
-    found.sort(key=lambda choice: (choice.chosen.log_probability, -choice.chosen.statistic, choice.group))
-    load = _Load(suspects, tests)
-    kept = []
-    for choice in found:
-        critical = _critical(unit, choice.chosen.dimension, limit) * scales[choice.group]
-        if load.leaves(choice, critical):
-            load.add(choice)
-            kept.append(choice)
-    return kept
 
 
 def _beyond(tests: Tests, unit: UnitWeight, scales: Floats, limit: float) -> Bools:
@@ -235,42 +278,6 @@ def _critical(unit: UnitWeight, dimension: int, limit: float) -> float:
         return math.inf
     ratio = dimension * critical_fisher(limit, dimension, others) / others
     return unit.weighted_sum_of_squares * ratio / (1 + ratio)
-
-
-def _on_points(
-    trial: Trial,
-    tests: Tests,
-    unit: UnitWeight,
-    scales: Floats,
-    allowed: Bools,
-    level: Level,
-    out: int,
-    candidates: Indices,
-    ahead: bool,
-) -> list[Choice]:
-    """Choose on the point of each candidate; of a candidate without a point, itself."""
-    suspects = trial.suspects
-    first: dict[int, int] = {}
-    for group in candidates.tolist():
-        point = int(suspects.points[group])
-        first.setdefault(point if point >= 0 else -1 - group, group)
-    all_sizes = np.diff(suspects.row_starts)
-    alike: dict[tuple[int, ...], list[tuple[list[int], Floats, Floats]]] = {}
-    for own in trial.blocks(list(first.values())):
-        sizes = tuple(all_sizes[own[0]].tolist())
-        alike.setdefault(sizes, []).append(own)
-    found = []
-    for sizes, blocks in alike.items():
-        starts = np.concatenate([[0], np.cumsum(sizes)])
-        rows = [np.arange(a, b) for a, b in pairwise(starts.tolist())]
-        groups = np.array([own[0] for own in blocks], dtype=np.int64)
-        residuals, response = np.stack([own[1] for own in blocks]), np.stack([own[2] for own in blocks])
-        conditional = Conditional(residuals, response, rows, scales[groups], unit)
-        chosen = _sequences(suspects, conditional, groups, tests, allowed, level, out, ahead, most=ON_POINT)
-        for places, choices in zip(groups, chosen, strict=True):
-            offsets = suspects.row_starts[places] - starts[:-1]
-            found += [_among_all(choice, places, offsets) for choice in choices]
-    return found
 
 
 def _among_all(choice: Choice, places: Indices, offsets: Indices) -> Choice:

@@ -21,8 +21,9 @@ from photogram.statistics.groups import INVISIBLE, GroupTests, group_tests
 
 __all__ = ["Chosen", "Conditional", "UnitWeight"]
 
-SAME = 1e-6
-"""Relative; test values that differ by less are equal, and the order of the input decides."""
+SAME = 1e-3
+"""Relative; logarithms of probabilities that differ by less are equal, and the order of the input decides:
+the images of a point on two photos, but for what an adjustment that ended early has left."""
 
 
 @dataclass(frozen=True)
@@ -108,8 +109,8 @@ class Conditional:
         The rows of each of the K groups.
     scales
         (n, K) what the variances of each group are multiplied by before it is tested (k^2).
-    unit
-        Of all that takes part.
+    units
+        Of all that takes part, for each block.
     """
 
     def __init__(
@@ -118,10 +119,10 @@ class Conditional:
         cofactors: Floats,
         groups: Sequence[Indices],
         scales: Floats,
-        unit: UnitWeight,
+        units: Sequence[UnitWeight],
     ) -> None:
         self.v, self.r, self.scales = np.array(residuals), np.array(cofactors), scales
-        self.units = [unit] * len(self.v)
+        self.units = list(units)
         size = max((len(rows) for rows in groups), default=1)
         self.rows = np.full((len(groups), size), -1)
         for place, rows in enumerate(groups):
@@ -216,7 +217,7 @@ class Conditional:
                     log_probability=float(test.log_probability[i]),
                     fisher=unit.fisher(float(statistic[i]), own[1]),
                     error=test.error[i][there] * math.sqrt(scale[i]),
-                    cofactors=test.cofactors[i][np.ix_(there, there)],
+                    cofactors=test.cofactors[i] if there.all() else test.cofactors[i][np.ix_(there, there)],
                     rivals=tuple(sorted((own for own in near if own[3] < RIVAL), key=lambda own: own[3])),
                 )
             )

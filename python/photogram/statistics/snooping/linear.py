@@ -152,6 +152,10 @@ class LinearTrial:
         rows = [self.suspects.rows(group) for group in groups]
         return [([group], v[own], r[np.ix_(own, own)]) for group, own in zip(groups, rows, strict=True)]
 
+    def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
+        """There are no points."""
+        return []
+
     def resist(self, scale: float) -> Floats:
         """Reweight by Huber's loss, then by Cauchy's (Holland and Welsch 1977)."""
         weights = self._in.astype(np.float64)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.statistics.distributions import LEVEL, log_chi_square, log_fisher
 from photogram.statistics.limits import global_test
 from photogram.statistics.reliability import TESTABLE
-from photogram.statistics.snooping.choosing import Choice, Level, choose
+from photogram.statistics.snooping.choosing import Choice, Choosing, Level
 from photogram.statistics.snooping.conditioning import UnitWeight
 from photogram.statistics.snooping.log import Removal, Rival, Round
 from photogram.statistics.snooping.suspects import (
@@ -166,11 +166,8 @@ class _Snooping:
 
     def _round(self, number: int) -> tuple[list[int], list[int]]:
         standing = self.standing
-        allowed = self._allowed()
         count = sum(each.is_out for each in self.log)
-        choices = choose(
-            self.trial, self.tests, self._unit(), self.scales, allowed, self.level, count, ahead=True
-        )
+        choices = self._choosing(self._allowed(), count, ahead=True).choose()
         remarks: list[str] = []
         # In a large network what went before returns in the adjustment that takes others out.
         returned = [] if self.trial.whole else self._agreeing()
@@ -193,6 +190,18 @@ class _Snooping:
         )
         return removed, returned
 
+    def _choosing(self, allowed: Bools, out: int, *, ahead: bool) -> Choosing:
+        return Choosing(
+            trial=self.trial,
+            tests=self.tests,
+            unit=self._unit(),
+            scales=self.scales,
+            allowed=allowed,
+            level=self.level,
+            out=out,
+            ahead=ahead,
+        )
+
     def _allowed(self) -> Bools:
         allowed = self.suspects.removable & self._testable()
         allowed[list(self.kept)] = False
@@ -200,9 +209,7 @@ class _Snooping:
 
     def _testable(self) -> Bools:
         """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
-        redundancy = np.nan_to_num(self.tests.redundancy)
-        largest = np.maximum.reduceat(redundancy, self.suspects.row_starts[:-1])
-        return np.asarray(self.tests.active & (self.tests.rank > 0) & (largest > TESTABLE))
+        return self.tests.testable(self.suspects.row_starts)
 
     def _scales(self) -> tuple[dict[str, float], Floats]:
         """Return robust factors k by kind where standard deviations are too optimistic, and k^2 by group."""
@@ -250,8 +257,10 @@ class _Snooping:
         many = bool(images.size) and float(np.mean(images > FAR * factor)) > MANY
         return many or (self.settings.known and factor > OPTIMISTIC)
 
-    def _robust_sizes(self) -> tuple[Floats, float]:
+    def _robust_sizes(self) -> tuple[Floats, float] | None:
         """Return the sizes of residuals in a robust adjustment, and the factor of its standard deviations.
+
+        None where no robust adjustment converges.
 
         The median of all is lifted by many gross errors, whose effects spread: the factor is found anew from
         residuals of the robust adjustment, until it stands.
@@ -260,53 +269,48 @@ class _Snooping:
         rows = np.repeat(active, np.diff(self.suspects.row_starts))
         expected = MEDIAN_OF_TWO * math.sqrt(float(np.mean(self.tests.redundancy[rows])))
         scale = max(_factor(self._values(active)), 1.0)
+        sizes = self.trial.resist(scale)
         for _ in range(SCALES):
-            sizes = self.trial.resist(scale)
+            if sizes is None:
+                return None
             found = max(float(np.median(sizes[active])) / expected, 1.0)
             if found > 0.8 * scale:
                 break
             scale = found
-        return sizes, scale
+            sizes = self.trial.resist(scale)
+        return None if sizes is None else (sizes, scale)
 
     def _start_robustly(self) -> None:
-        """Take out what robust weights nearly vanish for; real tests decide on their return."""
+        """Put points aside where robust weights nearly vanish, and test them against all others.
+
+        A robust adjustment tells that something is wrong with a point, but not which of its rays it is: of
+        two rays both lose their weight, and a good one beside a large error often does.
+        """
         suspects = self.suspects
         try:
-            sizes, scale = self._robust_sizes()
+            robust = self._robust_sizes()
         except LostSupportError:
+            robust = None
+        if robust is None:
             self.factors, self.scales = self._scales()
             return
-        far = sizes > CANDIDATE * scale
-        candidates = np.flatnonzero(far & suspects.removable & self.tests.active)
+        sizes, scale = robust
+        candidates = np.flatnonzero((sizes > CANDIDATE * scale) & suspects.removable & self.tests.active)
         first, standing = self.tests, self.standing
-        known = self._unit()
-        entries = []
-        for group in candidates.tolist():
-            rows = suspects.rows(group)
-            statistic, dimension = float(first.statistic[group]), int(first.rank[group])
-            entries.append(
-                self._entry(
-                    group,
-                    rows,
-                    0,
-                    statistic,
-                    statistic,
-                    dimension,
-                    known.fisher(statistic, dimension),
-                    math.nan,
-                    first.error[rows],
-                    first.error_sd[rows],
-                    self.level.limit(0),
-                    (),
-                )
-            )
+        points = np.unique(suspects.points[candidates])
+        choices, judged = self._on_points_aside(points[points >= 0].tolist(), candidates, first)
+        others = candidates[~np.isin(suspects.points[candidates], sorted(judged))]
+        entries = [self._as_it_was(group, first) for group in others.tolist()]
+        entries += self._entries(choices, 0)
+        self.out = Out(np.zeros(len(self.out.rows), dtype=bool))
         removed = self._apply(entries, [])
         if not removed:
             self._adjust(self.out)
-        self.factors, self.scales = self._scales()
+        if not self.factors:
+            self.factors, self.scales = self._scales()
         self.remarks.append(
-            f"many observations disagree: a robust adjustment (Huber, then Cauchy) put {len(removed)}"
-            " groups aside; tests against the others decided which stay out"
+            f"many observations disagree: a robust adjustment (Huber, then Cauchy) put {len(points)} points"
+            " aside; tests against the photos of the others decided which of their rays stay out"
         )
         returned = self._take_back(0)
         self.rounds.append(
@@ -322,9 +326,51 @@ class _Snooping:
             )
         )
 
+    def _on_points_aside(
+        self, points: list[int], candidates: Indices, first: Tests
+    ) -> tuple[list[Choice], set[int]]:
+        """Adjust without some points and all candidates; choose on these points; tell which were judged."""
+        out = Out(np.zeros(len(self.out.rows), dtype=bool), points=set(points))
+        aside = np.isin(self.suspects.points, points)
+        aside[candidates] = True
+        out.rows[np.repeat(aside, np.diff(self.suspects.row_starts))] = True
+        try:
+            self._adjust(out)
+        except LostSupportError:
+            # Photos are not determined without them: what has lost its weight goes, and is tested alone.
+            return [], set()
+        self.factors, self.scales = self._scales()
+        choosing = self._choosing(np.asarray(self.suspects.removable), 0, ahead=False)
+        return replace(choosing, tests=first).on_gone_points(points)
+
+    def _as_it_was(self, group: int, tests: Tests) -> Removal:
+        """Return the entry of a group that goes without a test of its own."""
+        rows = self.suspects.rows(group)
+        statistic, dimension = float(tests.statistic[group]), int(tests.rank[group])
+        return self._entry(
+            group,
+            rows,
+            0,
+            statistic,
+            statistic,
+            dimension,
+            self._unit().fisher(statistic, dimension),
+            math.nan,
+            tests.error[rows],
+            tests.error_sd[rows],
+            self.level.limit(0),
+            (),
+        )
+
     def _take_out(
         self, choices: list[Choice], number: int, remarks: list[str], returning: list[int]
     ) -> list[int]:
+        removed = self._apply(self._entries(choices, number), remarks, returning)
+        self._note_return(returning, number)
+        return removed
+
+    def _entries(self, choices: list[Choice], number: int) -> list[Removal]:
+        """Return what was chosen as entries of the log."""
         entries = []
         for choice in choices:
             own = choice.chosen
@@ -349,9 +395,7 @@ class _Snooping:
                     rivals,
                 )
             )
-        removed = self._apply(entries, remarks, returning)
-        self._note_return(returning, number)
-        return removed
+        return entries
 
     def _note_return(self, places: list[int], number: int) -> None:
         for place in places:

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["LostSupportError", "Out", "Prediction", "Standing", "Suspects", "Tests", "Trial"]
 
@@ -163,6 +164,11 @@ class Tests:
     error: Floats
     error_sd: Floats
 
+    def testable(self, row_starts: Indices) -> Bools:
+        """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
+        largest = np.maximum.reduceat(np.nan_to_num(self.redundancy), row_starts[:-1])
+        return np.asarray(self.active & (self.rank > 0) & (largest > TESTABLE))
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -231,10 +237,18 @@ class Trial(Protocol):
         """Return residuals of unit weight (M,) and R (M, M) of all rows; zero for those that are out."""
         ...
 
-    def resist(self, scale: float) -> Floats:
+    def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
+        """Return, for points that are out, all groups there with residuals and R as if they took part.
+
+        Each point by itself, against what the others determine; empty where that is not known.
+        """
+        ...
+
+    def resist(self, scale: float) -> Floats | None:
         """Adjust robustly, errors beyond some `scale` standard deviations losing weight.
 
-        Returns (G,) the lengths of the residuals of unit weight; zero for what no loss is applied to.
+        Returns (G,) the lengths of the residuals of unit weight, zero for what no loss is applied to; None
+        where that leads nowhere, and nothing has changed.
         """
         ...
 

@@ -68,11 +68,13 @@ impl Stack {
                 }),
             }
             let start = self.parts.len();
-            let width = self.place_parts(layout, symbolic, group as usize);
+            let width =
+                if layout.has_common() { self.place_parts(layout, symbolic, group as usize) } else { 0 };
             self.places.push(Place { parts: start..self.parts.len(), width, rows: common });
             common += depth * rows * width;
         }
-        let further = groups.iter().flat_map(|&group| layout.further_of(group as usize));
+        let with_further = if layout.has_further() { groups } else { &[] };
+        let further = with_further.iter().flat_map(|&group| layout.further_of(group as usize));
         let further = further.map(|&block| symbolic.position(block as usize));
         let home = further.chain(positions.first().map(|&main| main as usize)).min();
         let home = home.map_or(0, |first| symbolic.supernode_of(first));
@@ -120,6 +122,9 @@ impl Stack {
     /// Unites the parts that overlap or meet in one block; each segment takes `depth` rows of the coupling from `start` on.
     fn place_segments(&mut self, symbolic: &Symbolic, home: usize, depth: usize, start: usize) -> usize {
         self.segments.clear();
+        if self.parts.is_empty() {
+            return start;
+        }
         let mut parts: SmallVec<[&Part; 16]> = self.parts.iter().collect();
         parts.sort_unstable_by_key(|part| (part.position, part.unknowns.start));
         for part in parts {

@@ -1,0 +1,64 @@
+"""Draw the pictures of docs/pictures.md: docs/pictures/*.svg.
+
+    python docs/pictures_figures.py
+
+The network is the packaged example of GIANT, the camera that of examples/self_calibration.py; the field of
+residuals is a simulated block whose camera bends a little more than the adjustment knows.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from photogram import Block, Result, adjust, simulate
+from photogram.giant import read_project
+from photogram.plots import figures
+from photogram.show.pictures import drawn
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+from self_calibration import measured
+
+FOLDER = Path(__file__).with_name("pictures")
+
+
+def bent() -> Block:
+    """Return a simulated block with a lens that is not perfect: 20 micrometres in the corners."""
+    block = simulate(
+        strips=6, photos_per_strip=30, points_per_photo=80, position_sd=0.05, image_sd=0.004, seed=1
+    ).block
+    radius = np.hypot(*block.image_xy.T)[:, np.newaxis]
+    return block.replace(image_xy=block.image_xy * (1.0 + 0.02 * radius**2 / 160.0**3))
+
+
+def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
+    """Return adjustments, and which pictures are taken of each."""
+    galveston = adjust(read_project(files("photogram") / "examples" / "galveston").to_block())
+    return {
+        "giant": (galveston, ("network", "redundancy", "tests")),
+        "lens": (adjust(measured()), ("correlations", "distortion")),
+        "bent": (adjust(bent()), ("residuals",)),
+    }
+
+
+def rounded(svg: bytes) -> str:
+    """Return a drawing with hundredths of a point, which nobody sees: a third of the size."""
+    text = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", svg.decode())
+    return "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
+
+
+def main() -> None:
+    """Write the pictures."""
+    FOLDER.mkdir(exist_ok=True)
+    for result, names in results().values():
+        for name, figure in figures(result, names).items():
+            path = FOLDER / f"{name}.svg"
+            path.write_text(rounded(drawn(figure, path)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""Equality of things that hold arrays: the same values, whether or not it is the same thing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+__all__ = ["Valued", "alike"]
+
+
+class Valued:
+    """A data class whose instances are equal where all their fields are; NaN counts as equal to NaN.
+
+    It is declared with `eq=False`, which leaves `==` to this class. Its hash comes from what is cheap to
+    look at: names, kinds and sizes.
+    """
+
+    BESIDE: ClassVar[frozenset[str]] = frozenset()
+    """Fields that do not count: how long something took, and by which way."""
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(alike(getattr(self, name), getattr(other, name)) for name in self._compared())
+
+    def __hash__(self) -> int:
+        found: list[Any] = [type(self).__name__]
+        for name in self._compared():
+            value = getattr(self, name)
+            if isinstance(value, str | bool | None):
+                found.append(value)
+            elif isinstance(value, np.ndarray):
+                found.append(value.shape)
+            elif isinstance(value, Sequence | Mapping):
+                found.append(len(value))
+        return hash(tuple(found))
+
+    def _compared(self) -> list[str]:
+        return [each.name for each in fields(self) if each.name not in self.BESIDE]  # type: ignore[arg-type]
+
+
+def alike(a: object, b: object) -> bool:
+    """Return whether two values are of one kind and equal, down to the elements of arrays in data classes."""
+    if a is b:
+        return True
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return _equal_arrays(np.asarray(a), np.asarray(b))
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, Valued):
+        return a == b
+    if is_dataclass(a) and not isinstance(a, type):
+        return all(alike(getattr(a, each.name), getattr(b, each.name)) for each in fields(a))
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(alike(a[key], b[key]) for key in a)
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and (a == b if _plain(a) else all(map(alike, a, b)))
+    return bool(a == b) or (isinstance(a, float) and a != a and b != b)
+
+
+def _plain(values: Sequence[object]) -> bool:
+    """Whether these are strings, of which there may be many."""
+    return all(type(each) is str for each in values)
+
+
+def _equal_arrays(a: np.ndarray[Any, Any], b: np.ndarray[Any, Any]) -> bool:
+    if a.shape != b.shape or a.dtype.kind != b.dtype.kind:
+        return False
+    return np.array_equal(a, b, equal_nan=a.dtype.kind in "fc")

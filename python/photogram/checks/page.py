@@ -1,0 +1,96 @@
+"""The page of a check: what was found, then what was looked at."""
+
+from __future__ import annotations
+
+from photogram.checks.findings import Check, Finding, Section
+from photogram.results.page.pictures import drawings
+from photogram.show.page import Cell, Column, Fact, Judgement, Lines, Page, Part, Remarks, Row, Table, Text
+from photogram.show.page import Section as Chapter
+
+__all__ = ["check_page"]
+
+MARKS = {"grave": "grave", "look": "to look at"}
+NAMED = 6
+"""Photos and points that a row names."""
+
+
+def check_page(found: Check) -> Page:
+    """Return the report of a check for the browser."""
+    grave, look = len(found.grave), len(found.findings) - len(found.grave)
+    pictures = drawings(found.result) if found.result is not None else {}
+    chapters = [
+        Chapter("findings", "Findings", [_table(found)] if found.findings else [], _INTRO),
+        Chapter("network", "Plan of the network", [pictures["network"]] if pictures else []),
+        *(_chapter(number, section) for number, section in enumerate(found.sections)),
+    ]
+    return Page(
+        what="Check of a network before its adjustment",
+        title=found.title,
+        judgements=[_judgement(grave, look)],
+        advice=_advice(found),
+        highlights=[
+            Fact("Grave", f"{grave}", tone="bad" if grave else ""),
+            Fact("To look at", f"{look}", tone="look" if look else ""),
+        ],
+        sections=chapters,
+    )
+
+
+_INTRO = (
+    "Grave findings make results wrong or impossible; the others deserve a look. A mistake that"
+    " explains others is put"
+    " right before the next step looks, so that each is named once. Nothing was changed in the files."
+)
+
+
+def _judgement(grave: int, look: int) -> Judgement:
+    if grave:
+        others = f", and {look} to look at" if look else ""
+        return Judgement(
+            "Mend it first", f"{grave} grave finding{'s' if grave > 1 else ''}{others}", (), "bad"
+        )
+    if look:
+        return Judgement(
+            "Look first", f"Nothing grave; {look} finding{'s' if look > 1 else ''} to look at", (), "look"
+        )
+    return Judgement("Ready", "Nothing was found that speaks against an adjustment", (), "good")
+
+
+def _advice(found: Check) -> list[str]:
+    if found.grave:
+        first = found.grave[0].text
+        return [
+            first[:1].upper() + first[1:],
+            "Correct the input, and check again: one mistake may hide another.",
+        ]
+    return ["Adjust: `photogram adjust`, or `photogram giant` for a GIANT project."]
+
+
+def _table(found: Check) -> Table:
+    rows: list[Row] = []
+    ordered = sorted(
+        ((section.title, each) for section in found.sections for each in section.findings),
+        key=lambda pair: pair[1].level != "grave",
+    )
+    for title, each in ordered:
+        tone = "bad" if each.level == "grave" else "look"
+        rows.append([Cell(MARKS[each.level], tone=tone), each.text, _named(each), title])  # type: ignore[arg-type]
+    columns = (
+        Column("Level", text=True),
+        Column("Finding", text=True),
+        Column("Photos and points", text=True),
+        Column("Found by", text=True),
+    )
+    return Table("Findings", columns, rows)
+
+
+def _named(each: Finding) -> str:
+    names = [*each.photos, *each.points]
+    return ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+
+
+def _chapter(number: int, section: Section) -> Chapter:
+    parts: list[Part] = [Lines(section.lines)] if section.lines else []
+    told = [f"{MARKS[each.level]}: {each.text}" for each in section.findings]
+    parts.append(Remarks(told) if told else Text("Nothing found."))
+    return Chapter(f"part-{number}", section.title, parts, section.why)

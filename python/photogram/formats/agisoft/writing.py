@@ -1,0 +1,269 @@
+"""From a project to the camera XML of Metashape: sensors, poses, references, and markers of control."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats
+from photogram.errors import InputError
+from photogram.formats.images import to_corner
+from photogram.formats.lenses import lens_of
+from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.project import Frame, Project, Size
+from photogram.network.cameras import Camera
+from photogram.network.observations import Control, Position
+
+__all__ = ["FILE", "cannot_hold", "write"]
+
+FILE = "cameras.xml"
+FLIP = np.diag([1.0, -1.0, -1.0])
+LOCAL = (
+    'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1,AUTHORITY["EPSG","9001"]]]'
+)
+_TERMS = ("f", "cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
+
+
+def cannot_hold(project: Project) -> list[str]:
+    """Return what of a project the file has no place for."""
+    block = project.block
+    marked = _marked(project)
+    ties = int(np.count_nonzero(~marked[block.image_points]))
+    found = ["standard deviations of images, poses and cameras"]
+    if ties:
+        found.append(f"{ties} images of tie points: export BlocksExchange for these")
+    if lost := int(np.count_nonzero(~_posed(project))):
+        found.append(f"{lost} photos without a pose")
+    partly = _known(project) & ~marked
+    if partly.any():
+        found.append(f"{np.count_nonzero(partly)} control points that are not known in all coordinates")
+    if any(isinstance(each, Control) for each in block.observations):
+        found.append("correlations between coordinates of control")
+    others = sum(not isinstance(each, Position | Control) for each in block.observations)
+    if others:
+        found.append(f"{others} observations beside images, control and GNSS")
+    if any(isinstance(each, Position) for each in block.observations):
+        found.append("correlations of GNSS, lever arms, shifts and drifts")
+    if block.mounts:
+        found.append("rigs: photos have their poses")
+    if project.frame.kind in ("topocentric", "geocentric"):
+        found.append("digits: geocentric positions are good to 1e-9 m, degrees of references to 1e-9 m")
+    return found
+
+
+def write(project: Project) -> Mapping[str, bytes]:
+    """Return the file; a topocentric frame is written with its place on the earth.
+
+    Raises
+    ------
+    InputError
+        Cameras that Metashape does not have, pictures of unknown size, geographic coordinates, no poses.
+    """
+    block = project.block
+    if block.geographic:
+        raise InputError("chunks are cartesian: geographic coordinates have no place there")
+    if not _posed(project).any():
+        raise InputError("no photo has a pose, and the file holds nothing but photos with one")
+    world = _world(project.frame)
+    cameras, which = known_cameras(block)
+    sizes = [*project.sizes, *(None for _ in cameras[len(project.sizes) :])]
+    pixels = [*project.pixel_mm, *(None for _ in cameras[len(project.pixel_mm) :])]
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<document version="2.0.0">', '<chunk enabled="true">']
+    lines += [f'<sensors next_id="{len(cameras)}">']
+    for row, (camera, size, pixel) in enumerate(zip(cameras, sizes, pixels, strict=True)):
+        lines += _sensor(row, camera, size, pixel)
+    lines += [
+        "</sensors>",
+        '<components next_id="1" active_id="0">',
+        '<component id="0" label="Component 1">',
+    ]
+    lines += [
+        f"<transform><rotation>{_numbers(world.rotation)}</rotation>"
+        f"<translation>{_numbers(world.translation)}</translation><scale>1.0</scale></transform>",
+        "</component>",
+        "</components>",
+    ]
+    lines += [*_shots(project, world, which), *_markers(project, world)]
+    lines += [f"<reference>{world.text}</reference>", "</chunk>", "</document>", ""]
+    return {FILE: "\n".join(lines).encode()}
+
+
+@dataclass(frozen=True)
+class _World:
+    """Where the chunk, which is the frame of the project, lies: X_world = R X + T; and its references."""
+
+    rotation: Floats
+    translation: Floats
+    text: str
+    crs: str
+    frame: Frame
+
+    def references(self, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
+        """Return positions in the system of references, and standard deviations along its axes."""
+        if self.crs and len(xyz):
+            from photogram.formats.crs import from_frame
+
+            xyz, covariances = from_frame(self.crs, xyz, covariances, self.frame)
+        return xyz, np.sqrt(np.einsum("nii->ni", covariances))
+
+
+def _world(frame: Frame) -> _World:
+    if frame.kind == "cartesian" or (frame.kind == "topocentric" and frame.origin is None):
+        return _World(np.eye(3), np.zeros(3), LOCAL.replace('"', "&quot;"), "", frame)
+    from photogram.formats.crs import GEOCENTRIC, GEOGRAPHIC, east_north_up, from_frame
+
+    rotation, translation = np.eye(3), np.zeros(3)
+    if frame.origin is not None and frame.kind == "topocentric":
+        rotation = east_north_up(frame.origin).T
+        translation = from_frame(GEOCENTRIC, np.zeros((1, 3)), np.zeros((1, 3, 3)), frame)[0][0]
+    return _World(rotation, translation, GEOGRAPHIC, GEOGRAPHIC, frame)
+
+
+def _numbers(values: Floats) -> str:
+    return " ".join(map(repr, values.ravel().tolist()))
+
+
+def _sensor(row: int, camera: Camera, size: Size | None, pixel: float | None) -> list[str]:
+    kind, values = _calibration(camera, size)
+    if size is None:
+        raise InputError(f"the size of the pictures of the camera {camera.title} is not known")
+    extent = f'<resolution width="{size[0]}" height="{size[1]}"/>'
+    lines = [f'<sensor id="{row}" label={quoteattr(camera.title)} type="{kind}">', extent]
+    if pixel is not None:
+        lines += [f'<property name="{name}" value="{pixel!r}"/>' for name in ("pixel_width", "pixel_height")]
+        if "f" in values:
+            lines.append(f'<property name="focal_length" value="{values["f"] * pixel!r}"/>')
+    if values:
+        terms = "".join(f"<{name}>{values[name]!r}</{name}>" for name in _TERMS if name in values)
+        lines += [f'<calibration type="{kind}" class="adjusted">', extent, terms, "</calibration>"]
+    return [*lines, "</sensor>"]
+
+
+def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, float]]:
+    """Return type and parameters of a sensor: none of a spherical one."""
+    if camera.model == "equirectangular":
+        return "spherical", {}
+    if camera.model.startswith("agisoft_"):
+        values = {name: value for name, value in camera.parameters.items() if name not in ("w", "h")}
+        return camera.model.split("_")[1], values
+    lens = lens_of(camera, size)
+    if lens is None or size is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
+        raise InputError(
+            f"the camera {camera.title} has the model {camera.model}, which Metashape does not have"
+        )
+    # p1 belongs to r^2 + 2 x^2 there.
+    return "frame", {
+        "f": lens.fy,
+        "cx": lens.cx - size[0] / 2,
+        "cy": lens.cy - size[1] / 2,
+        "b1": lens.fx - lens.fy,
+        "b2": 0.0,
+        "k1": lens.k1,
+        "k2": lens.k2,
+        "k3": lens.k3,
+        "k4": 0.0,
+        "p1": lens.p2,
+        "p2": lens.p1,
+    }
+
+
+def _posed(project: Project) -> Bools:
+    block = project.block
+    poses = np.hstack([block.photo_positions, block.photo_attitudes])
+    return np.asarray(np.isfinite(poses).all(axis=1))
+
+
+def _shots(project: Project, world: _World, which: list[int]) -> list[str]:
+    block = project.block
+    turns = attitude_matrices(block) @ FLIP
+    given = [each for each in block.observations if isinstance(each, Position)]
+    positions, sd = world.references(
+        np.array([each.observed[:3] for each in given]).reshape(-1, 3),
+        np.array([each.precision for each in given]).reshape(-1, 3, 3),
+    )
+    references = {
+        each.photo: _reference(position, deviation)
+        for each, position, deviation in zip(given, positions, sd, strict=True)
+    }
+    lines = [f'<cameras next_id="{len(block.photo_ids)}" next_group_id="0">']
+    for row in np.flatnonzero(_posed(project)).tolist():
+        name = block.photo_ids[row]
+        transform = np.eye(4)
+        transform[:3, :3], transform[:3, 3] = turns[row], block.photo_positions[row]
+        lines += [
+            f'<camera id="{row}" sensor_id="{which[row]}" component_id="0" label={quoteattr(name)}>',
+            f"<transform>{_numbers(transform)}</transform>",
+            "<orientation>1</orientation>",
+            *([references[name]] if name in references else []),
+            "</camera>",
+        ]
+    return [*lines, "</cameras>"]
+
+
+def _reference(position: Floats, sd: Floats | None) -> str:
+    """Return a reference; without standard deviations it is disabled, a check."""
+    values = dict(zip("xyz", position.tolist(), strict=True))
+    if sd is not None:
+        values |= dict(zip(("sx", "sy", "sz"), sd.tolist(), strict=True))
+    attributes = " ".join(f'{name}="{value!r}"' for name, value in values.items())
+    return f'<reference {attributes} enabled="{"false" if sd is None else "true"}"/>'
+
+
+def _full(project: Project) -> Mapping[str, Control]:
+    """Return control that is observed with correlations."""
+    return {each.point: each for each in project.block.observations if isinstance(each, Control)}
+
+
+def _known(project: Project) -> Bools:
+    """Return which points are control or check points, in some coordinate at least."""
+    block, full = project.block, _full(project)
+    known = np.isfinite(block.point_positions).any(axis=1)
+    return np.asarray(known | np.array([name in full for name in block.point_ids], dtype=bool))
+
+
+def _marked(project: Project) -> Bools:
+    """Return which points are markers: control that is held in all coordinates, and check points."""
+    block, full = project.block, _full(project)
+    known = np.isfinite(block.point_positions).all(axis=1)
+    held = np.isfinite(block.point_sd)
+    correlated = np.array([name in full for name in block.point_ids], dtype=bool)
+    return np.asarray(correlated | (known & (held.all(axis=1) | ~held.any(axis=1))))
+
+
+def _markers(project: Project, world: _World) -> list[str]:
+    block, full = project.block, _full(project)
+    rows = np.flatnonzero(_marked(project)).tolist()
+    if not rows:
+        return []
+    positions, sd = block.point_positions[rows].copy(), block.point_sd[rows]
+    covariances = np.zeros((len(rows), 3, 3))
+    covariances[:, range(3), range(3)] = np.where(np.isfinite(sd), sd, 0.0) ** 2
+    checks: Bools = np.asarray(~np.isfinite(sd).any(axis=1))
+    for k, row in enumerate(rows):
+        if (each := full.get(block.point_ids[row])) is not None:
+            positions[k], covariances[k], checks[k] = each.observed, each.precision, False
+    positions, deviations = world.references(positions, covariances)
+    lines = [f'<markers next_id="{len(rows)}" next_group_id="0">']
+    for k, row in enumerate(rows):
+        reference = _reference(positions[k], None if checks[k] else deviations[k])
+        lines.append(f'<marker id="{k}" label={quoteattr(block.point_ids[row])}>{reference}</marker>')
+    return [*lines, "</markers>", *_locations(project, {row: k for k, row in enumerate(rows)})]
+
+
+def _locations(project: Project, markers: Mapping[int, int]) -> list[str]:
+    block, corner = project.block, to_corner(project).tolist()
+    posed = _posed(project)
+    images: dict[int, list[str]] = {k: [] for k in markers.values()}
+    for photo, point, (x, y) in zip(
+        block.image_photos.tolist(), block.image_points.tolist(), corner, strict=True
+    ):
+        if point in markers and posed[photo]:
+            images[markers[point]].append(
+                f'<location camera_id="{photo}" pinned="true" x="{x!r}" y="{y!r}"/>'
+            )
+    lines = ['<frames next_id="1">', '<frame id="0">', "<markers>"]
+    lines += [f'<marker marker_id="{k}">{"".join(own)}</marker>' for k, own in images.items()]
+    return [*lines, "</markers>", "</frame>", "</frames>"]

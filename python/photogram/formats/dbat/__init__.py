@@ -1,0 +1,58 @@
+"""PhotoModeler and DBAT: export files, scripts and tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from photogram.formats.dbat.content import project_of
+from photogram.formats.dbat.export import is_export, read_export
+from photogram.formats.dbat.folder import is_folder, is_measurements, read_folder, read_measurements
+from photogram.formats.dbat.script import read_script
+from photogram.formats.format import Format, Wishes
+from photogram.formats.project import Project
+from photogram.formats.xml_stream import root_of
+
+__all__ = ["FORMAT"]
+
+_EXPORTS = "*-pmexport.txt"
+
+
+def _the_export(path: Path) -> Path | None:
+    """Return the only export file of a folder."""
+    found = sorted(path.glob(_EXPORTS))
+    return found[0] if len(found) == 1 else None
+
+
+def _is_script(path: Path) -> bool:
+    root, attributes = root_of(path)
+    return root == "document" and "dbat_script_version" in attributes
+
+
+def _recognises(path: Path) -> bool:
+    if path.is_dir():
+        return is_folder(path) or _the_export(path) is not None
+    return _is_script(path) or is_export(path) or is_measurements(path)
+
+
+def read(path: Path, wishes: Wishes) -> Project:
+    """Read an export file of PhotoModeler, its tables of measurements, a script of DBAT or its tables.
+
+    Raises
+    ------
+    InputError
+        Files at fault.
+    """
+    if path.is_dir() and not is_folder(path):
+        path = _the_export(path) or path
+    if path.is_dir():
+        content = read_folder(path, wishes)
+    elif path.suffix.lower() == ".xml":
+        content = read_script(path, wishes)
+    elif is_measurements(path):
+        content = read_measurements(path, wishes)
+    else:
+        content = read_export(path, wishes)
+    return project_of(content, wishes)
+
+
+FORMAT = Format(name="dbat", title="PhotoModeler or DBAT block", recognises=_recognises, read=read)

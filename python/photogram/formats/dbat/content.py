@@ -1,0 +1,239 @@
+"""What files of PhotoModeler and DBAT hold, and the project that it makes.
+
+Pixels count from the upper-left corner, columns to the right and rows down. Cameras are backward in
+millimetres, y up: (column h - px, py - row h) with the terms of the lens added is -c u/w. Here they count
+from the middle of the picture, in square pixels of the height of a row; what differs along columns is an
+affinity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.format import Wishes
+from photogram.formats.project import Options, Project, Size, assembled
+from photogram.messages import Message, listed
+from photogram.network.attitudes import Attitudes
+from photogram.network.cameras import Camera
+
+__all__ = ["Content", "Sensor", "project_of", "sensor_of", "sensors_of_table"]
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A camera, with the size of its pictures and the side of its pixels in millimetres."""
+
+    camera: Camera
+    size: Size
+    pixel: float
+
+    def images(self, pixels: Floats) -> Floats:
+        """Return (m, 2) millimetres from the middle of the picture, y up, of columns and rows."""
+        width, height = self.size
+        found: Floats = (pixels - [width / 2, height / 2]) * [self.pixel, -self.pixel]
+        return found
+
+
+def sensor_of(
+    name: str,
+    size: Size,
+    sides: tuple[float, float],
+    principal: tuple[float, float, float],
+    terms: dict[str, float],
+    skew: float = 0.0,
+) -> Sensor:
+    """Return a camera as PhotoModeler and DBAT describe it.
+
+    Parameters
+    ----------
+    name
+        Of the camera.
+    size
+        Of its pictures.
+    sides
+        Width and height of a pixel, mm.
+    principal
+        c, and the principal point from the upper-left corner, to the right and down; mm.
+    terms
+        K1, K2, K3, P1, P2 in powers of millimetres.
+    skew
+        Shear.
+    """
+    across, down = sides
+    c, px, py = principal
+    affinity = across / down - 1
+    width, height = size
+    parameters = {
+        "c": -c,
+        "xp": px / (1 + affinity) - width / 2 * down,
+        "yp": height / 2 * down - py,
+        "b1": affinity,
+        "b2": skew,
+        **terms,
+    }
+    return Sensor(Camera("brown", parameters, name=name), size, down)
+
+
+def sensors_of_table(
+    cameras: Sequence[Camera], sizes: Sequence[Size | None], pixels: Sequence[float | None], path: Path
+) -> dict[str, Sensor]:
+    """Return the cameras of a table of the plain project, by their names.
+
+    Raises
+    ------
+    InputError
+        A camera without the size of its pictures and pixels.
+    """
+    found = {}
+    for camera, size, pixel in zip(cameras, sizes, pixels, strict=True):
+        if size is None or pixel is None or camera.image_y != "up":
+            raise InputError(
+                f"the camera {camera.title} needs c, width, height and pixel_mm: measurements are in pixels,"
+                " its lens in mm",
+                file=path,
+            )
+        found[camera.name] = Sensor(camera, size, pixel)
+    return found
+
+
+@dataclass
+class Content:
+    """What the files hold: photos and points are known by their numbers.
+
+    Attributes
+    ----------
+    path, title
+        What was read, and what it is.
+    sensors
+        The cameras by name.
+    photos, cameras
+        Name and camera of each photo.
+    poses
+        Centre, and omega, phi, kappa in radians.
+    control
+        Position and standard deviations of control points.
+    checks, starts
+        Positions of check points, and of others as they were computed before.
+    image_photos, image_points
+        Of each measurement.
+    pixels, image_sd
+        (m, 2) columns and rows from the corner, and their standard deviations; NaN where none is said.
+    held
+        Photos whose pose is held.
+    free
+        Parameters of cameras that are unknown.
+    """
+
+    path: Path
+    title: str
+    sensors: dict[str, Sensor] = field(default_factory=dict)
+    photos: dict[int, str] = field(default_factory=dict)
+    cameras: dict[int, str] = field(default_factory=dict)
+    poses: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
+    control: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
+    checks: dict[int, Floats] = field(default_factory=dict)
+    starts: dict[int, Floats] = field(default_factory=dict)
+    image_photos: list[int] = field(default_factory=list)
+    image_points: list[int] = field(default_factory=list)
+    pixels: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    image_sd: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    held: set[int] = field(default_factory=set)
+    free: set[str] = field(default_factory=set)
+    options: Options = field(default_factory=Options)
+    lacks: list[str] = field(default_factory=list)
+    messages: list[Message] = field(default_factory=list)
+
+
+def project_of(content: Content, wishes: Wishes) -> Project:
+    """Return the project; standard deviations of measurements that a user gives are in pixels, as these.
+
+    Raises
+    ------
+    InputError
+        It has no measurements.
+    """
+    if not content.image_photos:
+        raise InputError("has no measurements in photos", file=content.path)
+    order = {number: row for row, number in enumerate(content.photos)}
+    centres, matrices = np.full((len(order), 3), np.nan), np.full((len(order), 3, 3), np.nan)
+    posed = [number for number in order if number in content.poses]
+    if posed:
+        rows = [order[number] for number in posed]
+        centres[rows] = [content.poses[number][0] for number in posed]
+        angles = np.array([content.poses[number][1] for number in posed])
+        matrices[rows] = Attitudes.of("omega_phi_kappa", angles).matrices
+    points = list(dict.fromkeys([*content.image_points, *content.control, *content.checks]))
+    places = {number: row for row, number in enumerate(points)}
+    starts, positions = np.full((len(points), 3), np.nan), np.full((len(points), 3), np.nan)
+    sd = np.full((len(points), 3), np.inf)
+    for number, position in content.starts.items():
+        if number in places:
+            starts[places[number]] = position
+    for number, position in content.checks.items():
+        starts[places[number]] = positions[places[number]] = position
+    for number, (position, deviations) in content.control.items():
+        starts[places[number]] = positions[places[number]] = position
+        sd[places[number]] = deviations
+    sensors = list(content.sensors.values())
+    names = list(content.sensors)
+    photo_cameras = np.array([names.index(content.cameras[number]) for number in order])
+    image_photos = np.array([order[number] for number in content.image_photos], dtype=np.int64)
+    of_images = photo_cameras[image_photos]
+    xy, image_sd = content.pixels.copy(), content.image_sd.copy()
+    if "images" in wishes.sd:
+        image_sd[:] = wishes.sd["images"]
+    for row, sensor in enumerate(sensors):
+        own = of_images == row
+        xy[own] = sensor.images(content.pixels[own])
+        image_sd[own] *= sensor.pixel
+    lacks = list(content.lacks)
+    if (missing := np.isnan(image_sd)).any():
+        assumed = np.array([sensor.pixel for sensor in sensors])[of_images]
+        image_sd = np.where(missing, assumed[:, np.newaxis], image_sd)
+        lacks.append("no standard deviations of image coordinates: 1 pixel is assumed (--sd images=..)")
+    held = np.where([number in content.held for number in order], 0.0, np.inf)[:, np.newaxis] * np.ones(3)
+    free = dict.fromkeys(content.free, np.inf)
+    return assembled(
+        path=content.path,
+        title=content.title,
+        cameras=[each.camera.replace(sd=free) if free else each.camera for each in sensors],
+        sizes=[each.size for each in sensors],
+        pixel_mm=[each.pixel for each in sensors],
+        photo_ids=_names(content),
+        photo_cameras=photo_cameras,
+        centres=centres,
+        matrices=matrices,
+        photo_position_sd=held,
+        photo_attitude_sd=held,
+        point_ids=[str(number) for number in points],
+        starts=starts,
+        point_positions=positions,
+        point_sd=sd,
+        image_photos=image_photos,
+        image_points=np.array([places[number] for number in content.image_points], dtype=np.int64),
+        image_xy=xy,
+        image_sd=image_sd,
+        options=content.options,
+        lacks=lacks,
+        messages=content.messages,
+    ).replace(sd_taken=True)
+
+
+def _names(content: Content) -> list[str]:
+    """Return the names of photos: those of their files, with folders where they are needed to tell them."""
+    whole = [name.replace("\\", "/").strip() for name in content.photos.values()]
+    short = [name.rpartition("/")[2] for name in whole]
+    if all(short) and len(set(short)) == len(short):
+        return short
+    if all(whole) and len(set(whole)) == len(whole):
+        return whole
+    content.messages.append(
+        Message(f"photos have their numbers as names: {listed(sorted(set(short)), 3)} do not tell them apart")
+    )
+    return [str(number) for number in content.photos]

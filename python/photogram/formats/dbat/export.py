@@ -1,0 +1,215 @@
+"""The export file of PhotoModeler (`NAME-pmexport.txt`): cameras, poses, control, points and measurements.
+
+Lines 1 to 5 are a title; tolerance, iterations and the size of the pictures; nine standard deviations; the
+camera `c px py width height K1 K2 K3 P1 P2` in mm, and its standard deviations. Six lines a photo follow,
+then control, points and measurements, each list ended by an empty line; what comes after is not read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.cards import Card
+from photogram.formats.dbat.content import Content, Sensor, sensor_of
+from photogram.formats.format import Wishes
+from photogram.formats.project import Size
+from photogram.io.files import read_lines
+from photogram.io.numbers import whole_number
+from photogram.io.places import Place
+from photogram.messages import Message
+
+__all__ = ["TITLE", "is_export", "read_export"]
+
+TITLE = "PhotoModeler export"
+_HEAD = (2, 9, 10, 10)
+"""Numbers of lines 2 to 5, at least."""
+_PHOTO = ("centre and angles", "standard deviations", "covariances", "camera", "standard deviations of it")
+_CAMERA = "c px py width height K1 K2 K3 P1 P2"
+
+
+def is_export(path: Path) -> bool:
+    """Whether a file begins as an export does: a title, and four lines of so many numbers."""
+    try:
+        with path.open("rb") as file:
+            lines = file.read(4096).decode("latin-1").splitlines()
+    except OSError:
+        return False
+    if len(lines) < 5 or "," in "".join(lines[1:5]):
+        return False
+    counts = [len(line.split()) for line in lines[1:5]]
+    return (
+        counts[0] in (2, 4)
+        and all(count >= least for count, least in zip(counts, _HEAD, strict=True))
+        and all(_is_number(word) for line in lines[1:5] for word in line.split())
+    )
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+class _Lines:
+    """The lines of the file, one after the other."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self._lines, self._next = path, read_lines(path), 0
+
+    def take(self, what: str) -> Card:
+        """Return the next line."""
+        if self._next >= len(self._lines):
+            raise InputError(f"ends before {what}", file=self.path, record=self._next)
+        self._next += 1
+        return Card(Place(self.path, self._next, self._lines[self._next - 1]))
+
+    def until_empty(self) -> Iterator[Card]:
+        """Yield lines up to an empty one, or the end."""
+        while self._next < len(self._lines):
+            card = self.take("")
+            if not card.words:
+                return
+            yield card
+
+
+def read_export(path: Path, wishes: Wishes) -> Content:
+    """Read an export file.
+
+    Raises
+    ------
+    InputError
+        Lines that hold something else, photos and points that are there twice or not at all.
+    """
+    lines = _Lines(path)
+    content = Content(path, TITLE)
+    lines.take("the title")
+    size = _size(lines.take("tolerance and iterations"))
+    lines.take("nine standard deviations")
+    default = lines.take("the camera")
+    lines.take("standard deviations of the camera")
+    cameras = _Cameras(content, default, _sensor(default, 0, "camera", size), size)
+    for card in lines.until_empty():
+        _photo(card, lines, cameras)
+    _control(lines, content, wishes)
+    for card in lines.until_empty():
+        content.starts[_number(card, 0)] = card.numbers(1, "X Y Z")
+    _measurements(lines, content)
+    return content
+
+
+def _number(card: Card, index: int) -> int:
+    if index >= len(card.words):
+        raise card.place.error("ends before a number of a photo or point")
+    try:
+        return whole_number(card.words[index], highest=2**53)
+    except ValueError as error:
+        raise card.place.error(str(error)) from None
+
+
+def _size(card: Card) -> Size:
+    if len(card.words) < 4:
+        raise card.place.error(
+            "does not say how many pixels the pictures have: write their width and height behind the number"
+            " of iterations"
+        )
+    width, height = (_number(card, k) for k in (2, 3))
+    if not (0 < width < 2**31 and 0 < height < 2**31):
+        raise card.place.error(f"pictures of {width} x {height} pixels")
+    return width, height
+
+
+def _sensor(card: Card, first: int, name: str, size: Size) -> Sensor:
+    c, px, py, width, height, *terms = card.numbers(first, _CAMERA).tolist()
+    sides = width / size[0], height / size[1]
+    if not (c > 0 and min(sides) > 1e-5 and max(sides) < 1 and 0.5 < sides[0] / sides[1] < 2):
+        raise card.place.error(
+            f"a principal distance of {c:g} mm and pixels of {sides[0]:.3g} x {sides[1]:.3g} mm cannot be"
+        )
+    try:
+        return sensor_of(
+            name, size, sides, (c, px, py), dict(zip(("K1", "K2", "K3", "P1", "P2"), terms, strict=True))
+        )
+    except InputError as error:
+        raise card.place.error(error.message) from None
+
+
+@dataclass
+class _Cameras:
+    """The camera of the head, and those of photos that differ from it."""
+
+    content: Content
+    head: Card
+    common: Sensor
+    size: Size
+    others: dict[tuple[str, ...], str] = field(default_factory=dict)
+
+    def name_of(self, number: int, card: Card) -> str:
+        """Return the name of a photo's camera: that of the head, printed to fewer digits, as a rule."""
+        given, own = self.head.numbers(0, _CAMERA), card.numbers(1, _CAMERA)
+        words = tuple(card.words[1:11])
+        last = [10.0 ** -len(word.partition(".")[2].lower().partition("e")[0]) for word in words]
+        if (np.abs(given - own) <= np.array(last)).all():
+            self.content.sensors.setdefault("camera", self.common)
+            return "camera"
+        if words not in self.others:
+            name = self.others[words] = f"camera of photo {number}"
+            self.content.sensors[name] = _sensor(card, 1, name, self.size)
+            text = f"photo {number} has another camera than the head: {' '.join(words)}"
+            self.content.messages.append(Message(text, card.place.file))
+        return self.others[words]
+
+
+def _photo(head: Card, lines: _Lines, cameras: _Cameras) -> None:
+    number, content = _number(head, 0), cameras.content
+    if number in content.photos:
+        raise head.place.error(f"the photo {number} is there twice")
+    pose, _, _, camera, _ = (lines.take(f"the {what} of photo {number}") for what in _PHOTO)
+    for card in (pose, camera):
+        if _number(card, 0) != number:
+            raise card.place.error(f"is of photo {card.words[0]}, not of {number}")
+    content.photos[number] = (head.place.text or "").split(None, 1)[1] if len(head.words) > 1 else ""
+    kappa, phi, omega = np.radians(pose.numbers(4, "kappa phi omega")).tolist()
+    content.poses[number] = pose.numbers(1, "X Y Z"), np.array([omega, phi, kappa])
+    content.cameras[number] = cameras.name_of(number, camera)
+
+
+def _control(lines: _Lines, content: Content, wishes: Wishes) -> None:
+    given = wishes.sd.get("control")
+    for card in lines.until_empty():
+        number = _number(card, 0)
+        if number in content.control:
+            raise card.place.error(f"the control point {number} is there twice")
+        sd: Floats = card.numbers(4, "sx sy sz") if given is None else np.broadcast_to(given, 3)
+        if (sd < 0).any():
+            raise card.place.error("a standard deviation is negative: not computed; --sd control=.. gives it")
+        content.control[number] = card.numbers(1, "X Y Z"), sd
+    if content.control:
+        content.messages.append(
+            Message(
+                "positions and standard deviations of control are those after PhotoModeler's own adjustment;"
+                " --control FILE gives them as they were surveyed",
+                content.path,
+            )
+        )
+
+
+def _measurements(lines: _Lines, content: Content) -> None:
+    pixels, sd = [], []
+    for card in lines.until_empty():
+        photo = _number(card, 0)
+        if photo not in content.photos:
+            raise card.place.error(f"there is no photo {photo}")
+        content.image_photos.append(photo)
+        content.image_points.append(_number(card, 1))
+        pixels.append(card.numbers(2, "x y"))
+        own = card.numbers(4, "sx sy") if len(card.words) >= 6 else np.full(2, np.nan)
+        sd.append(np.where(own > 0, own, np.nan))
+    content.pixels, content.image_sd = np.array(pixels).reshape(-1, 2), np.array(sd).reshape(-1, 2)

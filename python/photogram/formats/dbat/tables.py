@@ -1,0 +1,207 @@
+"""Tables of DBAT: commas, `#` comments, columns by a comment or by the script that names them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.formats.dbat.content import Content
+from photogram.io.delimited import ColumnTable, read_columns, read_rows
+from photogram.io.numbers import whole_number
+
+__all__ = ["take_images", "take_photos", "take_points", "take_poses", "titled", "untitled"]
+
+_KNOWN = {
+    "image": "im",
+    "photo": "im",
+    "frame": "im",
+    "name": "label",
+    "camera": "cam",
+    "sigmax": "sx",
+    "sigmay": "sy",
+    "sigmaz": "sz",
+}
+_COLUMNS = ("id", "im", "cam", "path", "label", "x", "y", "z", "omega", "phi", "kappa")
+_DEVIATIONS = ("sx", "sy", "sz", "sxy", "sxyz")
+_NUMBERS = frozenset({"x", "y", "z", "omega", "phi", "kappa", *_DEVIATIONS})
+_RADIANS = {"degrees": math.pi / 180, "deg": math.pi / 180, "radians": 1.0, "rad": 1.0, "gon": math.pi / 200}
+
+
+def _spelled(column: str) -> str:
+    own = column.partition("(")[0].strip()
+    return _KNOWN.get(own, own)
+
+
+def titled(path: Path) -> ColumnTable:
+    """Read a table whose header stands in a comment, `# id, image, x, y`."""
+    return read_columns(path, known=(*_COLUMNS, *_DEVIATIONS), numbers=_NUMBERS, spelling=_spelled)
+
+
+def untitled(path: Path, columns: Sequence[str]) -> ColumnTable:
+    """Read a table whose columns a script names."""
+    return read_rows(path, [_spelled(column.strip().lower()) for column in columns], numbers=_NUMBERS)
+
+
+def _whole(table: ColumnTable, column: str) -> list[int]:
+    found, known = [], dict[str, int]()
+    for row, text in enumerate(table.texts(column)):
+        if text not in known:
+            try:
+                known[text] = whole_number(text, highest=2**53)
+            except ValueError as error:
+                raise table.error(row, f"column {column}: {error}") from None
+        found.append(known[text])
+    return found
+
+
+def _filled(table: ColumnTable, *columns: str) -> Floats:
+    """Return (rows, k) numbers of which none may be missing."""
+    found = np.stack([table.numbers(column) for column in columns], axis=1)
+    if np.isnan(found).any():
+        row, k = np.argwhere(np.isnan(found))[0].tolist()
+        raise table.error(row, f"column {columns[k]}: is empty")
+    return found
+
+
+def _once(table: ColumnTable, numbers: Sequence[int], kind: str) -> None:
+    seen: dict[int, int] = {}
+    for row, number in enumerate(numbers):
+        if seen.setdefault(number, row) != row:
+            raise table.error(row, f"the {kind} {number} is there already, in {table.records[seen[number]]}")
+
+
+def take_photos(table: ColumnTable, content: Content) -> None:
+    """Take photos: numbers, paths and cameras, the only one where there is no column.
+
+    Raises
+    ------
+    InputError
+        Photos that are there twice, cameras that are not there.
+    """
+    table.require("id", "path")
+    numbers = _whole(table, "id")
+    _once(table, numbers, "photo")
+    known = list(content.sensors)
+    if "cam" not in table and len(known) > 1:
+        raise table.head.error(f"no column says which of {len(known)} cameras took a photo")
+    for row, (number, path, camera) in enumerate(
+        zip(
+            numbers, table.texts("path"), table.texts("cam", known[0] if len(known) == 1 else ""), strict=True
+        )
+    ):
+        if camera not in content.sensors:
+            raise table.error(row, f"there is no camera {camera!r}, but {', '.join(known)}")
+        content.photos[number], content.cameras[number] = path, camera
+
+
+def take_poses(table: ColumnTable, content: Content, unit: str = "degrees") -> None:
+    """Take centres and angles omega, phi, kappa.
+
+    Raises
+    ------
+    InputError
+        Photos that are not there or twice, a unit that is not known.
+    """
+    if unit not in _RADIANS:
+        raise table.head.error(f"angles in {unit!r}: {', '.join(_RADIANS)} are read")
+    table.require("id", "x", "y", "z", "omega", "phi", "kappa")
+    numbers = _whole(table, "id")
+    _once(table, numbers, "photo")
+    centres = _filled(table, "x", "y", "z")
+    angles = _filled(table, "omega", "phi", "kappa") * _RADIANS[unit]
+    for row, number in enumerate(numbers):
+        if number not in content.photos:
+            raise table.error(row, f"there is no photo {number}")
+        content.poses[number] = centres[row], angles[row]
+
+
+def take_points(
+    table: ColumnTable,
+    content: Content,
+    sd: Sequence[float] | None,
+    *,
+    check: bool = False,
+    wanted: Callable[[int], bool] = lambda _: True,
+) -> None:
+    """Take control or check points.
+
+    Parameters
+    ----------
+    table
+        The table.
+    content
+        Where they go.
+    sd
+        Standard deviations that a user gives; None: those of the table, none where it has no column.
+    check
+        Whether they are check points.
+    wanted
+        Which of them.
+
+    Raises
+    ------
+    InputError
+        Points that are there twice, negative standard deviations.
+    """
+    table.require("id", "x", "y", "z")
+    numbers = _whole(table, "id")
+    _once(table, numbers, "point")
+    positions = _filled(table, "x", "y", "z")
+    deviations = _deviations(table, ("sx", "sy", "sz"), "sxyz")
+    if sd is not None:
+        deviations = np.broadcast_to(sd, deviations.shape)
+    elif np.isnan(deviations).all() and not check:
+        content.lacks.append(
+            f"{table.path.name} has no standard deviations: control is held (--sd control=..)"
+        )
+    for row, number in enumerate(numbers):
+        if wanted(number):
+            if check:
+                content.checks[number] = positions[row]
+            else:
+                content.control[number] = positions[row], np.nan_to_num(deviations[row])
+
+
+def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floats:
+    """Return (rows, k) standard deviations; NaN without."""
+    whole = table.numbers(common) if common in table else np.full(table.count, math.nan)
+    flat = table.numbers("sxy") if "sxy" in table else whole
+    defaults = (flat, flat, whole)
+    found = np.stack(
+        [
+            np.where(np.isnan(own := table.numbers(column)), default, own)
+            for column, default in zip(columns, defaults, strict=False)
+        ],
+        axis=1,
+    )
+    if (found < 0).any():
+        raise table.error(int(np.argwhere(found < 0)[0][0]), "a standard deviation is negative")
+    return found
+
+
+def take_images(table: ColumnTable, content: Content, sd: float = math.nan) -> None:
+    """Take measurements; `sd` is their standard deviation in pixels, where the table has none.
+
+    Raises
+    ------
+    InputError
+        Photos that are not there, standard deviations that are not positive.
+    """
+    table.require("id", "im", "x", "y")
+    photos = _whole(table, "im")
+    if (
+        bad := next((row for row, number in enumerate(photos) if number not in content.photos), None)
+    ) is not None:
+        raise table.error(bad, f"there is no photo {photos[bad]}")
+    own = _deviations(table, ("sx", "sy"), "sxy")
+    own = np.where(np.isnan(own), sd, own)
+    if (own == 0).any():
+        raise table.error(int(np.argwhere(own == 0)[0][0]), "a standard deviation is 0")
+    content.image_photos += photos
+    content.image_points += _whole(table, "id")
+    content.pixels = np.vstack([content.pixels, _filled(table, "x", "y")])
+    content.image_sd = np.vstack([content.image_sd, own])

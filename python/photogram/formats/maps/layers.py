@@ -1,0 +1,384 @@
+"""The layers of a map of a result: geometries with their attributes, as data frames of geopandas."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.formats.crs import amid, enu_origin, has_place
+from photogram.formats.placing import Placed, frame_of, placed
+from photogram.results.ellipses import CONFIDENCE, ellipses, fitting_scale
+from photogram.results.findings import axes
+from photogram.results.footprints import footprints
+from photogram.results.result import Result
+from photogram.statistics.limits import normal_limit
+from photogram.statistics.reliability import TESTABLE
+
+if TYPE_CHECKING:
+    import geopandas
+
+__all__ = ["Layer", "chosen_crs", "map_layers"]
+
+SUSPICIOUS = 3.0
+"""Test values beyond are on the map."""
+_ANGLES = ("omega", "phi", "kappa")
+_LOCAL = ("e", "n", "u")
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """A layer.
+
+    Attributes
+    ----------
+    name
+        What it is: `photos`, `footprints`, `points`, `point_ellipses`, `control`, `control_residuals`,
+        `check_residuals` or `suspicious`.
+    title
+        The same with the scale at which it is drawn, if it has one: `point_ellipses_x200`.
+    description
+        In a sentence.
+    table
+        Geometries and attributes; its `crs` is that of the map, None where the place is not known.
+    """
+
+    name: str
+    title: str
+    description: str
+    table: geopandas.GeoDataFrame
+
+
+def chosen_crs(result: Result) -> str:
+    """Return the system of a map for which none was asked: that of the frame, or UTM (WGS 84) around it.
+
+    Empty where nothing says where on the earth the frame is, or lengths are not metres.
+    """
+    block, frame = result.block, frame_of(result.block)
+    if not has_place(frame) or block.linear_unit != "m":
+        return ""
+    if frame.kind == "cartesian":
+        return frame.crs
+    geographic = placed_middle(result)
+    zone = int((geographic[1] + 180.0) // 6.0) % 60 + 1
+    return f"EPSG:{(32600 if geographic[0] >= 0 else 32700) + zone}"
+
+
+def placed_middle(result: Result) -> tuple[float, float, float]:
+    """Return latitude, longitude and height amid the stations."""
+    from photogram.formats.crs import to_system
+
+    earth, _ = to_system("EPSG:4978", result.photo_positions, frame_of(result.block))
+    return amid("EPSG:4978", earth)
+
+
+def map_layers(
+    result: Result,
+    crs: str | None = None,
+    *,
+    scale: float | None = None,
+    confidence: float = CONFIDENCE,
+    sizes: Sequence[tuple[float, float] | None] = (),
+) -> list[Layer]:
+    """Return the layers of a map.
+
+    Parameters
+    ----------
+    result
+        The result of a block.
+    crs
+        The coordinate reference system of the map. None: that of the frame, or the zone of UTM (WGS 84)
+        around it; where nothing says where on the earth the frame is, coordinates stay as they are and the
+        layers have no system.
+    scale
+        By how much error ellipses and residuals are magnified. None: a round number at which they are seen.
+    confidence
+        Of the error ellipses.
+    sizes
+        Width and height of the pictures of each camera in the unit of image coordinates; without them
+        footprints reach as far as measurements do.
+
+    Raises
+    ------
+    InputError
+        A system that does not go.
+    ModuleNotFoundError
+        geopandas is not installed.
+    """
+    import geopandas
+
+    found = placed(result, chosen_crs(result) if crs is None else crs)
+    own = ellipses(found.point_covariances, confidence)
+    if scale is None:
+        # Sizes in metres beside places in degrees: the spacing is that of the block's own stations.
+        scale = fitting_scale(own, _metric_places(found))
+    parts = [
+        ("photos", "adjusted stations with standard deviations, metres", *_photos(found)),
+        (
+            "footprints",
+            "what photos show of the ground, at the median height of their points",
+            *_footprints(found, sizes),
+        ),
+        ("points", "adjusted points with standard deviations, metres", *_points(found)),
+        (
+            "point_ellipses",
+            f"error ellipses ({100 * confidence:g} %) of points, magnified {scale:g} times",
+            *_ellipses(found, confidence, scale),
+        ),
+        ("control", "control as it was given, residuals observed minus adjusted, metres", *_control(found)),
+        (
+            "control_residuals",
+            f"from given to adjusted places of control, magnified {scale:g} times",
+            *_vectors(found, *_given(found, found.residuals(), -1.0), scale),
+        ),
+        (
+            "check_residuals",
+            f"from supplied to adjusted places of check points, magnified {scale:g} times",
+            *_vectors(found, *_given(found, found.differences(), 1.0), scale),
+        ),
+        (
+            "suspicious",
+            f"observations with a test value beyond {SUSPICIOUS:g}, at the place of their point or photo",
+            *_suspicious(found),
+        ),
+    ]
+    system = None if not found.crs or enu_origin(found.crs) is not None else found.crs
+    layers = []
+    for name, description, geometries, columns in parts:
+        scaled = name in ("point_ellipses", "control_residuals", "check_residuals")
+        table = geopandas.GeoDataFrame(dict(columns), geometry=list(geometries), crs=system)
+        layers.append(Layer(name, f"{name}_x{scale:g}" if scaled else name, description, table))
+    return layers
+
+
+_Part = tuple[Any, Mapping[str, Any]]
+"""Geometries and columns."""
+
+
+def _photos(found: Placed) -> _Part:
+    import shapely
+
+    result, block = found.result, found.result.block
+    angles, deviations = (np.degrees(each) for each in found.angles())
+    own = block.image_photos[result.used_images]
+    squares = np.sum(result.residuals[result.used_images] ** 2, axis=1)
+    images = np.bincount(own, minlength=len(block.photo_ids))
+    with np.errstate(invalid="ignore"):
+        rms = np.sqrt(np.bincount(own, squares, len(block.photo_ids)) / (2 * images))
+    cameras = (
+        {} if block.photo_cameras is None else {"camera": np.array(block.camera_names)[block.photo_cameras]}
+    )
+    return shapely.points(found.photos), {
+        "photo": block.photo_ids,
+        **cameras,
+        **_deviations(found.photo_covariances),
+        **{f"{name}_deg": column for name, column in zip(_ANGLES, angles.T, strict=True)},
+        **{f"sd_{name}_deg": column for name, column in zip(_ANGLES, deviations.T, strict=True)},
+        "images": images,
+        f"rms_{block.image_unit}": rms,
+    }
+
+
+def _footprints(found: Placed, sizes: Sequence[tuple[float, float] | None]) -> _Part:
+    import shapely
+
+    result, block = found.result, found.result.block
+    shown = footprints(result, sizes)
+    outlines = shown.positions()
+    known: Bools = np.asarray(np.isfinite(outlines).all(axis=2))
+    rows = np.flatnonzero(known.sum(axis=1) >= 4)
+    rings = [
+        found.carried(outline[there]) for outline, there in zip(outlines[rows], known[rows], strict=True)
+    ]
+    unit = block.linear_unit
+    return [shapely.Polygon(ring) for ring in rings], {
+        "photo": np.array(block.photo_ids, dtype=object)[rows],
+        f"{unit}_per_{block.image_unit}": shown.size[rows],
+        "cut": shown.cut[rows],
+    }
+
+
+def _points(found: Placed) -> _Part:
+    import shapely
+
+    result = found.result
+    return shapely.points(found.points), {
+        "point": _ids(found)[found.rows],
+        "kind": result.point_kinds[found.rows],
+        "rays": result.point_rays[found.rows],
+        **_deviations(found.point_covariances),
+    }
+
+
+def _ellipses(found: Placed, confidence: float, scale: float) -> _Part:
+    import shapely
+
+    known = np.flatnonzero(np.isfinite(found.point_covariances).all(axis=(1, 2)))
+    own = ellipses(found.point_covariances[known], confidence)
+    steps = own.outlines(np.zeros((len(known), 2)), scale)
+    count = steps.shape[1]
+    flat = np.column_stack([steps.reshape(-1, 2), np.zeros(steps.size // 2)])
+    places = found.moved(np.repeat(found.points[known], count, axis=0), flat)
+    return shapely.polygons(places[:, :2].reshape(-1, count, 2)), {
+        "point": _ids(found)[found.rows[known]],
+        "a": own.major,
+        "b": own.minor,
+        "azimuth_deg": np.degrees(own.azimuth),
+        "confidence": np.full(len(known), confidence),
+        "scale": np.full(len(known), scale),
+    }
+
+
+def _given(found: Placed, differences: tuple[Indices, Floats], sign: float) -> tuple[Indices, Floats, Floats]:
+    """Return rows of points, where they were given, and (c, 3) steps from there to the adjusted places."""
+    rows, vectors = differences
+    places = {row: k for k, row in enumerate(found.rows.tolist())}
+    adjusted = found.points[[places[row] for row in rows.tolist()]]
+    steps = sign * vectors
+    return rows, found.moved(adjusted, -steps), steps
+
+
+def _control(found: Placed) -> _Part:
+    import shapely
+
+    rows, given, steps = _given(found, found.residuals(), -1.0)
+    tests = np.abs(found.result.control.standardized)
+    return shapely.points(given), {
+        "point": _ids(found)[rows],
+        **{f"residual_{axis}": column for axis, column in zip(_LOCAL, -steps.T, strict=True)},
+        "largest_test": np.where(np.isnan(tests), 0.0, tests).max(axis=1, initial=0.0),
+    }
+
+
+def _vectors(found: Placed, rows: Indices, given: Floats, steps: Floats, scale: float) -> _Part:
+    import shapely
+
+    ends = found.moved(given, scale * steps)
+    lines = shapely.linestrings(np.stack([given, ends], axis=1)) if len(rows) else []
+    return lines, {
+        "point": _ids(found)[rows],
+        **{f"d_{axis}": column for axis, column in zip(_LOCAL, steps.T, strict=True)},
+        "length": np.linalg.norm(steps, axis=1),
+        "scale": np.full(len(rows), scale),
+    }
+
+
+def _suspicious(found: Placed) -> _Part:
+    """Return observations whose test values stand out, the largest first."""
+    import shapely
+
+    result = found.result
+    tests = [np.where(result.redundancy > TESTABLE, result.standardized, np.nan)]
+    tests += [result.control.standardized, result.stations.standardized]
+    tests += [each.standardized for each in result.kinds.values()]
+    limit = normal_limit(max(sum(int(np.isfinite(each).sum()) for each in tests), 1))
+    places = np.full((len(result.block.point_ids), 3), np.nan)
+    places[found.rows] = found.points
+    rows = [*_images(result, tests[0], places), *_observed(found, places), *_beside_images(found, places)]
+    rows.sort(key=lambda each: -abs(each[1]["test"]))
+    columns = {name: [own.get(name) for _, own in rows] for name in _SUSPECT}
+    columns["beyond"] = [abs(own["test"]) > limit for _, own in rows]
+    columns["limit"] = [limit] * len(rows)
+    return shapely.points(np.array([at for at, _ in rows])) if rows else [], columns
+
+
+_Suspect = tuple[Floats, dict[str, Any]]
+"""The place of an observation, and what is said of it."""
+
+
+def _images(result: Result, tests: Floats, places: Floats) -> Iterator[_Suspect]:
+    block = result.block
+    for image, axis in _beyond(tests):
+        point = int(block.image_points[image])
+        yield (
+            places[point],
+            {
+                "what": f"image {'xy'[axis]}",
+                "photo": block.photo_ids[int(block.image_photos[image])],
+                "point": block.point_ids[point],
+                "x": float(block.image_xy[image, 0]),
+                "y": float(block.image_xy[image, 1]),
+                "residual": float(result.residuals[image, axis]),
+                "unit": block.image_unit,
+                "test": float(tests[image, axis]),
+            },
+        )
+
+
+def _observed(found: Placed, places: Floats) -> Iterator[_Suspect]:
+    """Return components of control and stations."""
+    result, block = found.result, found.result.block
+    names = (*axes(result), *_ANGLES)
+    units = (
+        *(("rad", "rad") if block.geographic else (block.linear_unit,) * 2),
+        block.linear_unit,
+        *("rad",) * 3,
+    )
+    for what, given, kind, ids, at in (
+        ("control", result.control, "point", block.point_ids, places),
+        ("station", result.stations, "photo", block.photo_ids, found.photos),
+    ):
+        for row, k in _beyond(given.standardized):
+            index = int(given.rows[row])
+            yield (
+                at[index],
+                {
+                    "what": f"{what} {names[k]}",
+                    kind: ids[index],
+                    "residual": float(given.residuals[row, k]),
+                    "unit": units[k],
+                    "test": float(given.standardized[row, k]),
+                },
+            )
+
+
+def _beside_images(found: Placed, places: Floats) -> Iterator[_Suspect]:
+    """Return components of other observations, at their first point or photo."""
+    block = found.result.block
+    points = {name: row for row, name in enumerate(block.point_ids)}
+    photos = {name: row for row, name in enumerate(block.photo_ids)}
+    for kind in found.result.kinds.values():
+        for row, k in _beyond(kind.standardized):
+            each = block.observations[int(kind.rows[row])]
+            if not (each.points or each.photos):
+                continue
+            at = places[points[each.points[0]]] if each.points else found.photos[photos[each.photos[0]]]
+            yield (
+                at,
+                {
+                    "what": f"{kind.kind} {kind.components[k]} of {kind.names[row]}",
+                    "photo": each.photos[0] if each.photos else None,
+                    "point": each.points[0] if each.points else None,
+                    "residual": float(kind.residuals[row, k]),
+                    "unit": kind.units[k],
+                    "test": float(kind.standardized[row, k]),
+                },
+            )
+
+
+def _beyond(tests: Floats) -> list[list[int]]:
+    found: list[list[int]] = np.argwhere(np.abs(tests) > SUSPICIOUS).tolist()
+    return found
+
+
+_SUSPECT = ("what", "photo", "point", "x", "y", "residual", "unit", "test")
+
+
+def _deviations(covariances: Floats) -> dict[str, Floats]:
+    sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    return {f"sd_{axis}": column for axis, column in zip(_LOCAL, sd.T, strict=True)}
+
+
+def _ids(found: Placed) -> np.ndarray[Any, Any]:
+    return np.array(found.result.block.point_ids, dtype=object)
+
+
+def _metric_places(found: Placed) -> Floats:
+    """Return (k, 2) places in metres, for the distances between them."""
+    if found.names[0] != "longitude" or not len(found.points):
+        return found.points[:, :2]
+    one = found.moved(found.points[:1], np.ones((1, 3))) - found.points[:1]
+    return found.points[:, :2] / one[:, :2]

@@ -1,0 +1,101 @@
+"""By how much the plane of a projection bends a block that is adjusted in it as if it were cartesian."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.formats.project import Project
+from photogram.messages import Message
+from photogram.network.refraction import METRES_PER_UNIT
+
+__all__ = ["Bend", "bend", "plane_remarks"]
+
+RADIUS = 6_371_000.0
+"""Of the earth, metres."""
+LIKE_A_PLANE = 1e5
+"""Metres: coordinates that are both larger are those of a map, not of axes of one's own."""
+STEP = 100.0
+"""Metres, over which scales are measured."""
+
+
+@dataclass(frozen=True)
+class Bend:
+    """What a plane does to a block.
+
+    Attributes
+    ----------
+    extent
+        From the middle of the block to its edge, metres.
+    curvature
+        Height of the plane above a level surface at the edge, d^2 / 2R, metres.
+    scale
+        By how much horizontal lengths in the plane exceed those in space, as a part, in the middle and at
+        the edges: least and largest; heights have scale 1. None where the projection is not known.
+    """
+
+    extent: float
+    curvature: float
+    scale: tuple[float, float] | None
+
+    def __str__(self) -> str:
+        text = (
+            f"heights bend by {self.curvature:.3g} m over the {self.extent:.0f} m from the middle of the"
+            " block to its edge"
+        )
+        if self.scale is None:
+            return text
+        least, largest = (1e6 * each for each in self.scale)
+        return f"{text}, horizontal lengths are scaled by {least:.0f} to {largest:.0f} ppm, heights are not"
+
+
+def bend(xyz: Floats, crs: str = "") -> Bend:
+    """Return what a plane does to a block with these (n, 3) positions, metres; `crs` names it."""
+    middle = (xyz.min(axis=0) + xyz.max(axis=0)) / 2
+    extent = float(np.hypot(*(xyz - middle)[:, :2].T).max())
+    scale = None
+    if crs:
+        from photogram.formats.crs import geocentric
+
+        corners = np.array([middle, *xyz[xyz[:, :2].argmin(axis=0)], *xyz[xyz[:, :2].argmax(axis=0)]])
+        east = np.array([STEP / 2, 0.0, 0.0])
+        steps = geocentric(crs, corners + east) - geocentric(crs, corners - east)
+        found = STEP / np.linalg.norm(steps, axis=1) - 1
+        scale = float(found.min()), float(found.max())
+    return Bend(extent, extent**2 / (2 * RADIUS), scale)
+
+
+def plane_remarks(project: Project) -> list[Message]:
+    """Say by how much the plane bends where a project is adjusted in one, or looks as if it were."""
+    frame, block = project.frame, project.block
+    if frame.kind != "cartesian":
+        return []
+    known = np.vstack([block.photo_positions, project.positions()])
+    known = known[np.isfinite(known).all(axis=1)] * METRES_PER_UNIT.get(block.linear_unit, 1.0)
+    if len(known) < 2:
+        return []
+    if frame.crs:
+        from photogram.formats.crs import is_projected
+
+        if not is_projected(frame.crs):
+            return []
+        return [
+            Message(
+                f"the plane of {frame.crs} is adjusted as if it were cartesian: {bend(known, frame.crs)};"
+                " with [control] crs in place of [frame] crs the frame is a cartesian one",
+                project.path,
+            )
+        ]
+    like_a_map = (np.abs(np.median(known[:, :2], axis=0)) > LIKE_A_PLANE).all()
+    if not like_a_map or np.abs(known[:, 2]).max() > LIKE_A_PLANE:
+        return []
+    return [
+        Message(
+            "coordinates look like those of a map, and are adjusted as if they were cartesian:"
+            f" {bend(known)}, and the scale of the projection is not that of heights; where [control] crs or"
+            " --control-crs names the system, a cartesian frame is chosen",
+            project.path,
+        )
+    ]

@@ -1,0 +1,240 @@
+"""Parquet files whose columns say what they are: unit and description are metadata of every field.
+
+pyarrow is an extra (`pip install 'photogram[parquet]'`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from photogram.arguments.types import Indices
+from photogram.errors import InputError
+
+if TYPE_CHECKING:
+    import pyarrow
+
+__all__ = ["Column", "Repeated", "Sheet", "packed", "parquet_content", "read_sheet", "unpacked"]
+
+ROWS = 2**17
+"""Of a row group."""
+LEVEL = 1
+"""Of zstd: numbers of measurements hardly get smaller at higher ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """A column of names, most of which stand there many times: row i is `names[rows[i]]`."""
+
+    names: Sequence[str]
+    rows: Indices
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """A column.
+
+    Attributes
+    ----------
+    name
+        Without blanks.
+    values
+        (rows,) an array or names, or (rows, k) an array: k numbers in each row.
+    unit
+        `m`, `rad`, `px`, `m2` ...; `1` of plain numbers; empty where it has none.
+    description
+        One line.
+    order
+        What the k numbers are.
+    """
+
+    name: str
+    values: Any
+    unit: str = ""
+    description: str = ""
+    order: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A table that was read: arrays of numbers and lists of names, and what the file says of itself.
+
+    Attributes
+    ----------
+    path
+        The file.
+    columns
+        By name.
+    about
+        Metadata of the table.
+    """
+
+    path: Path
+    columns: Mapping[str, Any]
+    about: Mapping[str, str]
+
+    @property
+    def rows(self) -> int:
+        """How many rows it has."""
+        return len(next(iter(self.columns.values()), ()))
+
+    def column(self, name: str) -> Any:
+        """Return a column.
+
+        Raises
+        ------
+        InputError
+            It is not there.
+        """
+        if name not in self.columns:
+            raise InputError(f"the column {name} is missing", file=self.path)
+        return self.columns[name]
+
+
+def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Callable[[BinaryIO], None]:
+    """Return what writes a table to a file that is open.
+
+    Parameters
+    ----------
+    columns
+        Of one length, with different names.
+    about
+        Metadata of the table.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        pyarrow is not installed.
+    """
+    parquet = _module()
+    table = _table(columns, about)
+    repeated = [each.name for each in columns if isinstance(each.values, Repeated)]
+    kinds = {
+        name: kind.value_type if _is_list(kind) else kind
+        for name, kind in zip(table.schema.names, table.schema.types, strict=True)
+    }
+    few = [name for name in repeated if _is_dictionary(kinds[name])]
+
+    def write(file: BinaryIO) -> None:
+        # Of numbers of measurements hardly two are alike: a dictionary of them takes ten times as long.
+        parquet.write_table(
+            table, file, compression="zstd", compression_level=LEVEL, row_group_size=ROWS, use_dictionary=few
+        )
+
+    return write
+
+
+def read_sheet(path: Path) -> Sheet:
+    """Read a table.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or a number is missing (not NaN).
+    ModuleNotFoundError
+        pyarrow is not installed.
+    """
+    parquet = _module()
+    import pyarrow
+
+    try:
+        table = parquet.read_table(path)
+    except (OSError, pyarrow.ArrowException) as error:
+        raise InputError(f"cannot be read as Parquet: {error}", file=path) from None
+    columns = {name: _values(path, name, table.column(name)) for name in table.column_names}
+    about = {key.decode(): value.decode() for key, value in (table.schema.metadata or {}).items()}
+    return Sheet(path, columns, about)
+
+
+def packed(matrices: np.ndarray) -> np.ndarray:
+    """Return (n, k (k + 1) / 2) the lower triangles of (n, k, k) symmetric matrices, row by row."""
+    rows, columns = np.tril_indices(matrices.shape[1])
+    return np.ascontiguousarray(matrices[:, rows, columns])
+
+
+def unpacked(triangles: np.ndarray) -> np.ndarray:
+    """Return (n, k, k) symmetric matrices of their lower triangles."""
+    k = round(((8 * triangles.shape[1] + 1) ** 0.5 - 1) / 2)
+    rows, columns = np.tril_indices(k)
+    found = np.empty((len(triangles), k, k))
+    found[:, rows, columns] = triangles
+    found[:, columns, rows] = triangles
+    return found
+
+
+def _module() -> Any:
+    import pyarrow.parquet  # takes long to import
+
+    return pyarrow.parquet
+
+
+def _table(columns: Sequence[Column], about: Mapping[str, str]) -> pyarrow.Table:
+    import pyarrow
+
+    arrays = [_array(each.values) for each in columns]
+    fields = []
+    for each, array in zip(columns, arrays, strict=True):
+        said = {"unit": each.unit, "description": each.description, "order": " ".join(each.order)}
+        fields.append(
+            pyarrow.field(each.name, array.type, metadata={key: text for key, text in said.items() if text})
+        )
+    return pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields, metadata=dict(about)))
+
+
+def _array(values: Any) -> pyarrow.Array:
+    import pyarrow
+
+    if isinstance(values, Repeated):
+        names = pyarrow.array(values.names, pyarrow.string())
+        rows = pyarrow.array(values.rows.astype(np.int32))
+        # A dictionary of a great many names would stand before every group of rows.
+        few = len(values.names) <= ROWS
+        return pyarrow.DictionaryArray.from_arrays(rows, names) if few else names.take(rows)
+    if isinstance(values, np.ndarray) and values.ndim == 2:
+        flat = pyarrow.array(np.ascontiguousarray(values).ravel())
+        return pyarrow.FixedSizeListArray.from_arrays(flat, values.shape[1])
+    if isinstance(values, np.ndarray) and values.dtype.kind != "O":
+        return pyarrow.array(np.ascontiguousarray(values))
+    texts = all(isinstance(each, str) for each in values)
+    return pyarrow.array(list(values), pyarrow.string() if texts else None)
+
+
+def _values(path: Path, name: str, column: pyarrow.ChunkedArray) -> Any:
+    import pyarrow
+
+    whole = column.combine_chunks()
+    kind = column.type
+    if _is_dictionary(kind):
+        return Repeated(
+            whole.dictionary.to_pylist(), whole.indices.to_numpy(zero_copy_only=False).astype(np.int64)
+        )
+    if pyarrow.types.is_string(kind):
+        coded = whole.dictionary_encode()
+        return Repeated(
+            coded.dictionary.to_pylist(),
+            coded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64),
+        )
+    if whole.null_count:
+        raise InputError(f"the column {name} has empty cells", file=path)
+    if _is_list(kind):
+        return whole.flatten().to_numpy(zero_copy_only=False).reshape(len(whole), kind.list_size)
+    return whole.to_numpy(zero_copy_only=False)
+
+
+def _is_dictionary(kind: Any) -> bool:
+    import pyarrow
+
+    return bool(pyarrow.types.is_dictionary(kind))
+
+
+def _is_list(kind: Any) -> bool:
+    import pyarrow
+
+    return bool(pyarrow.types.is_fixed_size_list(kind))

@@ -1,0 +1,174 @@
+"""Objects of data classes as plain values of JSON, and back: exactly, and nothing but what a reader knows.
+
+Unlike pickles such a document runs no code: it names classes of a list that the reader has, and gives their
+fields. Objects that several others share are one object again. Numbers that JSON does not have (NaN, infinite
+ones), arrays, tuples and tables of names are marked: `{"array": ...}`, `{"tuple": ...}`, `{"map": ...}`.
+"""
+
+from __future__ import annotations
+
+import math
+from base64 import b64decode, b64encode
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.messages import quoted
+
+__all__ = ["Decoder", "Encoder"]
+
+SMALL = 36
+"""Numbers up to which an array is written as numbers that people can read."""
+_NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+
+
+class Encoder:
+    """Makes plain values; one for a whole document, which knows what it has written."""
+
+    def __init__(self) -> None:
+        self._written: dict[int, int] = {}
+        self._kept: list[object] = []
+
+    def value(self, given: Any) -> Any:
+        """Return a value of JSON that says what the given one is.
+
+        Raises
+        ------
+        TypeError
+            It is of a type that a document has no place for.
+        """
+        if given is None or isinstance(given, bool | str):
+            return given
+        if isinstance(given, int | np.integer):
+            return int(given)
+        if isinstance(given, float | np.floating):
+            number = float(given)
+            return number if math.isfinite(number) else {"number": str(number)}
+        if isinstance(given, np.ndarray):
+            return self._array(given)
+        if isinstance(given, list):
+            return [self.value(each) for each in given]
+        if isinstance(given, tuple):
+            return {"tuple": [self.value(each) for each in given]}
+        if isinstance(given, Mapping):
+            return {"map": [[self.value(name), self.value(each)] for name, each in given.items()]}
+        if isinstance(given, Path):
+            return {"path": str(given)}
+        if is_dataclass(given) and not isinstance(given, type):
+            return self._object(given)
+        raise TypeError(f"a document has no place for {type(given).__name__}")
+
+    def fields(self, given: Any, omitted: Iterable[str] = ()) -> dict[str, Any]:
+        """Return the fields of an object of a data class that make it, but for some."""
+        left = set(omitted)
+        return {
+            each.name: self.value(getattr(given, each.name))
+            for each in fields(given)
+            if each.init and each.name not in left
+        }
+
+    def _object(self, given: Any) -> dict[str, Any]:
+        if id(given) in self._written:
+            return {"same": self._written[id(given)]}
+        own = {"is": type(given).__name__, **self.fields(given)}
+        self._written[id(given)] = len(self._kept)
+        self._kept.append(given)  # as long as it lives nothing else has its id
+        return own
+
+    def _array(self, given: np.ndarray) -> dict[str, Any]:
+        if given.dtype.kind == "f" and given.size <= SMALL and np.isfinite(given).all():
+            return {"array": given.tolist()}
+        plain = np.ascontiguousarray(given, dtype=given.dtype.newbyteorder("<"))
+        return {
+            "array": b64encode(plain.tobytes()).decode("ascii"),
+            "type": plain.dtype.str,
+            "shape": list(given.shape),
+        }
+
+
+class Decoder:
+    """Makes objects of what an :class:`Encoder` has written.
+
+    Parameters
+    ----------
+    classes
+        Those that a document may name.
+    path
+        The document, for errors.
+    """
+
+    def __init__(self, classes: Iterable[type], path: Path) -> None:
+        self._classes = {each.__name__: each for each in classes}
+        self._path = path
+        self._made: list[object] = []
+        self._kinds: dict[str, Callable[[Any], Any]] = {
+            "tuple": lambda given: tuple(self.value(each) for each in given["tuple"]),
+            "map": lambda given: {self.value(name): self.value(each) for name, each in given["map"]},
+            "number": lambda given: _NUMBERS[given["number"]],
+            "path": lambda given: Path(given["path"]),
+            "array": self._array,
+            "same": lambda given: self._made[given["same"]],
+            "is": self._object,
+        }
+
+    def value(self, given: Any) -> Any:
+        """Return what a value of JSON stands for.
+
+        Raises
+        ------
+        InputError
+            A class that is not known, what no encoder has written, or what the class itself refuses.
+        """
+        if isinstance(given, list):
+            return [self.value(each) for each in given]
+        if not isinstance(given, dict):
+            return given
+        kind = next(iter(given), "")  # the mark comes first: members of objects may be called as marks are
+        if kind not in self._kinds:
+            raise self._error(f"does not say what {quoted(str(given))} is")
+        try:
+            return self._kinds[kind](given)
+        except (LookupError, TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise self._error(f"{quoted(str(given))} is no {kind} ({error})") from None
+
+    def fields(self, given: Any) -> dict[str, Any]:
+        """Return the fields of an object that were written one by one.
+
+        Raises
+        ------
+        InputError
+            As :meth:`value`.
+        """
+        if not isinstance(given, dict):
+            raise self._error(f"{quoted(str(given))} has no members")
+        return {name: self.value(each) for name, each in given.items()}
+
+    def _object(self, given: dict[str, Any]) -> object:
+        name = given["is"]
+        if name not in self._classes:
+            raise self._error(f"{quoted(str(name))} is no class that this version knows")
+        own = self.fields({member: each for member, each in given.items() if member != "is"})
+        try:
+            made = self._classes[name](**own)
+        except InputError as error:
+            raise self._error(error.message) from None
+        self._made.append(made)
+        return made
+
+    def _array(self, given: dict[str, Any]) -> np.ndarray:
+        if "type" not in given:
+            return np.array(given["array"], dtype=float)
+        kind = np.dtype(given["type"])
+        if kind.hasobject:
+            raise ValueError("an array of objects")
+        found = np.frombuffer(b64decode(given["array"], validate=True), dtype=kind)
+        return found.reshape(given["shape"]).astype(kind.newbyteorder("="))
+
+    def _error(self, text: str) -> InputError:
+        return InputError(text, file=self._path)

@@ -1,0 +1,37 @@
+"""The frame of a block: where on the earth its coordinates are, if that is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Frame"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What the coordinates of a block are.
+
+    Attributes
+    ----------
+    kind
+        `cartesian`, `topocentric` (east, north, up at the origin), `geocentric` or `geographic`.
+    crs
+        Coordinate reference system of the origin, or of the coordinates; empty where none is said.
+    origin
+        Latitude and longitude in degrees and ellipsoidal height in metres of a topocentric frame.
+    ellipsoid
+        Semi-axes of the ellipsoid of geographic coordinates; WGS 84.
+    """
+
+    kind: str = "cartesian"
+    crs: str = ""
+    origin: tuple[float, float, float] | None = None
+    ellipsoid: tuple[float, float] = (6378137.0, 6356752.314245179)
+
+    def __str__(self) -> str:
+        at = (
+            ""
+            if self.origin is None
+            else " at latitude {:.9g}, longitude {:.9g}, height {:.9g}".format(*self.origin)
+        )
+        return self.kind + at + (f" ({self.crs})" if self.crs else "")

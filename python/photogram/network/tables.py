@@ -1,0 +1,191 @@
+"""Tables that blocks are made of: data frames, or any mapping of column names to columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence, Sized
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import names, shaped, shown
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.messages import listed
+from photogram.network.cameras import Camera, photo_indices
+from photogram.network.geometry import Spheroid
+
+__all__ = [
+    "ATTITUDE_COLUMNS",
+    "GEOGRAPHIC_COLUMNS",
+    "RECTANGULAR_COLUMNS",
+    "Table",
+    "different",
+    "numbered",
+    "table_arguments",
+]
+
+
+RECTANGULAR_COLUMNS = ("X", "Y", "Z")
+GEOGRAPHIC_COLUMNS = ("longitude_deg", "latitude_deg", "height")
+ATTITUDE_COLUMNS = ("omega_deg", "phi_deg", "kappa_deg")
+
+
+class Table(Protocol):
+    """What has columns by name: a data frame of pandas or polars, a dictionary, an Arrow table of columns."""
+
+    def __contains__(self, name: Any, /) -> bool: ...
+
+    def __getitem__(self, name: Any, /) -> Any: ...
+
+
+def table_arguments(
+    photos: Table,
+    images: Table,
+    points: Table | None,
+    principal_distance: float | None,
+    cameras: Sequence[Camera],
+    image_sd: float | None,
+    spheroid: Spheroid | None,
+) -> dict[str, Any]:
+    """Return arguments of a block from tables; :meth:`photogram.Block.from_tables` says what these have."""
+    axes = RECTANGULAR_COLUMNS if spheroid is None else GEOGRAPHIC_COLUMNS
+    photo_ids = _photo_ids(photos)
+    image_point_names = _name_column(images, "images", "point")
+    control_ids = _name_column(points, "points", "point") if points is not None else []
+    control_ids = different("points", control_ids)
+    point_ids = list(dict.fromkeys([*control_ids, *image_point_names]))
+
+    positions = np.full((len(point_ids), 3), np.nan)
+    sd = np.full((len(point_ids), 3), np.inf)
+    if points is not None:
+        positions[: len(control_ids)] = _columns(points, "points", axes)
+        sd[: len(control_ids)] = _columns(points, "points", [f"sd_{axis}" for axis in axes], np.inf)
+        sd[np.isnan(sd) | np.isnan(positions)] = np.inf
+    unit = str(cameras[0].unit) if cameras else "mm"
+    if image_sd is None and unit == "mm":
+        image_sd = 0.010
+    return {
+        "photo_ids": photo_ids,
+        "photo_positions": _columns(photos, "photos", axes),
+        "photo_attitudes": _columns(photos, "photos", ATTITUDE_COLUMNS),
+        "principal_distances": _distances(photos, principal_distance, cameras),
+        "cameras": cameras,
+        "photo_cameras": _camera_column(photos, cameras),
+        "point_ids": point_ids,
+        "point_positions": positions,
+        "image_photos": _lookup("photo", photo_ids, _name_column(images, "images", "photo")),
+        "image_points": _lookup("point", point_ids, image_point_names),
+        "image_xy": _columns(images, "images", [f"x_{unit}", f"y_{unit}"]),
+        "image_sd": _columns(images, "images", [f"sd_x_{unit}", f"sd_y_{unit}"], image_sd),
+        "photo_position_sd": _columns(photos, "photos", [f"sd_{axis}" for axis in axes], np.inf),
+        "photo_attitude_sd": _columns(photos, "photos", [f"sd_{axis}" for axis in ATTITUDE_COLUMNS], np.inf),
+        "point_sd": sd,
+        "photo_positions_observed": _observed(photos, axes),
+        "photo_attitudes_observed": _observed(photos, ATTITUDE_COLUMNS),
+    }
+
+
+def different(name: str, values: Sequence[str]) -> list[str]:
+    """Return names that are all different."""
+    found = names(name, values)
+    if len(set(found)) != len(found):
+        seen: set[str] = set()
+        repeated = next(value for value in found if value in seen or seen.add(value))  # type: ignore[func-returns-value]
+        raise InputError(f"{name}: {repeated!r} stands there more than once")
+    return found
+
+
+def numbered(count: int) -> list[str]:
+    """Return names for things that have none: 0, 1, 2 ..."""
+    return [str(number) for number in range(count)]
+
+
+def _has(table: Table, table_name: str, name: str) -> bool:
+    try:
+        return bool(name in table)
+    except TypeError:
+        raise InputError(f"{table_name} is no table, a mapping of column names to columns") from None
+
+
+def _column(table: Table, table_name: str, name: str) -> Sequence[Any]:
+    if not _has(table, table_name, name):
+        raise InputError(f"{table_name} has no column {name}")
+    try:
+        column: Sequence[Any] = table[name]
+    except (TypeError, KeyError, IndexError):
+        raise InputError(f"{table_name} is no table, a mapping of column names to columns") from None
+    return column
+
+
+def _rows(table: Table, table_name: str) -> int:
+    """Return how many rows a table has: those of its names, or of a coordinate where it has none."""
+    name = "photo" if table_name == "photos" else "point"
+    first = (RECTANGULAR_COLUMNS[0], GEOGRAPHIC_COLUMNS[0])
+    known = next((each for each in (name, *first) if _has(table, table_name, each)), name)
+    column = _column(table, table_name, known)
+    if not isinstance(column, Sized):
+        raise InputError(f"{table_name}, column {known} is not a list: {shown(column)}")
+    return len(column)
+
+
+def _photo_ids(photos: Table) -> list[str]:
+    """Return the column of names; without it numbers from 0."""
+    if _has(photos, "photos", "photo"):
+        return _name_column(photos, "photos", "photo")
+    return numbered(_rows(photos, "photos"))
+
+
+def _name_column(table: Table, table_name: str, name: str) -> list[str]:
+    return names(f"{table_name}, column {name}", _column(table, table_name, name))
+
+
+def _columns(
+    table: Table, table_name: str, columns: Sequence[str], default: ArrayLike | None = None
+) -> Floats:
+    """Stack columns as (rows, len(columns)), `_deg` ones in radians; absent ones get the default."""
+    rows = _rows(table, table_name)
+    stacked = []
+    for name in columns:
+        values = default if name not in table and default is not None else _column(table, table_name, name)
+        column = shaped(f"{table_name}, column {name}", values, (rows,), missing=True)
+        stacked.append(np.radians(column) if name.endswith("_deg") else column)
+    return np.stack(stacked, axis=1)
+
+
+def _distances(photos: Table, principal_distance: float | None, cameras: Sequence[Camera]) -> Floats | None:
+    name = "principal_distance_mm"
+    if cameras:
+        if name in photos or principal_distance is not None:
+            raise InputError("principal distances and cameras are both given: the cameras have them")
+        return None
+    if name not in photos and principal_distance is None:
+        raise InputError(f"photos has no column {name} and no principal_distance was given")
+    return _columns(photos, "photos", [name], principal_distance)[:, 0]
+
+
+def _camera_column(photos: Table, cameras: Sequence[Camera]) -> Indices | None:
+    """Return (P,) indices of the cameras that photos name; None where they name none."""
+    if not cameras or "camera" not in photos:
+        return None
+    return photo_indices(list(_column(photos, "photos", "camera")), cameras, _rows(photos, "photos"))
+
+
+def _observed(photos: Table, columns: Sequence[str]) -> Floats | None:
+    """Return the columns of observed values, the initial ones where there are none; None without any."""
+    observed = [f"observed_{name}" for name in columns]
+    if not any(name in photos for name in observed):
+        return None
+    present = [own if own in photos else name for own, name in zip(observed, columns, strict=True)]
+    return _columns(photos, "photos", present)
+
+
+def _lookup(kind: str, ids: Sequence[str], images: Sequence[str]) -> Indices:
+    index = {name: i for i, name in enumerate(ids)}
+    try:
+        return np.array([index[name] for name in images], dtype=np.int64)
+    except KeyError as error:
+        numbers = f": they are {listed(list(ids), 3)}" if ids and ids[0] == "0" else ""
+        raise InputError(
+            f"images names the {kind} {error.args[0]!r}, which the {kind}s do not list{numbers}"
+        ) from None

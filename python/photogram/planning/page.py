@@ -1,0 +1,252 @@
+"""The page of a plan: patterns of a network side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from photogram.planning.pattern import Pattern
+from photogram.planning.plot import figure
+from photogram.planning.statistics import PointQuality
+from photogram.planning.text import remarks
+from photogram.show.angles import ARCSEC
+from photogram.show.page import (
+    Column,
+    Drawing,
+    Fact,
+    Judgement,
+    Layers,
+    Page,
+    Part,
+    Remarks,
+    Row,
+    Section,
+    Table,
+    significant,
+)
+
+__all__ = ["plan_page"]
+
+NOTICED = 1.05
+"""Ratio of standard deviations below which patterns are called alike."""
+
+
+def plan_page(patterns: Sequence[Pattern]) -> Page:
+    """Return the report of a plan for the browser."""
+    sections = [
+        Section("network", "Plan of the network", [_drawing(patterns)] if _has_points(patterns) else []),
+        _comparison(patterns),
+        Section("size", "How much", [_size(patterns)]),
+        _layers("points", "New points", patterns, _points, _POINTS),
+        _layers("photos", "Photos", patterns, _photos, ""),
+        _layers("control", "Control", patterns, _control, _CONTROL),
+        Section("remarks", "Remarks", [Remarks(told)] if (told := remarks(patterns)) else []),
+    ]
+    return Page(
+        what="Prediction of a network before it is flown",
+        title=patterns[0].block.title,
+        judgements=[_judgement(patterns)],
+        advice=_advice(patterns),
+        highlights=_highlights(patterns),
+        sections=sections,
+    )
+
+
+_POINTS = (
+    "Standard deviations that the network promises, a priori: nothing has been measured. Detectable is"
+    " the smallest"
+    " error of an image coordinate that the test finds (level 0.001, power 0.80); its effect is what it"
+    " moves at most"
+    " while it stays in."
+)
+_CONTROL = (
+    "How the network checks its control: an error below what is detectable goes into the result unseen."
+)
+
+
+def _has_points(patterns: Sequence[Pattern]) -> bool:
+    return any(pattern.new_points.any() for pattern in patterns)
+
+
+def _drawing(patterns: Sequence[Pattern]) -> Drawing:
+    caption = (
+        "The patterns in plan, on one scale of colours: the expected standard deviation of points in height."
+        " Control points are marked by what they hold."
+    )
+    return Drawing("picture-plan", "Expected standard deviation in height", caption, lambda: figure(patterns))
+
+
+def _judgement(patterns: Sequence[Pattern]) -> Judgement:
+    """Say which pattern is better, by the rms in height of new points."""
+    mark = "Prediction"
+    if not all(pattern.new_points.any() for pattern in patterns):
+        return Judgement(mark, "There are no new points to be judged")
+    unit = patterns[0].block.linear_unit
+    heights = {pattern.name: pattern.points[-1].rms_sd[2] for pattern in patterns}
+    best, worst = min(heights, key=heights.__getitem__), max(heights, key=heights.__getitem__)
+    if len(patterns) == 1:
+        return Judgement(
+            mark, f"Heights of new points will have an rms of {significant(heights[best], 3)} {unit}"
+        )
+    if heights[worst] <= NOTICED * heights[best]:
+        return Judgement(
+            mark, f"The patterns are alike: heights with an rms of {significant(heights[best], 3)} {unit}"
+        )
+    return Judgement(
+        mark,
+        f"“{best}” gives heights {heights[worst] / heights[best]:.2f} times better than “{worst}”:"
+        f" rms {significant(heights[best], 3)} against {significant(heights[worst], 3)} {unit}",
+    )
+
+
+def _advice(patterns: Sequence[Pattern]) -> list[str]:
+    found = []
+    for pattern in patterns:
+        unchecked = pattern.points[-1].unchecked
+        if pattern.new_points.any() and unchecked > 0.01:
+            found.append(
+                f"“{pattern.name}”: gross errors of {100 * unchecked:.0f} percent of the image"
+                " coordinates could not be"
+                " found. More rays a point (more overlap) make them checked."
+            )
+        weak = [quality for quality in pattern.control if quality.held and quality.redundancy < 0.2]
+        if weak:
+            named = ", ".join(quality.component for quality in weak)
+            found.append(
+                f"“{pattern.name}”: control in {named} is hardly checked by the network; more of it, or"
+                " check points"
+                " beside it, would show its errors."
+            )
+    return found
+
+
+def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
+    unit = patterns[0].block.linear_unit
+    found = []
+    for pattern in patterns:
+        if pattern.new_points.any():
+            x, y, z = pattern.points[-1].rms_sd
+            plane = f"{pattern.axes[0]} {significant(x, 2)}, {pattern.axes[1]} {significant(y, 2)} {unit}"
+            found.append(Fact(f"rms in {pattern.axes[2]}, {pattern.name}", significant(z, 2), unit, plane))
+    found.append(
+        Fact(
+            "An image error on the ground",
+            significant(patterns[0].unit, 2),
+            unit,
+            "standard deviation, mean of all",
+        )
+    )
+    return found
+
+
+def _comparison(patterns: Sequence[Pattern]) -> Section:
+    if not all(pattern.new_points.any() for pattern in patterns):
+        return Section("comparison", "Side by side", [])
+    unit = patterns[0].block.linear_unit
+    every = [pattern.points[-1] for pattern in patterns]
+    rows: list[Row] = []
+    for k, axis in enumerate(patterns[0].axes):
+        for kind in ("rms", "max"):
+            values = [(quality.rms_sd if kind == "rms" else quality.max_sd)[k] for quality in every]
+            ratio = max(values) / min(values) if min(values) > 0 else math.nan
+            rows.append([f"{'rms' if kind == 'rms' else 'largest'} {axis}", *values, ratio])
+    columns = [
+        Column("Standard deviation", text=True),
+        *(Column(pattern.name, unit, figures=3) for pattern in patterns),
+        Column("Largest over smallest", decimals=2),
+    ]
+    return Section("comparison", "Side by side", [Table("All new points", columns, rows)])
+
+
+def _size(patterns: Sequence[Pattern]) -> Table:
+    unit = patterns[0].block.linear_unit
+    cells: list[tuple[str, Callable[[Pattern], str | float]]] = [
+        ("Photos", lambda p: len(p.block.photo_ids)),
+        ("New points", lambda p: int(p.new_points.sum())),
+        ("Control points", lambda p: int((p.result.used_points & ~p.new_points).sum())),
+        ("Points left out", lambda p: len(p.result.dropped)),
+        ("Image points", lambda p: int(p.result.used_images.sum())),
+        (f"1 mm in the photo on the ground, {unit}", lambda p: significant(p.scale)),
+        (f"sd of image coordinates on the ground, {unit}", lambda p: significant(p.unit, 3)),
+    ]
+    rows: list[Row] = [[name, *(cell(pattern) for pattern in patterns)] for name, cell in cells]
+    return Table("How much", [Column("", text=True), *(Column(pattern.name) for pattern in patterns)], rows)
+
+
+def _layers(
+    name: str, title: str, patterns: Sequence[Pattern], table: Callable[[Pattern], Table | None], intro: str
+) -> Section:
+    tables = [made for pattern in patterns if (made := table(pattern)) is not None]
+    parts: list[Part] = [Layers(f"{name}-layers", tables)] if len(tables) > 1 else [*tables]
+    return Section(name, title, parts, intro)
+
+
+def _points(pattern: Pattern) -> Table | None:
+    shown = [quality for quality in pattern.points if quality.points]
+    if not shown:
+        return None
+    unit = pattern.block.linear_unit
+    columns = [
+        Column("Group", text=True),
+        Column("Points"),
+        *(
+            Column(f"{kind} {axis}", unit, figures=3)
+            for axis in pattern.axes
+            for kind in ("rms", "max")
+        ),
+        Column("Mean redundancy", decimals=3),
+        Column("Unchecked", "%", decimals=0),
+        Column("Detectable", "µm", decimals=1),
+        Column("Effect", "sd", decimals=1),
+    ]  # fmt: skip
+    return Table(pattern.name, columns, [_point_row(quality) for quality in shown])
+
+
+def _point_row(quality: PointQuality) -> Row:
+    figures = [value for pair in zip(quality.rms_sd, quality.max_sd, strict=True) for value in pair]
+    return [
+        quality.group,
+        quality.points,
+        *figures,
+        quality.redundancy,
+        100 * quality.unchecked,
+        1000 * quality.detectable,
+        quality.effect,
+    ]
+
+
+def _photos(pattern: Pattern) -> Table:
+    linear = pattern.block.linear_unit
+    rows: list[Row] = []
+    for k, quality in enumerate(pattern.photos):
+        factor, unit = (1.0, linear) if k < 3 else (1.0 / ARCSEC, "″")
+        redundancy = quality.redundancy if math.isfinite(quality.redundancy) else None
+        rows.append(
+            [f"{quality.unknown}, {unit}", factor * quality.rms_sd, factor * quality.max_sd, redundancy]
+        )
+    columns = [
+        Column("Unknown", text=True),
+        Column("rms sd", figures=3),
+        Column("Largest sd", figures=3),
+        Column("Mean redundancy of given values", decimals=3),
+    ]
+    return Table(pattern.name, columns, rows)
+
+
+def _control(pattern: Pattern) -> Table | None:
+    held = [quality for quality in pattern.control if quality.held]
+    if not held:
+        return None
+    unit = pattern.block.linear_unit
+    columns = [
+        Column("Component", text=True),
+        Column("Held"),
+        Column("sd given", unit, figures=3),
+        Column("Mean redundancy", decimals=3),
+        Column("Detectable", unit, figures=3),
+        Column("Effect", "sd", decimals=1),
+    ]
+    rows: list[Row] = [
+        [each.component, each.held, each.sd, each.redundancy, each.detectable, each.effect] for each in held
+    ]
+    return Table(pattern.name, columns, rows)

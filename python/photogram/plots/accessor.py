@@ -1,0 +1,147 @@
+"""`result.plot`: the pictures of a result by name, and all of them at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from photogram.errors import InputError
+from photogram.plots.correlations import correlations
+from photogram.plots.distortion import distortion
+from photogram.plots.network import network
+from photogram.plots.panels import Where
+from photogram.plots.redundancy import redundancy
+from photogram.plots.residuals import residuals
+from photogram.plots.tests import tests
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["PICTURES", "Plots", "figures", "picture_files"]
+
+PICTURES: dict[str, Callable[..., Any]] = {
+    "network": network,
+    "residuals": residuals,
+    "redundancy": redundancy,
+    "tests": tests,
+    "correlations": correlations,
+    "distortion": distortion,
+}
+"""The pictures by name, in the order in which a reader looks at them."""
+
+
+class Plots:
+    """The pictures of a result. Each takes and returns axes of matplotlib (`pip install 'photogram[plots]'`).
+
+    Parameters
+    ----------
+    result
+        An adjusted block or collection.
+    """
+
+    def __init__(self, result: object) -> None:
+        self._result = result
+
+    def __repr__(self) -> str:
+        return f"pictures: {', '.join(f'.{name}()' for name in PICTURES)}, .save(folder)"
+
+    def network(self, ax: Where = None, *, plane: str | None = None) -> Axes:
+        """Draw the network in plan; see :func:`photogram.plots.network`."""
+        return network(self._result, ax, plane=plane)
+
+    def residuals(self, ax: Where = None) -> Any:
+        """Draw image residuals over the frame; see :func:`photogram.plots.residuals`."""
+        return residuals(self._result, ax)
+
+    def redundancy(self, ax: Where = None) -> Any:
+        """Draw redundancy numbers over frame and network; see :func:`photogram.plots.redundancy`."""
+        return redundancy(self._result, ax)
+
+    def tests(self, ax: Where = None) -> Any:
+        """Draw test values against the normal distribution; see :func:`photogram.plots.tests`."""
+        return tests(self._result, ax)
+
+    def correlations(self, ax: Where = None) -> Any:
+        """Draw correlations of parameters of cameras; see :func:`photogram.plots.correlations`."""
+        return correlations(self._result, ax)
+
+    def distortion(self, ax: Where = None) -> Any:
+        """Draw curves of radial distortion; see :func:`photogram.plots.distortion`."""
+        return distortion(self._result, ax)
+
+    def save(self, folder: Path | str, ending: str = "png") -> list[Path]:
+        """Write all pictures that there are, `network.png` ..., and return their places.
+
+        Parameters
+        ----------
+        folder
+            Where to.
+        ending
+            Of the names, and so the format: `png`, `svg`, `pdf`.
+
+        Raises
+        ------
+        InputError
+            An ending that names no format.
+        ModuleNotFoundError
+            matplotlib is absent.
+        """
+        from photogram.io.writing import write_whole
+
+        written = picture_files(self._result, Path(folder), ending)
+        write_whole(written)
+        return list(written)
+
+
+def figures(result: object, names: Sequence[str] = tuple(PICTURES)) -> dict[str, Figure]:
+    """Return pictures of a result by name, each a figure that belongs to no window.
+
+    Those that there is nothing of are left out: correlations and distortion of known cameras, redundancy and
+    tests without covariances.
+
+    Parameters
+    ----------
+    result
+        An adjusted block or collection.
+    names
+        Which, of `network`, `residuals`, `redundancy`, `tests`, `correlations`, `distortion`.
+
+    Raises
+    ------
+    InputError
+        Other names.
+    ModuleNotFoundError
+        matplotlib is absent.
+    TypeError
+        A result without photos and points.
+    """
+    from photogram.show.pictures import new_figure
+
+    if unknown := [name for name in names if name not in PICTURES]:
+        raise InputError(f"there is no picture {', '.join(unknown)}, but {', '.join(PICTURES)}")
+    found = {}
+    for name in names:
+        figure = new_figure(1.0, 1.0)
+        try:
+            PICTURES[name](result, figure)
+        except InputError:
+            continue
+        found[name] = figure
+    return found
+
+
+def picture_files(result: object, folder: Path, ending: str = "png") -> dict[Path, bytes]:
+    """Return all pictures of a result as files of a folder, in the format of their ending.
+
+    Raises
+    ------
+    InputError
+        An ending that names no format.
+    ModuleNotFoundError
+        matplotlib is absent.
+    """
+    from photogram.show.pictures import files
+
+    return files(figures(result), folder, ending)

@@ -1,0 +1,75 @@
+"""Means over the cells of a frame: what many image points have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+
+__all__ = ["Cells", "cells"]
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of a frame that have image points.
+
+    Attributes
+    ----------
+    columns, rows
+        How many cells there are across and up.
+    edges
+        (2, 2) lower left and upper right corner of the frame.
+    own
+        (m,) the cell of each image point, row by row from the lower left.
+    counts
+        (rows columns,) image points of each cell.
+    """
+
+    columns: int
+    rows: int
+    edges: Floats
+    own: Indices
+    counts: Indices
+
+    @property
+    def side(self) -> Floats:
+        """Width and height of a cell."""
+        found: Floats = (self.edges[1] - self.edges[0]) / [self.columns, self.rows]
+        return found
+
+    @property
+    def middles(self) -> Floats:
+        """(rows columns, 2) middles of the cells."""
+        column, row = np.arange(self.rows * self.columns) % self.columns, np.arange(self.rows * self.columns)
+        found: Floats = self.edges[0] + self.side * (np.column_stack([column, row // self.columns]) + 0.5)
+        return found
+
+    def means(self, values: Floats) -> Floats:
+        """Return (rows columns,) means of (m,) values; NaN where a cell has none."""
+        known = np.isfinite(values)
+        sums = np.bincount(self.own[known], values[known], minlength=len(self.counts))
+        counts = np.bincount(self.own[known], minlength=len(self.counts))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(sums / counts)
+
+
+def cells(xy: Floats, longer: int) -> Cells:
+    """Return square cells, nearly, over the rectangle in which image points lie.
+
+    Parameters
+    ----------
+    xy
+        (m, 2) image coordinates.
+    longer
+        How many cells the longer side has.
+    """
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    extent = np.maximum(high - low, 1e-12 + 1e-9 * np.abs(high))
+    columns, rows = np.maximum(1, np.round(longer * extent / extent.max())).astype(int).tolist()
+    place = np.minimum((xy - low) / extent * [columns, rows], [columns - 1, rows - 1]).astype(np.int64)
+    own = place[:, 1] * columns + place[:, 0]
+    return Cells(
+        columns, rows, np.array([low, low + extent]), own, np.bincount(own, minlength=columns * rows)
+    )

@@ -1,0 +1,125 @@
+"""Redundancy numbers over the frame and over the network: where gross errors would show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.plots.cells import cells
+from photogram.plots.network import thinned, view_of_plan
+from photogram.plots.panels import Where, handed_out, note, panels
+from photogram.plots.pictured import Images, Pictured, pictured
+from photogram.plots.residuals import frame
+from photogram.show.style import INK, ORDERED
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+
+__all__ = ["redundancy"]
+
+SINGLE = 600
+"""Image points that are drawn one by one at most."""
+CELLS = 16
+"""Along the longer side of the frame."""
+POINTS = 6000
+"""Points of the network that are drawn at most."""
+
+
+def redundancy(result: object, ax: Where = None) -> Any:
+    """Draw redundancy numbers of images over the frame of all cameras, and of points over the network.
+
+    A redundancy number is the part of an error that shows in the residual of its own observation: 0 hides
+    it, 1 shows all of it. Drawn are means of x and y.
+
+    Parameters
+    ----------
+    result
+        An adjusted block or collection.
+    ax
+        Two axes, or a figure to put them in; a new one when None.
+
+    Returns
+    -------
+    An array of two axes: the frame, the network.
+
+    Raises
+    ------
+    InputError
+        The adjustment gave no redundancy numbers (`covariance=False`); another number of axes.
+    ModuleNotFoundError
+        matplotlib is absent (`pip install 'photogram[plots]'`).
+    TypeError
+        A result without photos and points.
+    """
+    drawn = pictured(result)
+    images = drawn.images
+    values = images.redundancy.mean(axis=1)
+    if not np.isfinite(values).any():
+        raise InputError("there are no redundancy numbers: adjust with covariance=True")
+    with panels(ax, 1, 2, 10.5, 4.9) as found:
+        mappable = _over_frame(found[0], images, values)
+        _over_network(found[1], drawn, values)
+        figure = found[1].get_figure()
+        assert figure is not None
+        figure.colorbar(mappable, ax=found[1], label="redundancy number, 0 to 1", aspect=30, shrink=0.85)
+    return handed_out(found)
+
+
+def _over_frame(axes: Axes, images: Images, values: Floats) -> ScalarMappable:
+    grid = cells(images.xy, CELLS)
+    frame(axes, images, grid.edges)
+    axes.set_title(f"Over the frame: mean {np.nanmean(values):.2f}, least {np.nanmin(values):.2f}")
+    if len(values) <= SINGLE:
+        return axes.scatter(
+            images.xy[:, 0], images.xy[:, 1], c=values, s=14.0, cmap=ORDERED, vmin=0.0, vmax=1.0, linewidths=0
+        )
+    table = grid.means(values).reshape(grid.rows, grid.columns)
+    (left, low), (right, high) = grid.edges
+    note(
+        axes, [f"means of cells with {grid.counts[grid.counts > 0].min():,} to {grid.counts.max():,} images"]
+    )
+    return axes.pcolormesh(
+        np.linspace(left, right, grid.columns + 1),
+        np.linspace(low, high, grid.rows + 1),
+        np.ma.masked_invalid(table),
+        cmap=ORDERED,
+        vmin=0.0,
+        vmax=1.0,
+    )
+
+
+def _over_network(axes: Axes, drawn: Pictured, values: Floats) -> None:
+    """Draw points in the colour of the least checked of their images."""
+    plan, images = drawn.plan, drawn.images
+    least = np.full(len(plan.points), np.inf)
+    np.minimum.at(least, images.points, values)
+    rows = np.flatnonzero(np.isfinite(least) & np.isfinite(plan.points).all(axis=1))
+    seen = view_of_plan(axes, plan)
+    chosen, said = thinned("points", rows, POINTS)
+    # The least on top: they are what a reader looks for.
+    chosen = chosen[np.argsort(-least[chosen], kind="stable")]
+    axes.scatter(
+        plan.points[chosen, seen[0]],
+        plan.points[chosen, seen[1]],
+        c=least[chosen],
+        s=float(np.clip(9000.0 / len(chosen), 3.0, 20.0)),
+        cmap=ORDERED,
+        vmin=0.0,
+        vmax=1.0,
+        linewidths=0,
+        rasterized=len(chosen) > 1500,
+    )
+    axes.plot(
+        *plan.photos[:: max(1, len(plan.photos) // 1000)][:, list(seen[:2])].T,
+        "+",
+        color=INK,
+        markersize=3.0,
+        markeredgewidth=0.5,
+        alpha=0.5,
+    )
+    axes.set_title("Over the network: the least of the images of a point")
+    note(axes, [said])

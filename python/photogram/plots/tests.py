@@ -1,0 +1,176 @@
+"""Test values of all observations against the normal distribution: histogram and quantiles."""
+
+from __future__ import annotations
+
+from functools import cache
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.plots.panels import Where, handed_out, labels, note, panels
+from photogram.plots.pictured import pictured
+from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
+from photogram.statistics.distributions import bonferroni, critical_normal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from photogram.statistics.outliers import Observations
+
+__all__ = ["tests"]
+
+QUANTILES = 1500
+"""Test values that are drawn against the normal distribution at most; the largest are always among them."""
+ENDS = 200
+"""Of these, the smallest and largest, each."""
+NAMED = 5
+"""Test values beyond the limit that are named at most."""
+LEVEL = 0.05
+WIDEST = 6.0
+"""What the histogram shows: values beyond are counted at its ends."""
+
+
+def tests(result: object, ax: Where = None) -> Any:  # noqa: PT028  (pytest does not call it)
+    """Draw test values w of all observations: their histogram, and their quantiles, against the normal.
+
+    w = residual / (standard deviation x root of redundancy number) is standard normal where the given
+    standard deviations are right and there are no gross errors.
+
+    Parameters
+    ----------
+    result
+        An adjusted block or collection.
+    ax
+        Two axes, or a figure to put them in; a new one when None.
+
+    Returns
+    -------
+    An array of two axes: histogram, quantiles.
+
+    Raises
+    ------
+    InputError
+        The adjustment gave no test values (`covariance=False`); another number of axes.
+    ModuleNotFoundError
+        matplotlib is absent (`pip install 'photogram[plots]'`).
+    TypeError
+        A result without photos and points.
+    """
+    drawn = pictured(result)
+    groups = drawn.tested
+    values = np.concatenate([each.values.ravel() for each in groups])
+    values = values[np.isfinite(values)]
+    if len(values) < 2:
+        raise InputError("there are no test values: adjust with covariance=True, and with redundancy")
+    with panels(ax, 1, 2, 10.0, 4.6) as found:
+        _histogram(found[0], values, drawn.unit_weight)
+        _quantiles(found[1], values, groups, drawn.unit_weight)
+    return handed_out(found)
+
+
+def _histogram(axes: Axes, values: Floats, unit_weight: float) -> None:
+    reach = float(np.clip(1.02 * np.abs(values).max(), 3.5 * min(unit_weight, 1.0), WIDEST))
+    bins = int(np.clip(2 * round(np.sqrt(len(values))), 12, 60))
+    edges = np.linspace(-reach, reach, bins + 1)
+    counts, _ = np.histogram(values, edges)
+    density = counts / (len(values) * np.diff(edges))
+    axes.stairs(density, edges, fill=True, color=SKY, alpha=0.6, label=f"{len(values):,} test values")
+    x = np.linspace(-reach, reach, 241)
+    axes.plot(x, _bell(x, 1.0), color=INK, label="normal, standard deviations as given")
+    if abs(unit_weight - 1.0) > 0.02:
+        label = f"normal, standard deviations × {unit_weight:.3g}"
+        axes.plot(x, _bell(x, unit_weight), color=MARKED, linestyle="--", label=label)
+    axes.set_ylim(0.0, 1.35 * max(float(density.max()), 0.4))
+    axes.legend(loc="upper right")
+    axes.set_xlabel("test value w")
+    axes.set_ylabel("density")
+    axes.set_title(f"Histogram: mean {values.mean():.2f}, standard deviation {values.std():.2f}")
+    beyond = int((np.abs(values) > reach).sum())
+    note(axes, [f"{beyond:,} test values lie beyond ±{reach:.1f}" if beyond else ""])
+
+
+def _bell(x: Floats, sd: float) -> Floats:
+    return np.asarray(np.exp(-0.5 * (x / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
+
+
+def _quantiles(axes: Axes, values: Floats, groups: list[Observations], unit_weight: float) -> None:
+    n = len(values)
+    rows = _rows(n)
+    probability = (rows + 0.5) / n
+    expected = normal_quantiles(probability)
+    ordered = np.sort(values)[rows]
+    # Of the order statistics of independent values, about; those of residuals are nearly so.
+    spread = 1.96 * np.sqrt(probability * (1.0 - probability) / n) / _bell(expected, 1.0)
+    band: dict[str, Any] = {"alpha": 0.35, "linewidth": 0, "color": FAINT}
+    axes.fill_between(expected, expected - spread, expected + spread, label="95 % of normal values", **band)
+    axes.plot(
+        expected[[0, -1]], expected[[0, -1]], color=INK, linewidth=0.9, label="standard deviations as given"
+    )
+    if abs(unit_weight - 1.0) > 0.02:
+        ends = expected[[0, -1]]
+        label = f"standard deviations × {unit_weight:.3g}"
+        axes.plot(ends, unit_weight * ends, color=MARKED, linewidth=0.9, linestyle="--", label=label)
+    limit = critical_normal(bonferroni(LEVEL, n))
+    beyond = np.abs(ordered) > limit
+    axes.plot(
+        expected[~beyond], ordered[~beyond], ".", color=BLUE, markersize=4.0, rasterized=len(rows) > 500
+    )
+    if beyond.any():
+        axes.plot(
+            expected[beyond], ordered[beyond], "D", color=MARKED, markersize=4.0, label=_count(values, limit)
+        )
+    axes.axhline(limit, color=FAINT, linewidth=0.7, linestyle=":")
+    axes.axhline(-limit, color=FAINT, linewidth=0.7, linestyle=":")
+    reach = 1.3 * max(float(np.abs(ordered).max()), limit)
+    axes.set_ylim(-reach, reach)
+    axes.set_xlim(1.08 * expected[0], 1.08 * expected[-1])
+    axes.set_xlabel("normal quantile")
+    axes.set_ylabel("test value w")
+    axes.set_title(f"Quantiles: limit of {n:,} tests ±{limit:.2f} (dotted)")
+    axes.legend(loc="lower right", frameon=True, framealpha=1.0, edgecolor="white")
+    worst = _worst(groups, limit)
+    if worst:
+        places = np.searchsorted(np.sort(values), [value for value, _ in worst])
+        at = np.column_stack(
+            [normal_quantiles((np.minimum(places, n - 1) + 0.5) / n), [value for value, _ in worst]]
+        )
+        labels(axes, at, [name for _, name in worst], [INK] * len(worst))
+
+
+def _count(values: Floats, limit: float) -> str:
+    count = int((np.abs(values) > limit).sum())
+    return f"beyond the limit ({count:,})"
+
+
+def _rows(n: int) -> Any:
+    """Return which of n ordered values are drawn: all of the ends, and as many between as there is room."""
+    if n <= QUANTILES:
+        return np.arange(n)
+    inner = np.linspace(ENDS, n - ENDS - 1, QUANTILES - 2 * ENDS).round().astype(np.int64)
+    return np.concatenate([np.arange(ENDS), inner, np.arange(n - ENDS, n)])
+
+
+def _worst(groups: list[Observations], limit: float) -> list[tuple[float, str]]:
+    """Return the values beyond the limit and their names, the largest first."""
+    found = []
+    for each in groups:
+        sizes = np.nan_to_num(np.abs(each.values))
+        order = np.argsort(-sizes, axis=None)[:NAMED]
+        for flat in order.tolist():
+            index = tuple(int(k) for k in np.unravel_index(flat, sizes.shape))
+            if sizes[index] > limit:
+                found.append((float(each.values[index]), each.name(index)))
+    return sorted(found, key=lambda pair: -abs(pair[0]))[:NAMED]
+
+
+@cache
+def _normal() -> NormalDist:
+    return NormalDist()
+
+
+def normal_quantiles(probability: Floats) -> Floats:
+    """Return quantiles of the normal distribution."""
+    return np.array([_normal().inv_cdf(p) for p in probability.tolist()])

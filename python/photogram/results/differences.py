@@ -1,0 +1,155 @@
+"""How far two results differ: values in standard deviations, and the standard deviations themselves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.messages import listed
+from photogram.results.result import Result, adjusted
+
+__all__ = ["Differences", "Largest", "differences"]
+
+_KINDS = ("photo", "point", "camera", "unknown")
+
+
+@dataclass(frozen=True)
+class Largest:
+    """The largest of differences.
+
+    Attributes
+    ----------
+    size
+        How large; 0 where nothing differs.
+    kind, name, component
+        Of what; empty where nothing differs.
+    """
+
+    size: float = 0.0
+    kind: str = ""
+    name: str = ""
+    component: str = ""
+
+    def __str__(self) -> str:
+        of = f" ({self.component} of {self.kind} {self.name})" if self.kind else ""
+        return f"{self.size:.3g}{of}"
+
+
+@dataclass(frozen=True)
+class Differences:
+    """How far a second result differs from a first one, in what both have.
+
+    Attributes
+    ----------
+    values
+        The largest difference of adjusted values, in standard deviations of the first result.
+    deviations
+        The largest difference of standard deviations, as a part of those of the first result.
+    variance
+        Ratio of the variances of unit weight, second to first; None where one has none.
+    alone
+        What only one of the two has, or adjusted, by kind.
+    compared
+        How many unknowns were compared.
+    """
+
+    values: Largest
+    deviations: Largest
+    variance: float | None
+    alone: dict[str, list[str]]
+    compared: int
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.compared} unknowns compared",
+            f"values differ by at most {self.values} standard deviations",
+            f"standard deviations differ by at most a part of {self.deviations}",
+        ]
+        if self.variance is not None:
+            lines.append(f"ratio of the variances of unit weight {self.variance:.9g}")
+        lines += [f"in one only, of the kind {kind}: {listed(names)}" for kind, names in self.alone.items()]
+        return "\n".join(lines)
+
+
+def differences(first: Result, second: Result) -> Differences:
+    """Return by how much a result differs from another one of the same things, by their names.
+
+    Attitudes may differ by whole turns. What has no standard deviation in the first result, or is held there,
+    is compared in nothing but its standard deviation.
+
+    Parameters
+    ----------
+    first, second
+        Results of blocks: of one block, or of different ones that have photos, points, cameras or unknowns
+        of the same names.
+
+    Raises
+    ------
+    InputError
+        What is no result of a block, or results that have nothing in common.
+    """
+    for each in (first, second):
+        if not isinstance(each, Result):
+            raise InputError(f"results of blocks are compared, not what is of the type {type(each).__name__}")
+    one, two = adjusted(first), adjusted(second)
+    values, deviations = Largest(), Largest()
+    alone: dict[str, list[str]] = {}
+    compared = 0
+    for kind in _KINDS:
+        places = [
+            {
+                (name, k): (row, part)
+                for row, name in enumerate(each.ids[kind])
+                for part, k in enumerate(each.components[kind][row])
+            }
+            for each in (one, two)
+        ]
+        shared = [key for key in places[0] if key in places[1]]
+        found = [
+            (_picked(each.values[kind], own, shared), _picked(each.sd[kind], own, shared))
+            for each, own in ((one, places[0]), (two, places[1]))
+        ]
+        (value, sd), (other, other_sd) = found
+        known = np.isfinite(value) & np.isfinite(other)
+        compared += int(np.count_nonzero(known))
+        missing = {name for name, _ in places[0].keys() ^ places[1].keys()}
+        missing |= {shared[row][0] for row in np.flatnonzero(np.isfinite(value) != np.isfinite(other))}
+        if missing:
+            alone[kind] = sorted(missing)
+        steps = other - value
+        if kind == "photo":
+            turning = np.array(
+                [component in ("omega", "phi", "kappa") for _, component in shared], dtype=bool
+            )
+            steps = np.where(turning, steps - math.tau * np.round(steps / math.tau), steps)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = _larger(values, steps / sd, kind, shared)
+            deviations = _larger(deviations, np.where(other_sd == sd, 0.0, other_sd / sd - 1), kind, shared)
+    if not compared:
+        raise InputError("the two results have nothing in common, by the names of photos and points")
+    variances = first.variance_of_unit_weight, second.variance_of_unit_weight
+    ratio = None if not variances[0] or variances[1] is None else variances[1] / variances[0]
+    return Differences(values, deviations, ratio, alone, compared)
+
+
+def _picked(
+    arrays: Sequence[Floats] | Floats,
+    places: dict[tuple[str, str], tuple[int, int]],
+    keys: Sequence[tuple[str, str]],
+) -> Floats:
+    rows = (places[key] for key in keys)
+    return np.array([arrays[row][part] for row, part in rows], dtype=float)
+
+
+def _larger(before: Largest, sizes: Floats, kind: str, keys: Sequence[tuple[str, str]]) -> Largest:
+    """Return the largest of some sizes, where it is larger than that of other kinds."""
+    found = np.where(np.isfinite(sizes), np.abs(sizes), 0.0)
+    if not len(found) or not found.max() > before.size:
+        return before
+    row = int(found.argmax())
+    return Largest(float(found[row]), kind, *keys[row])

@@ -1,0 +1,163 @@
+"""Footprints: what photos show of the ground."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Bools, Floats
+from photogram.network.block import Block
+from photogram.network.rays import LocalAxes, local_axes
+from photogram.results.result import Result
+
+__all__ = ["Footprints", "footprints", "grounds", "picture_frames"]
+
+SIDE = 4
+"""Vertices of an outline on each side of the picture."""
+HORIZON = math.radians(80.0)
+"""From the vertical: what a picture shows beyond is cut off there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Footprints:
+    """What P photos show of the ground.
+
+    Attributes
+    ----------
+    outlines
+        (P, 17, 3) closed outlines in metric axes, counter-clockwise as the corners of the picture are from
+        the lower left; NaN for photos at or below the ground, and where the lens has no ray.
+    axes
+        The metric axes: those of a rectangular block, else east, north and up amid the stations.
+    grounds
+        (P,) heights in these axes of the level planes on which they lie.
+    size
+        (P,) what a unit of the image covers on the ground along the axis, in the linear unit: the ground
+        sample distance where image coordinates are pixels.
+    cut
+        (P,) whether a picture reaches beyond 80 degrees from the vertical, where its outline is cut off.
+    """
+
+    outlines: Floats
+    axes: LocalAxes
+    grounds: Floats
+    size: Floats
+    cut: Bools
+
+    def positions(self) -> Floats:
+        """Return (P, 17, 3) the outlines as positions of the block's own kind."""
+        found = self.axes.from_local(self.outlines.reshape(-1, 3))
+        return found.reshape(self.outlines.shape)
+
+
+def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ()) -> Footprints:
+    """Return the footprints of the adjusted photos on level planes, each at the height of its own points.
+
+    Parameters
+    ----------
+    result
+        The adjusted block.
+    sizes
+        Width and height of the pictures of each camera in the unit of image coordinates. Where they are not
+        known, pictures reach as far as measurements do on all photos with the camera.
+    """
+    block = result.block.replace(
+        photo_positions=result.photo_positions,
+        photo_attitudes=result.photo_attitudes,
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
+        photo_position_sd=np.inf,
+        photo_attitude_sd=np.inf,
+    )
+    axes = local_axes(block)
+    levels = grounds(result, axes.positions(result.point_positions)[:, 2])
+    centres, turns = axes.positions(block.photo_positions), axes.cameras()
+    heights = centres[:, 2] - levels
+    cameras, photo_cameras = block.core_cameras()
+    frames = picture_frames(block, sizes)
+    rays = np.full((len(cameras), 4 * SIDE + 1, 3), np.nan)
+    for row, (model, parameters, *_) in enumerate(_adjusted_cameras(result, cameras)):
+        rays[row] = _photocore.camera_rays(model, np.array(parameters), _outline(frames[row]))
+    directions = np.einsum("pij,pvj->pvi", turns, rays[photo_cameras])
+    horizontal = np.hypot(directions[..., 0], directions[..., 1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tangents = np.where(directions[..., 2] < 0, -horizontal / directions[..., 2], np.inf)
+        far = tangents > math.tan(HORIZON)
+        reach = np.where(far, math.tan(HORIZON), tangents) * np.where(heights > 0, heights, np.nan)[:, None]
+        along = directions[..., :2] / np.where(horizontal > 0, horizontal, 1.0)[..., np.newaxis]
+        outlines = np.empty(directions.shape)
+        outlines[..., :2] = centres[:, np.newaxis, :2] + along * reach[..., np.newaxis]
+        outlines[..., 2] = np.where(np.isnan(reach), np.nan, levels[:, np.newaxis])
+        slant = heights / turns[:, 2, 2]
+    known = np.isfinite(directions[..., 2])
+    outlines[~known] = np.nan
+    size = np.where(slant > 0, slant, np.nan) / block.camera_scales()
+    return Footprints(outlines, axes, levels, size, (far & known).any(axis=1))
+
+
+def grounds(result: Result, heights: Floats) -> Floats:
+    """Return (P,) the median of the heights of the points that each photo shows; of all where it shows none.
+
+    Parameters
+    ----------
+    result
+        The adjusted block.
+    heights
+        (n,) of its points.
+    """
+    block = result.block
+    own = np.flatnonzero(result.used_images)
+    photos, seen = block.image_photos[own], heights[block.image_points[own]]
+    order = np.lexsort((seen, photos))
+    starts = np.searchsorted(photos[order], np.arange(len(block.photo_ids) + 1))
+    counts = np.diff(starts)
+    known = heights[np.isfinite(heights)]
+    found = np.full(len(counts), np.median(known) if len(known) else np.nan)
+    some = counts > 0
+    sorted_heights = seen[order]
+    low, high = starts[:-1][some] + (counts[some] - 1) // 2, starts[:-1][some] + counts[some] // 2
+    found[some] = (sorted_heights[low] + sorted_heights[high]) / 2
+    return found
+
+
+def picture_frames(block: Block, sizes: Sequence[tuple[float, float] | None] = ()) -> Floats:
+    """Return (k, 4) least x and y, largest x and y of the pictures of the cameras of a block, as its images.
+
+    Pixels of cameras whose y counts down count from the corner, all other coordinates from the middle.
+    """
+    cameras, photo_cameras = block.core_cameras()
+    of_images = photo_cameras[block.image_photos]
+    found = np.full((len(cameras), 4), np.nan)
+    for row in range(len(cameras)):
+        size = sizes[row] if row < len(sizes) else None
+        if size is not None:
+            width, height = size
+            corner = bool(block.cameras) and block.cameras[row].image_y == "down" and block.image_unit == "px"
+            middle = (0.0, 0.0) if corner else (width / 2, height / 2)
+            found[row] = -middle[0], -middle[1], width - middle[0], height - middle[1]
+            continue
+        own = block.image_xy[of_images == row]
+        if len(own):
+            found[row] = *own.min(axis=0), *own.max(axis=0)
+    return found
+
+
+def _outline(frame: Floats) -> Floats:
+    """Return (17, 2) places around a picture, the first one again at the end."""
+    left, low, right, high = frame
+    corners = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
+    steps = np.arange(4 * SIDE + 1) / SIDE
+    return np.column_stack([np.interp(steps, np.arange(5), corner) for corner in corners.T])
+
+
+def _adjusted_cameras(
+    result: Result, cameras: Sequence[tuple[str, list[float], list[float], list[float] | None]]
+) -> list[tuple[str, list[float]]]:
+    """Return models and adjusted parameters of the cameras as the core takes them."""
+    if not result.cameras:
+        return [(model, parameters) for model, parameters, *_ in cameras]
+    return [(model, each.values.tolist()) for (model, *_), each in zip(cameras, result.cameras, strict=True)]

@@ -1,0 +1,1 @@
+"""The report of an adjusted network for the browser, part by part."""

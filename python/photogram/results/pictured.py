@@ -1,0 +1,147 @@
+"""What pictures draw of an adjusted block."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.network import geometry
+from photogram.network.rays import LocalAxes, local_axes
+from photogram.plots.pictured import Correlated, Curve, Curves, Images, Pictured, Plan, pictured
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.distortion import DistortionCurve, distortion_curve
+from photogram.results.ellipses import metric_covariances
+from photogram.results.findings import tested_observations
+from photogram.results.footprints import footprints
+from photogram.results.result import Result
+from photogram.statistics.outliers import Observations
+
+__all__ = ["PicturedBlock", "curves_of"]
+
+
+class PicturedBlock(Pictured):
+    """What is drawn of an adjusted block: geographic space in axes to east, north and up amid its stations.
+
+    Parameters
+    ----------
+    result
+        The adjusted block.
+    """
+
+    def __init__(self, result: Result) -> None:
+        self.result = result
+
+    @property
+    def title(self) -> str:
+        """The title of the block."""
+        return self.result.block.title
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The network."""
+        result, block = self.result, self.result.block
+        # Differences as lengths: those of angles are too small to be taken of positions.
+        lengths = geometry.lengths_of_units(result.point_positions, block.spheroid)
+        return Plan(
+            axes=("E", "N", "h") if block.geographic else ("X", "Y", "Z"),
+            unit=block.linear_unit,
+            photo_ids=block.photo_ids,
+            photos=self._metric(result.photo_positions),
+            point_ids=block.point_ids,
+            points=np.where(result.used_points[:, np.newaxis], self._metric(result.point_positions), np.nan),
+            rays=result.point_rays,
+            kinds=result.point_kinds,
+            differences=result.point_differences * lengths,
+        )
+
+    def _metric(self, positions: Floats) -> Floats:
+        """Return (n, 3) positions in metric axes: as they are in rectangular space."""
+        return self._axes.positions(positions) if self.result.block.geographic else positions
+
+    @cached_property
+    def _axes(self) -> LocalAxes:
+        return local_axes(self.result.block)
+
+    def covariances(self, points: Indices) -> Floats:
+        """Return (k, 3, 3) covariances of points along the axes of the plan."""
+        return np.asarray(metric_covariances(self.result)[points])
+
+    @cached_property
+    def footprints(self) -> Floats:
+        """(P, v, 3) outlines of photos on level ground."""
+        found = footprints(self.result).positions()
+        return self._metric(found.reshape(-1, 3)).reshape(found.shape)
+
+    @cached_property
+    def images(self) -> Images:
+        """The image observations that took part."""
+        result, block = self.result, self.result.block
+        used = result.used_images
+        _, cameras = block.core_cameras()
+        names = block.camera_names
+        if not names:
+            distances = dict.fromkeys(block.known_distances("pictures").tolist())
+            names = [f"c = {distance:g} {block.image_unit}" for distance in distances]
+        return Images(
+            unit=block.image_unit,
+            photos=block.image_photos[used],
+            points=block.image_points[used],
+            xy=block.image_xy[used],
+            residuals=result.residuals[used],
+            redundancy=result.redundancy[used],
+            cameras=cameras[block.image_photos[used]],
+            names=names,
+            down=bool(block.cameras) and block.cameras[0].image_y == "down",
+        )
+
+    @property
+    def tested(self) -> list[Observations]:
+        """All observations with their standardized residuals."""
+        return tested_observations(self.result)
+
+    @property
+    def unit_weight(self) -> float:
+        """The root of the variance of unit weight."""
+        return float(np.sqrt(self.result.covariance_scale))
+
+    @property
+    def correlations(self) -> list[Correlated]:
+        """Cameras with two or more estimated parameters."""
+        found = []
+        for each in self.result.cameras:
+            rows = each.estimated
+            table = each.correlations[np.ix_(rows, rows)]
+            if len(rows) > 1 and np.isfinite(table).all():
+                found.append(Correlated(each.name, [each.names[k] for k in rows], table))
+        return found
+
+    @property
+    def distortion(self) -> list[Curves]:
+        """Cameras with radial distortion."""
+        curves = [(each, distortion_curve(self.result, each)) for each in self.result.cameras]
+        return [curves_of(each, curve) for each, curve in curves if curve is not None]
+
+
+def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
+    """Return what is drawn of the distortion of a camera: the curve, and its balanced form."""
+    unit = str(camera.camera.unit)
+    balanced = (
+        f"balanced at {curve.balanced_at:.4g} {unit}: principal distance {curve.balanced_distance:.6g} {unit}"
+    )
+    return Curves(
+        camera=f"{camera.name} ({camera.camera.model}, {curve.direction})",
+        unit=unit,
+        radii=curve.radii,
+        observed=curve.observed,
+        curves=[
+            Curve("", curve.values, {"mapping": curve.sd_mapping, "curve": curve.sd}),
+            Curve(balanced, curve.balanced, {"balanced curve": curve.sd_balanced}),
+        ],
+    )
+
+
+@pictured.register(Result)
+def _pictured(result: Result) -> Pictured:
+    return PicturedBlock(result)

@@ -1,0 +1,288 @@
+"""What reports and JSON documents say of reliability: a summary by kind, the weakest observations, pairs.
+
+The tests of all groups of observations, which the verdict judges, come with it: both need one factorisation
+and selected inverse at the adjusted values.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.results.reliability import Inseparable, Reliability
+from photogram.statistics.reliability import TESTABLE
+from photogram.statistics.snooping.suspects import Suspects, Tests
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+__all__ = ["KindReliability", "ReliabilitySummary", "WeakObservation", "reliability_summary"]
+
+LISTED = 5
+"""Observations of each kind that are listed."""
+PAIRS = 10
+"""Pairs that cannot be told apart that are listed."""
+LOOKED_INTO = 2_000
+"""Points whose pairs are looked into, those of the least redundancy first."""
+LIMIT = 0.9
+"""Of the correlation of two tests, from which on errors cannot be told apart (Foerstner 1983)."""
+APART = 1 / (1 + LIMIT)
+"""Redundancy from which on that of a pair cannot be reached: rho^2 <= (1 - r)(1 - s) / (r s)."""
+
+
+@dataclass(frozen=True)
+class KindReliability:
+    """The groups of observations of one kind: images, control points, positions ...
+
+    Attributes
+    ----------
+    kind
+        Its name.
+    groups, components
+        How many take part, and their rows.
+    redundancy
+        Sum of the redundancy numbers of these.
+    unchecked
+        Groups whose errors no other observation shows.
+    one_sided
+        Groups with a direction in which an error shows in no residual, among those that are checked.
+    """
+
+    kind: str
+    groups: int
+    components: int
+    redundancy: float
+    unchecked: int
+    one_sided: int
+
+
+@dataclass(frozen=True)
+class WeakObservation:
+    """A group of observations whose undetected error does most among those of its kind.
+
+    Attributes
+    ----------
+    kind, name
+        What it is.
+    redundancy
+        The least of a direction that shows.
+    detectable_sd
+        Largest half-axis of its minimal detectable error, in standard deviations.
+    external_sd
+        By how many standard deviations that moves anything at the most when it is not found.
+    own_point
+        By how much the minimal detectable error of its worst component moves its own point, in the unit of
+        the object space (of geographic coordinates the height); NaN without one.
+    """
+
+    kind: str
+    name: str
+    redundancy: float
+    detectable_sd: float
+    external_sd: float
+    own_point: float
+
+
+@dataclass(frozen=True, eq=False)
+class ReliabilitySummary:
+    """The reliability of a network in a few lines.
+
+    Attributes
+    ----------
+    level, power, known
+        Of the tests, and whether the unit weight is known.
+    kinds
+        By kind of observation.
+    weakest
+        Of each kind those whose undetected errors do most.
+    two_rays
+        Points on two photos: which of their images is wrong nothing tells.
+    pairs
+        Pairs of observations on other points that cannot be told apart, the most alike first.
+    pairs_found
+        How many of these there are among the points that were looked into.
+    points_looked_into
+        How many points these are: those with little redundancy, `LOOKED_INTO` at the most.
+    suspects, tests
+        All groups, and their tests.
+    """
+
+    level: float
+    power: float
+    known: bool
+    kinds: tuple[KindReliability, ...]
+    weakest: tuple[WeakObservation, ...]
+    two_rays: int
+    pairs: tuple[Inseparable, ...]
+    pairs_found: int
+    points_looked_into: int
+    suspects: Suspects
+    tests: Tests
+
+    @property
+    def testable(self) -> Bools:
+        """(G,) which groups have a direction whose errors show notably in their own residuals."""
+        return self.tests.testable(self.suspects.row_starts)
+
+    def table(self) -> pd.DataFrame:
+        """Return the weakest observations as a data frame."""
+        import pandas as pd
+
+        columns = list(WeakObservation.__annotations__)
+        return pd.DataFrame([asdict(each) for each in self.weakest], columns=columns)
+
+    def lines(self, unit: str) -> list[str]:
+        """Return the section of a report; `unit` is that of the object space."""
+        weight = "known" if self.known else "estimated"
+        lines = [
+            f"{'kind':<16}{'groups':>10}{'components':>12}{'redundancy':>12}{'mean':>8}{'unchecked':>11}"
+            f"{'one-sided':>11}"
+        ]
+        lines += [
+            f"{each.kind:<16}{each.groups:>10}{each.components:>12}{each.redundancy:>12.3f}"
+            f"{each.redundancy / max(each.components, 1):>8.3f}{each.unchecked:>11}{each.one_sided:>11}"
+            for each in self.kinds
+        ]
+        lines += [
+            "",
+            f"errors that are found in {100 * self.power:.0f} of 100 cases by tests of the level"
+            f" {self.level:g}, unit weight {weight}; what does most when it is not found:",
+            f"{'group':<44}{'least redundancy':>17}{'detectable sd':>15}{'moves up to sd':>16}"
+            f"{f'own point {unit}'.rstrip():>18}",
+        ]
+        lines += [
+            f"{each.name:<44}{each.redundancy:>17.3f}{each.detectable_sd:>15.2f}{each.external_sd:>16.2f}"
+            f"{f'{each.own_point:.4f}' if math.isfinite(each.own_point) else '-':>18}"
+            for each in self.weakest
+        ]
+        lines += ["", *self._pair_lines()]
+        return lines
+
+    def _pair_lines(self) -> list[str]:
+        lines = []
+        if self.two_rays:
+            lines.append(
+                f"{self.two_rays} points stand on two photos: which of their images is wrong nothing tells"
+            )
+        if self.pairs:
+            more = self.pairs_found - len(self.pairs)
+            lines.append("on other points cannot be told apart:")
+            lines += [f"  {pair}" for pair in self.pairs]
+            lines += [f"  and {more} more"] if more > 0 else []
+        return lines or ["all observations of a point can be told apart"]
+
+    def document(self) -> dict[str, Any]:
+        """Return the member `reliability` of JSON documents."""
+        return {
+            "level": self.level,
+            "power": self.power,
+            "unit_weight": "known" if self.known else "unknown",
+            "kinds": [asdict(each) for each in self.kinds],
+            "weakest": [asdict(each) for each in self.weakest],
+            "points_on_two_photos": self.two_rays,
+            "inseparable": [
+                {"first": each.first, "second": each.second, "correlation": each.correlation}
+                for each in self.pairs
+            ],
+            "inseparable_found": self.pairs_found,
+            "points_looked_into": self.points_looked_into,
+        }
+
+
+def reliability_summary(found: Reliability, *, heights: bool) -> ReliabilitySummary:
+    """Return what a report says of the reliability of a network.
+
+    Parameters
+    ----------
+    found
+        The reliability of every observation.
+    heights
+        Whether own points are judged by their heights alone: where plan coordinates are angles.
+    """
+    suspects, tests = found.suspects, found.tests
+    two, points = _points(suspects, tests)
+    checked = tests.least > TESTABLE
+    pairs = [each for each in found.inseparable_on(points, LIMIT) if checked[list(each.groups)].all()]
+    pairs.sort(key=lambda pair: -pair.correlation)
+    return ReliabilitySummary(
+        level=found.level,
+        power=found.power,
+        known=found.known,
+        kinds=tuple(_kinds(found)),
+        weakest=tuple(_weakest(found, heights=heights)),
+        two_rays=two,
+        pairs=tuple(pairs[:PAIRS]),
+        pairs_found=len(pairs),
+        points_looked_into=len(points),
+        suspects=suspects,
+        tests=tests,
+    )
+
+
+def _kinds(found: Reliability) -> list[KindReliability]:
+    suspects, tests = found.suspects, found.tests
+    rows = np.repeat(suspects.kinds, np.diff(suspects.row_starts))
+    redundancy = found.redundancy
+    kinds = []
+    for kind, name in enumerate(suspects.kind_names):
+        own, of_rows = tests.active & (suspects.kinds == kind), (rows == kind) & ~np.isnan(redundancy)
+        if own.any():
+            unchecked = own & found.untestable
+            kinds.append(
+                KindReliability(
+                    kind=name,
+                    groups=int(own.sum()),
+                    components=int(of_rows.sum()),
+                    redundancy=float(redundancy[of_rows].sum()),
+                    unchecked=int(unchecked.sum()),
+                    one_sided=int((own & found.invisible & ~unchecked).sum()),
+                )
+            )
+    return kinds
+
+
+def _weakest(found: Reliability, *, heights: bool) -> list[WeakObservation]:
+    suspects, tests = found.suspects, found.tests
+    external, detectable = found.group_external, found.group_detectable
+    checked = tests.active & (tests.least > TESTABLE)
+    weakest = []
+    for kind, name in enumerate(suspects.kind_names):
+        size = np.where(checked & (suspects.kinds == kind), external, -math.inf)
+        order = np.argsort(-size, kind="stable")[:LISTED]
+        groups = order[np.isfinite(size[order])].tolist()
+        weakest += [
+            WeakObservation(
+                kind=name,
+                name=suspects.name(group),
+                redundancy=float(tests.least[group]),
+                detectable_sd=float(detectable[group]),
+                external_sd=float(external[group]),
+                own_point=moved,
+            )
+            for group, moved in zip(groups, found.own_points(groups, heights=heights), strict=True)
+        ]
+    return weakest
+
+
+def _points(suspects: Suspects, tests: Tests) -> tuple[int, list[int]]:
+    """Return how many points stand on two photos, and others on which a pair may be alike."""
+    at = suspects.points
+    takes_part = tests.active & (at >= 0)
+    if not takes_part.any():
+        return 0, []
+    size = int(at.max()) + 1
+    images = takes_part & (suspects.kinds == 0)
+    rays = np.bincount(at[images], minlength=size)
+    others = np.bincount(at[takes_part], minlength=size) - rays
+    weak = takes_part & ~(tests.least > APART)
+    least: Floats = np.full(size, math.inf)
+    np.minimum.at(least, at[weak], np.nan_to_num(tests.least[weak]))
+    two = (rays == 2) & (others == 0)
+    several: Indices = np.flatnonzero((np.bincount(at[weak], minlength=size) > 1) & ~two)
+    order = np.argsort(least[several], kind="stable")[:LOOKED_INTO]
+    return int(two.sum()), several[order].tolist()

@@ -1,0 +1,126 @@
+"""A page as one HTML file that needs nothing else; what makes it is the extra `photogram[report]`."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from photogram import _photocore
+from photogram.show.inline import inlined
+from photogram.show.page import Cell, Column, Drawing, Layers, Page, Part, Section, Table
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
+
+__all__ = ["page_html"]
+
+
+def page_html(page: Page) -> bytes:
+    """Return a page as an HTML file (UTF-8) that needs no network and no other file.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        jinja2 or matplotlib is missing: `pip install 'photogram[report]'`.
+    """
+    environment = _environment()
+    sections = [drawn for section in page.sections if (drawn := _drawn(section)).parts]
+    known = {
+        cell.id
+        for section in sections
+        for part in section.parts
+        for table in (part.parts if isinstance(part, Layers) else (part,))
+        if isinstance(table, Table)
+        for row in table.rows
+        for cell in row
+        if isinstance(cell, Cell) and cell.id
+    }
+    text = environment.get_template("report.html").render(
+        page=replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title)),
+        sections=sections,
+        version=_photocore.__version__,
+        attributes=_attributes,
+        content=lambda column, cell: _content(column, cell, known),
+        style=_source("style.css"),
+        script=_source("script.js"),
+    )
+    return text.encode("utf-8", errors="replace")
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import BaseLoader, Environment, StrictUndefined
+
+    class Packaged(BaseLoader):
+        """Templates as they lie in the package, also in one that is zipped."""
+
+        def get_source(self, environment: Environment, template: str) -> tuple[str, None, None]:
+            return _text(template), None, None
+
+    environment = Environment(
+        loader=Packaged(),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["coded"] = _coded
+    environment.filters["zip"] = zip
+    return environment
+
+
+def _text(name: str) -> str:
+    return files("photogram.show").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+def _source(name: str) -> Markup:
+    from markupsafe import Markup
+
+    return Markup(_text(name))
+
+
+def _coded(text: str) -> Markup:
+    """Set what stands between grave accents as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def _attributes(column: Column, cell: Cell) -> Markup:
+    from markupsafe import Markup
+
+    classes = " ".join(filter(None, ("text" if column.text else "", cell.tone)))
+    found = Markup(' class="{}"').format(classes) if classes else Markup()
+    if cell.id:
+        found += Markup(' id="{}"').format(cell.id)
+    number = cell.value if isinstance(cell.value, float) and column.decimals is None else cell.sorts
+    if number is not None and math.isfinite(number):
+        found += Markup(' data-value="{}"').format(f"{number:.9g}")
+    return found
+
+
+def _content(column: Column, cell: Cell, known: set[str]) -> Markup:
+    from markupsafe import Markup, escape
+
+    text = escape(column.written(cell.value))
+    return Markup('<a href="#{}">{}</a>').format(cell.goes_to, text) if cell.goes_to in known else text
+
+
+def _drawn(section: Section) -> Section:
+    """Return a section with its pictures drawn, without those that have nothing to show."""
+    parts: list[Part] = []
+    for part in section.parts:
+        if isinstance(part, Drawing):
+            parts += [found] if (found := inlined(part)) else []
+        elif isinstance(part, Layers):
+            layers = [inlined(each) if isinstance(each, Drawing) else each for each in part.parts]
+            own = [each for each in layers if each is not None]
+            parts += own if len(own) < 2 else [Layers(part.name, own)]
+        else:
+            parts.append(part)
+    return Section(section.id, section.title, parts, section.intro)

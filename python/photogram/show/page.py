@@ -1,0 +1,325 @@
+"""What a report for the browser consists of: one page of sections with tables, figures and facts.
+
+Programs fill these classes from their results; `show.html` makes the file. None of them knows HTML.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "Cell",
+    "Column",
+    "Drawing",
+    "Fact",
+    "Facts",
+    "Judgement",
+    "Layers",
+    "Lines",
+    "Page",
+    "Part",
+    "Picture",
+    "Remarks",
+    "Row",
+    "Section",
+    "Table",
+    "Text",
+    "decimals_of",
+    "fixed",
+    "significant",
+]
+
+Tone = Literal["", "good", "look", "bad"]
+"""How a thing is to be taken: no colour stands without words that say the same."""
+
+MOST_DECIMALS = 12
+"""Of a fixed-point column."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell that is more than its text.
+
+    Attributes
+    ----------
+    value
+        Text, a number, or None for nothing.
+    goes_to
+        The `id` of a cell elsewhere on the page, to which it is a link if that is there.
+    id
+        What others link to.
+    tone
+        Whether it is to be looked at.
+    sorts
+        The number by which a text is sorted.
+    """
+
+    value: str | float | None
+    goes_to: str = ""
+    id: str = ""
+    tone: Tone = ""
+    sorts: float | None = None
+
+
+Row = Sequence[Cell | str | float | None]
+"""Cells of a table."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes
+    ----------
+    head, unit
+        Its name, and the unit of its numbers.
+    decimals
+        Of its numbers in fixed point; None for `significant` figures, as many as `figures` says.
+    figures
+        Significant figures where there are no fixed decimals.
+    text
+        Whether it holds names: set to the left.
+    """
+
+    head: str
+    unit: str = ""
+    decimals: int | None = None
+    figures: int = 4
+    text: bool = False
+
+    def written(self, value: str | float | None) -> str:
+        """Return a value as it stands in the column."""
+        if value is None:
+            return ""
+        if isinstance(value, str):
+            return value
+        if isinstance(value, int):
+            return f"{value}"
+        if math.isnan(value):
+            return "–"
+        if math.isinf(value):
+            return "∞" if value > 0 else "-∞"
+        if self.decimals is None:
+            return significant(value, self.figures)
+        return fixed(value, self.decimals)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a caption; `note` says what is not in it."""
+
+    caption: str
+    columns: Sequence[Column]
+    rows: Sequence[Row]
+    note: str = ""
+    kind: str = field(default="table", init=False)
+
+    def cells(self) -> Iterable[list[tuple[Column, Cell]]]:
+        """Return the rows as cells with their columns."""
+        for row in self.rows:
+            yield [
+                (column, each if isinstance(each, Cell) else Cell(each))
+                for column, each in zip(self.columns, row, strict=True)
+            ]
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A figure with its name: `value` is written as it stands, `note` says what it means."""
+
+    name: str
+    value: str
+    unit: str = ""
+    note: str = ""
+    tone: Tone = ""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Named figures, one under the other."""
+
+    caption: str
+    facts: Sequence[Fact]
+    kind: str = field(default="facts", init=False)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A picture that is still to be drawn.
+
+    Attributes
+    ----------
+    name
+        Unique on the page; parts of the picture are named after it.
+    title, caption
+        A word for switching, and what is to be seen.
+    draw
+        Makes the matplotlib figure; None where there is nothing to draw.
+    """
+
+    name: str
+    title: str
+    caption: str
+    draw: Callable[[], Figure | None]
+    kind: str = field(default="drawing", init=False)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture as markup that stands in the page."""
+
+    name: str
+    title: str
+    caption: str
+    markup: str
+    kind: str = field(default="figure", init=False)
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Parts of which one is shown at a time: all of them on paper, and where no script runs."""
+
+    name: str
+    parts: Sequence[Drawing | Picture | Table]
+    kind: str = field(default="layers", init=False)
+
+    def titles(self) -> list[str]:
+        """Return what the parts are called."""
+        return [each.caption if isinstance(each, Table) else each.title for each in self.parts]
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Lines of text whose columns stand below each other."""
+
+    lines: Sequence[str]
+    kind: str = field(default="lines", init=False)
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph."""
+
+    text: str
+    kind: str = field(default="text", init=False)
+
+
+@dataclass(frozen=True)
+class Remarks:
+    """Sentences, one under the other; of long ones the rest is folded away."""
+
+    sentences: Sequence[str]
+    most: int = 12
+    kind: str = field(default="remarks", init=False)
+
+
+Part = Table | Facts | Drawing | Picture | Layers | Lines | Text | Remarks
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section; one without parts is left out."""
+
+    id: str
+    title: str
+    parts: Sequence[Part]
+    intro: str = ""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What stands on top of a page: whether the result can be used.
+
+    Attributes
+    ----------
+    mark
+        In few words.
+    headline, lines
+        A sentence, and others.
+    tone
+        How it is to be taken.
+    on
+        What it is on, where a page has several.
+    """
+
+    mark: str
+    headline: str
+    lines: Sequence[str] = ()
+    tone: Tone = ""
+    on: str = ""
+
+
+@dataclass(frozen=True)
+class Page:
+    """A report.
+
+    Attributes
+    ----------
+    what, title
+        What was done, and the name of the job.
+    judgements
+        One, or one for each thing that was adjusted.
+    advice
+        What to do next, in sentences.
+    highlights
+        Few figures that a reader wants first.
+    sections
+        The others.
+    phases
+        Seconds that the engine spent in its phases.
+    """
+
+    what: str
+    title: str
+    judgements: Sequence[Judgement]
+    advice: Sequence[str]
+    highlights: Sequence[Fact]
+    sections: Sequence[Section]
+    phases: Mapping[str, float] = field(default_factory=dict)
+
+    def with_sections(self, *more: Section) -> Page:
+        """Return the page with more sections at its end."""
+        return replace(self, sections=[*self.sections, *more])
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Return a number in fixed point, zero without a sign; one that is too long for it with an exponent."""
+    if abs(value) >= 1e15:
+        return significant(value)
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if float(text) == 0 else text
+
+
+def significant(value: float, figures: int = 4) -> str:
+    """Return a number with so many significant figures, without an exponent where that is readable."""
+    if not math.isfinite(value):
+        return "–" if math.isnan(value) else "∞" if value > 0 else "-∞"
+    if value == 0:
+        return "0"
+    size = abs(value)
+    if 1e-4 <= size < 1e7:
+        decimals = max(figures - 1 - math.floor(math.log10(size)), 0)
+        return f"{value:.{decimals}f}"
+    return f"{value:.{figures - 1}e}"
+
+
+def decimals_of(deviations: Floats, figures: int = 2) -> int:
+    """Return with how many decimals values are written whose standard deviations are these.
+
+    The median standard deviation keeps so many significant figures; 4 decimals where none is known.
+    """
+    known = np.asarray(deviations, dtype=float)
+    known = known[np.isfinite(known) & (known > 0)]
+    if not known.size:
+        return 4
+    return int(np.clip(figures - 1 - math.floor(math.log10(float(np.median(known)))), 0, MOST_DECIMALS))

@@ -1,0 +1,113 @@
+"""How a report came about: program, options, inputs and times, so that it can be made again."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from photogram import _photocore
+from photogram.messages import printable
+from photogram.show.page import Column, Fact, Facts, Part, Section, Table
+
+__all__ = ["InputFile", "Run", "input_files", "reproducibility"]
+
+PIECE = 1 << 20
+LISTED = 200
+"""Input files that are listed at most."""
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file that was read."""
+
+    path: Path
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of a command.
+
+    Attributes
+    ----------
+    command
+        What was asked for, with the options that were given.
+    options
+        All options with their values, by name.
+    inputs
+        The files that were read.
+    began
+        When.
+    seconds
+        How long it took up to the report.
+    """
+
+    command: str
+    options: Mapping[str, str]
+    inputs: Sequence[InputFile]
+    began: datetime
+    seconds: float
+    others: int = field(default=0)
+    """Files that were read and are not among `inputs`."""
+
+
+def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
+    """Return regular files with sizes and SHA-256 sums, `LISTED` at most, and how many more there are."""
+    found = []
+    every = [each for each in dict.fromkeys(paths) if each.is_file()]
+    for path in every[:LISTED]:
+        total = hashlib.sha256()
+        size = 0
+        with path.open("rb") as file:
+            while piece := file.read(PIECE):
+                total.update(piece)
+                size += len(piece)
+        found.append(InputFile(path, size, total.hexdigest()))
+    return found, len(every) - len(found)
+
+
+def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
+    """Return the last section of a report.
+
+    Parameters
+    ----------
+    run
+        The run of a command; None where a report is made from Python.
+    phases
+        Seconds that the engine spent in its phases.
+    """
+    made = [Fact("photogram", _photocore.__version__), Fact("Python", platform.python_version())]
+    if run is not None:
+        stamp = run.began.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S")
+        made += [
+            Fact("Command", printable(run.command)),
+            Fact("Began", stamp, "UTC"),
+            Fact("Time up to this report", f"{run.seconds:.2f}", "s"),
+        ]
+    parts: list[Part] = [Facts("Made by", made)]
+    if run is not None and run.inputs:
+        parts.append(_inputs(run))
+    if run is not None and run.options:
+        given = {name: printable(value) for name, value in run.options.items()}
+        columns = (Column("Option", text=True), Column("Value", text=True))
+        parts.append(
+            Table("Options", columns, [*given.items()], "Those that were not given have their defaults.")
+        )
+    if phases:
+        columns = (Column("Phase", text=True), Column("Time", "s", decimals=3))
+        parts.append(Table("Time spent in the adjustment", columns, [*phases.items()]))
+    intro = (
+        "What is needed to make this page again. Everything above is the same in every run; times are not."
+    )
+    return Section("reproducibility", "Reproducibility", parts, intro)
+
+
+def _inputs(run: Run) -> Table:
+    columns = (Column("File", text=True), Column("Size", "bytes"), Column("SHA-256", text=True))
+    rows = [(printable(str(each.path)), each.size, each.sha256) for each in run.inputs]
+    return Table("Input files", columns, rows, f"and {run.others} more" if run.others else "")

@@ -1,0 +1,100 @@
+"""How pictures of all programs look: colours that colour-blind readers tell apart, and sizes of letters.
+
+The colours of kinds are those of Okabe and Ito (2008, "Color Universal Design"); ordered values have
+`cividis` (Nunez, Anderton and Renslow, PLoS ONE 13, 2018), signed ones blue over white to vermilion.
+"""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.colors import Colormap
+
+__all__ = [
+    "BLUE",
+    "COLOURS",
+    "FAINT",
+    "INK",
+    "MARKED",
+    "ORDERED",
+    "PURPLE",
+    "SKY",
+    "VERMILION",
+    "need_matplotlib",
+    "signed",
+    "styled",
+]
+
+BLACK = "#000000"
+BLUE = "#0072b2"
+VERMILION = "#d55e00"
+GREEN = "#009e73"
+PURPLE = "#cc79a7"
+ORANGE = "#e69f00"
+SKY = "#56b4e9"
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+"""Of kinds, in the order in which they are taken."""
+INK, MARKED, FAINT = "#222222", VERMILION, "#8c8c8c"
+"""What is drawn as it is, what a reader should look at, and what only helps."""
+ORDERED = "cividis"
+"""Colour map of values from small to large."""
+
+SETTINGS: dict[str, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.edgecolor": FAINT,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "legend.title_fontsize": 8.0,
+    "svg.hashsalt": "photogram",
+    # Letters stay letters: pictures are smaller, and can be searched.
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"],
+}
+
+
+def need_matplotlib() -> None:
+    """Say how to get matplotlib where it is absent.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        It is: the message names the extra.
+    """
+    try:
+        import matplotlib  # noqa: F401
+    except ModuleNotFoundError as error:
+        if error.name != "matplotlib":
+            raise
+        said = "pictures need matplotlib: pip install 'photogram[plots]'"
+        raise ModuleNotFoundError(said, name="matplotlib") from None
+
+
+def styled() -> AbstractContextManager[None]:
+    """Return a context in which axes, letters and legends are those of the house."""
+    need_matplotlib()
+    import matplotlib as mpl
+
+    settings: Any = SETTINGS
+    return mpl.rc_context(settings)
+
+
+def signed() -> Colormap:
+    """Return the colour map of values from minus to plus: blue, white, vermilion."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("signed", [BLUE, "#ffffff", VERMILION])

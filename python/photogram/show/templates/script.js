@@ -1,0 +1,62 @@
+"use strict";
+// Columns are sorted by a click on their heads; names by the numbers in them, too.
+for (const table of document.querySelectorAll("table")) {
+  const body = table.tBodies[0];
+  if (body.rows.length < 2) continue;
+  const value = (row, column) => row.cells[column].dataset.value ?? row.cells[column].textContent;
+  [...table.tHead.rows[0].cells].forEach((head, column) => {
+    const button = document.createElement("button");
+    button.append(...head.childNodes);
+    head.append(button);
+    button.addEventListener("click", () => {
+      const text = head.classList.contains("text");
+      const before = head.getAttribute("aria-sort");
+      const up = before ? before === "descending" : text;
+      for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
+      head.setAttribute("aria-sort", up ? "ascending" : "descending");
+      const rows = [...body.rows];
+      const known = (row) => text || !Number.isNaN(parseFloat(value(row, column)));
+      rows.sort((a, b) => {
+        if (!known(a) || !known(b)) return known(b) - known(a);
+        const order = text
+          ? value(a, column).localeCompare(value(b, column), "en", { numeric: true })
+          : parseFloat(value(a, column)) - parseFloat(value(b, column));
+        return up ? order : -order;
+      });
+      body.append(...rows);
+    });
+  });
+}
+// Of layers one is shown; on paper, and without this script, all are.
+for (const group of document.querySelectorAll(".layers")) {
+  const layers = [...group.children];
+  if (layers.length < 2) continue;
+  const bar = document.createElement("div");
+  bar.className = "switch";
+  bar.setAttribute("role", "tablist");
+  const show = (chosen) => layers.forEach((layer, k) => {
+    layer.hidden = layer !== chosen;
+    bar.children[k].setAttribute("aria-selected", String(layer === chosen));
+  });
+  for (const layer of layers) {
+    const button = document.createElement("button");
+    button.setAttribute("role", "tab");
+    button.textContent = layer.dataset.title;
+    button.addEventListener("click", () => show(layer));
+    bar.append(button);
+  }
+  group.classList.add("switched");
+  group.prepend(bar);
+  show(layers[0]);
+}
+// A link into a layer that is not shown brings it forward.
+const reveal = () => {
+  const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  const layer = target && target.closest(".layer[hidden]");
+  if (!layer) return;
+  const bar = layer.parentElement.querySelector(".switch");
+  bar.children[[...layer.parentElement.querySelectorAll(".layer")].indexOf(layer)].click();
+  target.scrollIntoView();
+};
+window.addEventListener("hashchange", reveal);
+reveal();

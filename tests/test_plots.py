@@ -1,0 +1,233 @@
+"""Pictures of results: axes in and out, all kinds of networks, nothing over anything else, equal files."""
+
+import re
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from example_scripts import EXAMPLES, load
+from photogram import adjust, collection, simulate
+from photogram.errors import InputError
+from photogram.giant import read_project
+from photogram.plots import PICTURES, figures, picture_files
+from photogram.plots.cells import cells
+from photogram.plots.panels import labels
+from photogram.plots.pictured import pictured
+from photogram.show.pictures import drawn
+
+ALWAYS = {"network", "residuals", "redundancy", "tests"}
+
+
+@pytest.fixture(scope="module")
+def galveston():
+    return adjust(read_project(files("photogram") / "examples" / "galveston").to_block())
+
+
+@pytest.fixture(scope="module")
+def calibrated():
+    return adjust(load("self_calibration").measured())
+
+
+@pytest.fixture(scope="module")
+def ring():
+    return collection.adjust(collection.read(files("photogram") / "examples" / "collection" / "ring.txt"))
+
+
+@pytest.fixture(scope="module")
+def large():
+    return adjust(simulate(strips=8, photos_per_strip=60, points_per_photo=30, position_sd=0.1, seed=1).block)
+
+
+def written(figure):
+    """Return all letters of a figure that are seen."""
+    found = []
+    for axes in figure.axes:
+        found += [axes.get_title(loc="left"), axes.get_xlabel(), axes.get_ylabel()]
+        found += [text.get_text() for text in axes.texts]
+        found += [artist.txt.get_text() for artist in axes.artists if hasattr(artist, "txt")]
+        if axes.get_legend():
+            found += [text.get_text() for text in axes.get_legend().get_texts()]
+    return "\n".join(found)
+
+
+def test_every_network_has_its_pictures(galveston, calibrated, ring):
+    assert set(figures(galveston)) == ALWAYS
+    assert set(figures(calibrated)) == set(figures(ring)) == set(PICTURES)
+
+
+def test_pictures_take_axes_and_return_them(calibrated):
+    figure = Figure()
+    axes = figure.subplots(3, 2)
+    assert calibrated.plot.network(axes[0, 0]) is axes[0, 0]
+    assert calibrated.plot.correlations(axes[0, 1]) is axes[0, 1]
+    assert calibrated.plot.residuals(axes[1, 0]) is axes[1, 0]
+    assert calibrated.plot.tests(axes[2]).tolist() == axes[2].tolist()
+    with pytest.raises(InputError, match="2 panels, but ax is 1 axes"):
+        calibrated.plot.redundancy(axes[1, 1])
+
+
+def test_without_axes_there_is_a_new_figure_of_pyplot(galveston):
+    from matplotlib import pyplot
+
+    before = pyplot.get_fignums()
+    axes = galveston.plot.network()
+    [number] = set(pyplot.get_fignums()) - set(before)
+    assert axes.get_figure().number == number
+    pyplot.close(number)
+
+
+def test_pictures_of_what_is_not_there_say_so(galveston):
+    with pytest.raises(InputError, match="no correlations to draw"):
+        galveston.plot.correlations()
+    with pytest.raises(InputError, match="no distortion to draw"):
+        galveston.plot.distortion()
+    with pytest.raises(InputError, match="plane is one of XY, XZ, YZ"):
+        galveston.plot.network(plane="up")
+    with pytest.raises(InputError, match="there is no picture map"):
+        figures(galveston, ["map"])
+    with pytest.raises(TypeError, match="no pictures of str"):
+        figures("galveston")
+    bare = adjust(galveston.block, covariance=False)
+    assert set(figures(bare)) == {"network", "residuals"}
+
+
+def test_the_network_shows_what_it_is_of(galveston):
+    said = written(figures(galveston, ["network"])["network"])
+    assert "E, m" in said
+    assert "photo (20)" in said
+    assert "control point (22)" in said
+    assert "2 rays (21)" in said
+    assert "semi-axes of error ellipses, 95%" in said
+    names = galveston.block.point_ids
+    in_plan = pictured(galveston).covariances(np.arange(len(names)))[:, :2, :2]
+    sizes = np.sqrt(np.linalg.eigvalsh(in_plan)[:, 1])
+    worst = int(np.nanargmax(sizes))
+    assert f"{2.4477 * sizes[worst]:.3g} m, point {names[worst]}" in said
+
+
+def test_large_networks_are_thinned_and_the_picture_says_so(large):
+    drawn = figures(large)
+    said = written(drawn["network"])
+    assert "400 of 480 footprints are drawn" in said
+    assert "the median one of each of" in said
+    count = sum(len(each.get_offsets()) for each in drawn["network"].axes[0].collections[1:6])
+    assert count <= 6000 + 150
+    assert "means of cells with" in written(drawn["residuals"])
+    content = picture_files(large, Path("pictures"), "svg")
+    assert {path.name for path in content} == {f"{name}.svg" for name in ALWAYS}
+    assert sum(map(len, content.values())) < 3e6
+
+
+def test_names_do_not_touch(galveston):
+    figure = figures(galveston, ["network"])["network"]
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    named = [
+        text
+        for text in axes.texts
+        if text.get_text() in {*galveston.block.photo_ids, *galveston.block.point_ids}
+    ]
+    assert len(named) > 30
+    boxes = [text.get_window_extent() for text in named]
+    for row, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[:row])
+
+
+def test_a_name_without_room_is_left_out():
+    figure = Figure(figsize=(2.0, 2.0))
+    axes = figure.subplots()
+    axes.set(xlim=(0, 1), ylim=(0, 1))
+    places = np.full((12, 2), 0.5) + 1e-3 * np.arange(12)[:, np.newaxis]
+    left_out = labels(axes, places, ["a long name"] * 12, ["black"] * 12)
+    assert 0 < left_out < 12
+    assert len(axes.texts) == 12 - left_out
+
+
+def test_means_of_cells():
+    random = np.random.default_rng(5)
+    xy = random.uniform([-30.0, -10.0], [30.0, 10.0], (2000, 2))
+    grid = cells(xy, 6)
+    assert (grid.columns, grid.rows) == (6, 2)
+    np.testing.assert_allclose(grid.means(xy[:, 0]), grid.middles[:, 0], atol=1.5)
+    np.testing.assert_allclose(grid.means(xy[:, 1]), grid.middles[:, 1], atol=1.5)
+    assert grid.counts.sum() == 2000
+
+
+def test_a_lens_that_was_left_out_shows_in_the_means_of_the_cells(large):
+    block = large.block
+    radius = np.hypot(*block.image_xy.T)[:, np.newaxis]
+    bent = block.replace(image_xy=block.image_xy * (1 + 3e-8 * radius**2))
+    said = written(figures(adjust(bent), ["residuals"])["residuals"])
+    assert "are larger than chance gives" in said
+    assert "are larger than chance gives" not in written(figures(large, ["residuals"])["residuals"])
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_equal_results_give_equal_files(ring, ending):
+    path = Path(f"network.{ending}")
+    first, second = (drawn(figures(ring, ["network"])["network"], path) for _ in range(2))
+    assert first == second
+
+
+def test_saved_pictures_are_all_there(calibrated, tmp_path):
+    found = calibrated.plot.save(tmp_path, "svg")
+    assert [path.name for path in found] == [f"{name}.svg" for name in PICTURES]
+    assert all(path.read_bytes().startswith(b"<?xml") for path in found)
+    with pytest.raises(InputError, match="matplotlib draws no 'doc'"):
+        calibrated.plot.save(tmp_path, "doc")
+
+
+@pytest.mark.parametrize("command", ["giant", "collection", "adjust"])
+def test_commands_write_all_pictures(run, tmp_path, command):
+    result = run(command, "--example", "--out", "o", "--plots", "--plot-format", "svg", "--quiet")
+    assert result.exit_code == 0, result.output
+    there = {path.stem for path in (tmp_path / "o").glob("*.svg")}
+    assert there >= ALWAYS
+
+
+def test_pictures_need_a_place(run):
+    result = run("collection", "--example", "--plots")
+    assert result.exit_code == 2
+    assert "goes with --out DIR" in result.stderr
+
+
+def test_a_result_is_there_without_matplotlib_and_pictures_name_the_extra(galveston, monkeypatch):
+    for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert "network" in repr(galveston.plot)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'photogram\[plots\]'"):
+        galveston.plot.network()
+
+
+def test_an_adjustment_loads_no_matplotlib():
+    code = (
+        "import sys, photogram; r = photogram.adjust(photogram.simulate(strips=2, photos_per_strip=3).block);"
+        " r.plot; assert 'matplotlib' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_page_quotes_the_example_and_shows_pictures_that_are_there():
+    root = Path(__file__).parents[1]
+    command = [sys.executable, root / "docs" / "regenerate.py", "--check", "pictures.md"]
+    assert subprocess.run(command, check=False).returncode == 0
+    page = (root / "docs" / "pictures.md").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[[^\]]+\]\(pictures/(\w+)\.svg\)", page)
+    assert sorted(shown) == sorted(PICTURES)
+    for name in shown:
+        assert 5_000 < (root / "docs" / "pictures" / f"{name}.svg").stat().st_size < 200_000
+
+
+def test_the_example_writes_all_pictures(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLES)
+    load("pictures").main([str(tmp_path)])
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "side-by-side.png",
+        *(f"{name}.svg" for name in PICTURES),
+    }
