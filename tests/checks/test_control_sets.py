@@ -50,6 +50,22 @@ def test_a_mistake_in_all_control_is_explained(factors, kind):
     )
 
 
+@pytest.mark.parametrize(("axis", "size"), [(0, 30.0), (2, 30.0), (0, 300.0), (2, 300.0)])
+def test_heights_in_feet_with_a_gross_error_beside(axis, size):
+    """Both are named: the unit of all heights, and the point that is wrong besides."""
+    positions = BLOCK.point_positions.copy()
+    held = np.isfinite(BLOCK.point_sd)
+    positions[held[:, 2], 2] /= 0.3048
+    full = np.flatnonzero(held.all(axis=1))
+    point = int(full[len(full) // 2])
+    positions[point, axis] += size
+    found = check(BLOCK.replace(point_positions=positions), threads=1)
+    assert [each.kind for each in found.grave] == ["control-set", "control-misfit"]
+    assert "heights of the control are in feet" in found.grave[0].text
+    assert found.grave[1].points == [BLOCK.point_ids[point]]
+    assert found.verdict.code == "hint"
+
+
 def test_good_control_is_neither_doubted_nor_explained():
     assert not doubtful(ADJUSTER.tried(BLOCK), "control")
     assert explain(free_model(BLOCK, ADJUSTER)) is None

@@ -111,6 +111,8 @@ class NetworkTrial:
             kind, _, combinations, points = error.args
             if kind == "undetermined points":
                 raise LostSupportError(points, []) from error
+            if kind == "not finite":
+                raise LostSupportError([], []) from error
             if kind == "undetermined photos":
                 photos = {photo for combination in combinations for photo in combination[0]}
                 raise LostSupportError([], sorted(photos)) from error

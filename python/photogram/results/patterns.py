@@ -212,7 +212,10 @@ def _of_heights(result: AdjustedNetwork) -> Systematic | None:
     if not tested.any():
         return None
     plan = result.point_positions[:, :2] - result.point_positions[tested, :2].mean(axis=0)
-    plan = plan / max(float(np.abs(plan[tested]).max()), 1e-300)
+    extent = float(np.abs(plan[tested]).max())
+    if not extent > 0:
+        return None
+    plan = plan / extent
     x, y = plan.T
     design = np.column_stack([np.ones(len(w)), x, y, x * x, x * y, y * y])
     return _regressed(

@@ -16,7 +16,17 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 
-__all__ = ["Fit", "FramePattern", "Normality", "frame_pattern", "group_patterns", "normality", "regression"]
+__all__ = [
+    "Fit",
+    "FramePattern",
+    "Normality",
+    "durbin_watson",
+    "frame_pattern",
+    "group_patterns",
+    "moran",
+    "normality",
+    "regression",
+]
 
 MOST = 20_000
 """Values whose distribution is looked at; of more every so many-th."""
@@ -26,6 +36,9 @@ BINS = 5
 
 FULL = 10.0
 """Redundancy that a bin of the frame needs."""
+
+CELLS = 10
+"""Of the frame in each direction: images in one cell are neighbours."""
 
 
 @dataclass(frozen=True)
@@ -252,3 +265,62 @@ def regression(values: Floats, design: Floats, used: Bools | None = None) -> Fit
     statistic = (explained / first) / (left / second)
     probability = _photocore.fisher(statistic, float(first), second)
     return Fit(statistic, (float(first), second), probability, math.sqrt(explained / len(y)))
+
+
+def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
+    """Return Moran's I of residuals over the frame: how alike those of neighbours are (Moran 1950).
+
+        I = (n / S0) sum w_ij z_i z_j / sum z_i^2,     S0 = sum w_ij
+
+    summed over x and y. Neighbours are images in one of 10 x 10 cells of the frame but on different photos,
+    since errors of the object make images of one photo alike; w_ij is 1 / (number of neighbours of i). About
+    0 without a pattern; NaN where nothing has a neighbour.
+
+    Parameters
+    ----------
+    xy, photos, residuals
+        (m, 2), (m,), (m, 2) image coordinates, photo and ~v of each image.
+    """
+    if not len(xy):
+        return math.nan
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    width = np.where(high > low, high - low, 1.0)
+    places = np.minimum((CELLS * (xy - low) / width).astype(np.int64), CELLS - 1)
+    cells = places[:, 0] * CELLS + places[:, 1]
+    _, shared = np.unique(cells * (int(photos.max()) + 1) + photos, return_inverse=True)
+    neighbours = np.bincount(cells)[cells] - np.bincount(shared)[shared]
+    seen = neighbours > 0
+    squares = float((residuals**2).sum())
+    if not (seen.any() and squares > 0):
+        return math.nan
+    products = 0.0
+    for z in residuals.T:
+        others = np.bincount(cells, weights=z)[cells] - np.bincount(shared, weights=z)[shared]
+        products += float((z[seen] * others[seen] / neighbours[seen]).sum())
+    return len(xy) / int(seen.sum()) * products / squares
+
+
+def durbin_watson(photos: Indices, count: int, residuals: Floats, redundancy: Floats) -> float:
+    """Return d of the mean residuals of photos in their order (Durbin and Watson 1950).
+
+        d = sum (m_(p+1) - m_p)^2 / sum m_p^2,     m_p = sum ~v / root of sum r
+
+    summed over x and y; about 2 where the residuals of one photo say nothing of the next, towards 0 where
+    they drift. NaN of fewer than three photos.
+
+    Parameters
+    ----------
+    photos, count
+        (m,) the photo of each image, and how many there are.
+    residuals, redundancy
+        (m, 2) ~v and r.
+    """
+    steps = squares = 0.0
+    for v, r in zip(residuals.T, redundancy.T, strict=True):
+        sums, checked = (np.bincount(photos, weights=each, minlength=count) for each in (v, r))
+        means = sums[checked > 0] / np.sqrt(checked[checked > 0])
+        if means.size < 3:
+            return math.nan
+        steps += float((np.diff(means) ** 2).sum())
+        squares += float((means**2).sum())
+    return steps / squares if squares > 0 else math.nan

@@ -24,7 +24,8 @@ impl Bundle {
             let first = self.of_block(photo).start + 3;
             let three = |all: &[f64]| -> [f64; 3] { std::array::from_fn(|k| all[first + k]) };
             let (angles, observed, sd) = (three(values), three(prior), Vector3::from(three(sd)));
-            if sd.iter().all(|sd| sd.is_infinite()) {
+            // An attitude that is held, of a photo that is tried without for one, is no observation.
+            if sd.iter().all(|sd| sd.is_infinite()) || sd.iter().any(|&sd| sd == 0.0) {
                 return None;
             }
             let is_steep = observed[1].cos().abs() < STEEP.max(REACH * sd.max());

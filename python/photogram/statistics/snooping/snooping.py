@@ -45,6 +45,8 @@ SCALES = 5
 """Robust adjustments at the most until their scale stands."""
 LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
 """Images of a photo that are out, by number and share, from which on the whole photo goes."""
+BAD_PHOTOS = 5
+"""Photos that are taken out before single images are tested, at the most."""
 RESCUES = 5
 """Attempts to leave a round with everything determined."""
 
@@ -135,6 +137,7 @@ class _Snooping:
         self.images = frozenset(np.flatnonzero(suspects.kinds == 0).tolist())
 
     def run(self) -> Outcome:
+        self._take_bad_photos_out()
         if self._needs_robust_start():
             self._start_robustly()
         else:
@@ -296,13 +299,13 @@ class _Snooping:
             return
         sizes, scale = robust
         candidates = np.flatnonzero((sizes > CANDIDATE * scale) & suspects.removable & self.tests.active)
-        first, standing = self.tests, self.standing
+        first, standing, start = self.tests, self.standing, self.out
         points = np.unique(suspects.points[candidates])
         choices, judged = self._on_points_aside(points[points >= 0].tolist(), candidates, first)
         others = candidates[~np.isin(suspects.points[candidates], sorted(judged))]
         entries = [self._as_it_was(group, first) for group in others.tolist()]
         entries += self._entries(choices, 0)
-        self.out = Out(np.zeros(len(self.out.rows), dtype=bool))
+        self.out = start
         removed = self._apply(entries, [])
         if not removed:
             self._adjust(self.out)
@@ -330,7 +333,8 @@ class _Snooping:
         self, points: list[int], candidates: Indices, first: Tests
     ) -> tuple[list[Choice], set[int]]:
         """Adjust without some points and all candidates; choose on these points; tell which were judged."""
-        out = Out(np.zeros(len(self.out.rows), dtype=bool), points=set(points))
+        out = self.out.copy()
+        out.points |= set(points)
         aside = np.isin(self.suspects.points, points)
         aside[candidates] = True
         out.rows[np.repeat(aside, np.diff(self.suspects.row_starts))] = True
@@ -472,6 +476,55 @@ class _Snooping:
             self._keep(each)
         return []
 
+    def _take_bad_photos_out(self) -> None:
+        """Take out as one group each photo whose images all disagree: those of another exposure, wrong names.
+
+        Such a photo spoils all around it, so that nothing can be told of single images. The median of its
+        test values stands out: a few gross errors do not move it. Where that is by its observed station, the
+        photo stays, and the station is left to its own test.
+        """
+        for _ in range(BAD_PHOTOS):
+            middles = self._middles()
+            if not len(middles) or np.isnan(middles).all():
+                return
+            worst, usual = int(np.nanargmax(middles)), float(np.nanmedian(middles))
+            if not middles[worst] > FAR * max(usual, 1.0) or self._is_by_station(worst, middles[worst]):
+                return
+            said = f"its test values have the median {middles[worst]:.3g}, those of other photos {usual:.3g}"
+            if self._photo_out(worst, 0, said) is None:
+                return
+
+    def _middles(self) -> Floats:
+        """Return the median of the test values of the images of each photo, in standard deviations."""
+        suspects, tests = self.suspects, self.tests
+        tested = (suspects.kinds == 0) & self._testable()
+        size = np.sqrt(tests.statistic / np.maximum(tests.rank, 1))
+        photos = int(suspects.photos.max(initial=-1)) + 1
+        found: Floats = np.full(photos, math.nan)
+        for photo in range(photos):
+            own = suspects.on_photo(photo)
+            own = own[tested[own]]
+            if own.size >= LEAST_OF_PHOTO:
+                found[photo] = float(np.median(size[own]))
+        return found
+
+    def _is_by_station(self, photo: int, middle: float) -> bool:
+        """Whether the images of a photo agree as soon as its observed position and attitude are out."""
+        own = self.suspects.on_photo(photo)
+        stations = own[(self.suspects.kinds[own] != 0) & self.tests.active[own]]
+        if not stations.size:
+            return False
+        out, before = self.out.copy(), self.out
+        for group in stations.tolist():
+            out.rows[self.suspects.rows(group)] = True
+        try:
+            self._adjust(out)
+            left = self._middles()[photo]
+            self._adjust(before)
+        except LostSupportError:
+            return False
+        return bool(left < middle / FAR)
+
     def _take_photos_out(self, number: int) -> list[int]:
         """Take out as a whole the photos most of whose images are out, each by itself."""
         suspects = self.suspects
@@ -480,51 +533,56 @@ class _Snooping:
         counts = np.bincount([photo for photo in photos if photo >= 0])
         added = []
         for photo in np.flatnonzero(counts >= LEAST_OF_PHOTO).tolist():
-            own = suspects.on_photo(photo)
-            images = [group for group in own.tolist() if group in self.images]
-            if photo in self.out.photos or counts[photo] <= MOST_OF_PHOTO * len(images):
+            images = sum(group in self.images for group in suspects.on_photo(photo).tolist())
+            if photo in self.out.photos or counts[photo] <= MOST_OF_PHOTO * images:
                 continue
-            out, before = self.out.copy(), self.standing
-            rows = np.concatenate([suspects.rows(group) for group in own.tolist()])
-            out.rows[rows] = True
-            out.photos.add(photo)
-            consequences: list[str] = []
-            for group in images:
-                for point in sorted(self.trial.consequences(out, group)[0] - out.points):
-                    out.points.add(point)
-                    consequences += self._left(out, point)
-            try:
-                self._adjust(out)
-            except LostSupportError:
-                continue
-            omega = before.weighted_sum_of_squares - self.standing.weighted_sum_of_squares
-            freedom = before.degrees_of_freedom - self.standing.degrees_of_freedom
-            self.log.append(
-                Removal(
-                    round=number,
-                    group=images[0],
-                    kind="photo",
-                    name=f"all of {suspects.photo_name(photo)}",
-                    rows=(),
-                    components=(),
-                    units=(),
-                    dimension=freedom,
-                    first_statistic=omega,
-                    statistic=omega,
-                    fisher=math.nan,
-                    log_probability=float(log_chi_square(max(omega, 0.0), max(freedom, 1))),
-                    limit=self.level.limit(0),
-                    error=(),
-                    error_sd=(),
-                    redundancy=math.nan,
-                    consequences=(
-                        f"{counts[photo]} of its {len(images)} images had gone one by one",
-                        *consequences,
-                    ),
-                )
-            )
-            added.append(len(self.log) - 1)
+            said = f"{counts[photo]} of its {images} images had gone one by one"
+            place = self._photo_out(photo, number, said)
+            added += [] if place is None else [place]
         return added
+
+    def _photo_out(self, photo: int, number: int, said: str) -> int | None:
+        """Take a photo out with all that was observed of it; return the place of its entry in the log."""
+        suspects = self.suspects
+        own = suspects.on_photo(photo)
+        images = [group for group in own.tolist() if group in self.images]
+        out, before = self.out.copy(), self.standing
+        out.rows[np.concatenate([suspects.rows(group) for group in own.tolist()])] = True
+        out.photos.add(photo)
+        consequences: list[str] = []
+        for group in images:
+            for point in sorted(self.trial.consequences(out, group)[0] - out.points):
+                out.points.add(point)
+                consequences += self._left(out, point)
+        try:
+            self._adjust(out)
+        except LostSupportError:
+            self._adjust(self.out)
+            return None
+        omega = before.weighted_sum_of_squares - self.standing.weighted_sum_of_squares
+        freedom = before.degrees_of_freedom - self.standing.degrees_of_freedom
+        self.log.append(
+            Removal(
+                round=number,
+                group=images[0],
+                kind="photo",
+                name=f"all of {suspects.photo_name(photo)}",
+                rows=(),
+                components=(),
+                units=(),
+                dimension=freedom,
+                first_statistic=omega,
+                statistic=omega,
+                fisher=math.nan,
+                log_probability=float(log_chi_square(max(omega, 0.0), max(freedom, 1))),
+                limit=self.level.limit(0),
+                error=(),
+                error_sd=(),
+                redundancy=math.nan,
+                consequences=(said, *consequences),
+            )
+        )
+        return len(self.log) - 1
 
     def _forced(self, entry: Removal, points: tuple[int, ...]) -> Removal:
         own = int(self.suspects.points[entry.group])

@@ -1,0 +1,67 @@
+"""Patterns of residuals against draws of residuals without any."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from photogram import adjust, simulate
+from photogram.errors import InputError
+from photogram.results.drawn_patterns import drawn_patterns
+from photogram.statistics.patterns import durbin_watson, moran
+
+BLOCK = simulate(strips=2, photos_per_strip=4, seed=5).block
+
+
+def test_moran_is_its_double_sum():
+    random = np.random.default_rng(3)
+    xy, photos = random.uniform(-100, 100, (60, 2)), random.integers(0, 4, 60)
+    z = random.normal(size=(60, 2))
+    low, width = xy.min(axis=0), np.ptp(xy, axis=0)
+    cell = np.minimum((10 * (xy - low) / width).astype(int), 9)
+    total = weights = 0.0
+    for i in range(60):
+        near = [j for j in range(60) if (cell[i] == cell[j]).all() and photos[i] != photos[j]]
+        for j in near:
+            total += z[i] @ z[j] / len(near)
+            weights += 1 / len(near)
+    assert moran(xy, photos, z) == pytest.approx(60 / weights * total / (z**2).sum())
+
+
+def test_durbin_and_watson_by_hand():
+    """Means 1, 2, 4 of three photos with a redundancy of 1 each: (1 + 4) / 21 in x, and the same in y."""
+    photos = np.array([0, 1, 2])
+    v = np.array([[1.0, 1.0], [2.0, 2.0], [4.0, 4.0]])
+    assert durbin_watson(photos, 3, v, np.ones((3, 2))) == pytest.approx(5 / 21)
+    assert np.isnan(durbin_watson(photos[:2], 2, v[:2], np.ones((2, 2))))
+
+
+def test_a_good_block_has_no_pattern_and_waves_have_one():
+    good = drawn_patterns(adjust(BLOCK), draws=60)
+    assert {each.statistic for each in good} == {"B", "I", "d"}
+    assert all(each.probability > 0.02 and each.draws == 60 for each in good)
+    xy = BLOCK.image_xy
+    waves = adjust(BLOCK.replace(image_xy=xy + 0.010 * np.sin(xy[:, ::-1] / 30)))
+    found = {each.statistic: each for each in drawn_patterns(waves, draws=60)}
+    assert found["B"].probability == found["I"].probability == pytest.approx(1 / 61)
+    assert found["I"].value > found["I"].expected + 4 * found["I"].sd
+
+
+def test_probabilities_are_uniform_where_there_is_no_pattern():
+    """Of 40 blocks without a pattern about as many have a p above a half as below, and few a small one."""
+    p = []
+    for seed in range(40):
+        block = simulate(strips=1, photos_per_strip=4, points_per_photo=40, seed=seed).block
+        p.append([each.probability for each in drawn_patterns(adjust(block), draws=19)])
+    for column in itertools.zip_longest(*p):
+        values = np.array([each for each in column if each is not None])
+        assert len(values) > 30
+        assert 0.3 < values.mean() < 0.7
+        assert (values <= 0.05).mean() < 0.2
+
+
+def test_what_cannot_be_tested():
+    with pytest.raises(InputError, match="without a loss"):
+        drawn_patterns(adjust(BLOCK, loss="huber"))
+    with pytest.raises(InputError, match="one draw"):
+        drawn_patterns(adjust(BLOCK), draws=0)
