@@ -274,7 +274,9 @@ def with_control(
         ),
         messages=(*messages, *carried.messages[len(project.messages) :]),
     )
-    planes = [each for each in plane_remarks(found) if each not in found.messages]
+    planes = [
+        each for each in plane_remarks(found.block, found.path, found.starts) if each not in found.messages
+    ]
     return found.replace(messages=(*found.messages, *planes))
 
 

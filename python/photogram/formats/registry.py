@@ -33,6 +33,7 @@ FORMATS: dict[str, Format] = {
         "bingo",
         "dbat",
         "giant",
+        "results",
     )
 }
 """By name, in the order in which help lists them."""
@@ -109,7 +110,9 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     with turned(f"reading {path}"):
         try:
             project = chosen.read(path, wishes or Wishes())
-            return project.replace(messages=(*project.messages, *plane_remarks(project)))
+            return project.replace(
+                messages=(*project.messages, *plane_remarks(project.block, path, project.starts))
+            )
         except InputError as error:
             # What refuses arrays or systems of coordinates does not know where they came from.
             raise (error if error.file else InputError(error.message, file=path)) from None

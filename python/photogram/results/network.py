@@ -148,7 +148,7 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
 
-    BESIDE: ClassVar[frozenset[str]] = frozenset(
+    _BESIDE: ClassVar[frozenset[str]] = frozenset(
         {"seconds", "operations", "predictions", "formations", "state"}
     )
 
