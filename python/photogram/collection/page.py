@@ -11,7 +11,7 @@ from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.findings import names
 from photogram.collection.report import problems_of
 from photogram.results.page.frame import Frame
-from photogram.results.page.observed import Images, observed_table, worst_images
+from photogram.results.page.observed import Images, observed_table, worst_images, worst_of
 from photogram.results.page.parts import (
     images_facts,
     iterations_section,
@@ -48,7 +48,8 @@ def collection_page(result: AdjustedCollection) -> Page:
     given, (photos, points) = result.collection, names(result)
     images = Images(given.image_photos, photos, points, "px", 1.0, given.image_xy)
     pictures = drawings(result)
-    worst = worst_images(result)
+    found = worst_of(result)
+    worst = worst_images(found)
     sections = [
         Section("network", "Plan of the network", [pictures["network"]] if "network" in pictures else []),
         _size_section(result),
@@ -60,7 +61,7 @@ def collection_page(result: AdjustedCollection) -> Page:
             _REDUNDANCY,
         ),
         tests_section(result, pictures.get("tests")),
-        worst_section(result, images),
+        worst_section(result, images, found),
         _weighted_section(result),
         _cameras_section(pictures),
         _photos_section(result, given.image_photos[worst].tolist()),

@@ -12,7 +12,7 @@ from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.page.cameras import cameras_section
 from photogram.results.page.frame import block_frame, degrees
-from photogram.results.page.observed import Images, worst_images
+from photogram.results.page.observed import Images, worst_images, worst_of
 from photogram.results.page.parts import (
     images_facts,
     iterations_section,
@@ -46,7 +46,8 @@ def block_page(result: Result) -> Page:
     """Return the report of an adjusted block for the browser."""
     block, images = result.block, block_images(result)
     pictures = drawings(result)
-    worst = worst_images(result)
+    found = worst_of(result)
+    worst = worst_images(found)
     photos, points = block.image_photos[worst].tolist(), block.image_points[worst].tolist()
     sections = [
         _network_section(result, pictures),
@@ -54,7 +55,7 @@ def block_page(result: Result) -> Page:
         _residuals_section(pictures),
         _redundancy_section(result, pictures),
         tests_section(result, pictures.get("tests")),
-        worst_section(result, images),
+        worst_section(result, images, found),
         control_section(result),
         check_section(result),
         beside_section(result),
