@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram import formats
 from photogram.formats.colmap.binary import binary_files, read_binary
 from photogram.formats.colmap.content import Camera, Images, Model, Points
 from photogram.io.delimited import read_columns
@@ -54,10 +55,17 @@ def main(records: int) -> None:
         ]
         (place / "images.csv").write_text("\n".join(["photo,point,column,row", *lines, ""]))
         timed(f"CSV, {records} records", lambda: table(place / "images.csv"))
+        (place / "project.toml").write_text("[project]\nformat = 1\n")
+        (place / "cameras.csv").write_text("camera,width,height,f\nA,4000,4000,3000\n")
+        names = "".join(f"IMG_{photo:05d}.JPG\n" for photo in range(photos[-1] + 1))
+        (place / "photos.csv").write_text(f"photo\n{names}")
+        timed("  the whole project", lambda: formats.read(place))
+        (place / "images.csv").unlink()
         _parquet(place / "images.parquet", photos, points, xy)
         for name, content in binary_files(_model(photos, points, xy)).items():
             (place / name).write_bytes(content)
         timed("COLMAP, binary", lambda: read_binary(place))
+        timed("  the whole project", lambda: formats.read(place, "colmap"))
 
 
 def _parquet(path: Path, photos: np.ndarray, points: np.ndarray, xy: np.ndarray) -> None:
@@ -68,12 +76,13 @@ def _parquet(path: Path, photos: np.ndarray, points: np.ndarray, xy: np.ndarray)
         print("Parquet: pyarrow is not installed")
         return
     names = [
-        pyarrow.array([f"{mark}{each}" for each in own.tolist()]).dictionary_encode()
-        for mark, own in (("IMG_", photos), ("T", points))
+        pyarrow.array([form(each) for each in own.tolist()]).dictionary_encode()
+        for form, own in (("IMG_{:05d}.JPG".format, photos), ("T{:06d}".format, points))
     ]
     columns = dict(zip(("photo", "point", "column", "row"), (*names, *xy.T), strict=True))
     pyarrow.parquet.write_table(pyarrow.table(columns), path, compression="zstd")
     timed("Parquet", lambda: table(path))
+    timed("  the whole project", lambda: formats.read(path.parent))
 
 
 def _model(photos: np.ndarray, points: np.ndarray, xy: np.ndarray) -> Model:

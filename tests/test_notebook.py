@@ -15,6 +15,7 @@ import pytest
 
 import photogram
 import typed_uses
+from example_scripts import load
 from photogram import Block, Camera, adjust, collection, errors, simulate
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.equality import alike
@@ -198,3 +199,55 @@ def test_checkers_of_types_are_told_the_arguments_that_there_are(kind):
     assert {name for name, default in given.items() if default is None} == {
         name for name, each in there.items() if each.default is inspect.Parameter.empty
     }
+
+
+def made(kind):
+    """Return a result of each kind that may hold much."""
+    simulation = simulate(strips=2, photos_per_strip=4, blunders=2, seed=1)
+    block = simulation.block
+    unknown = np.full((8, 3), np.nan)
+    return {
+        "snoop": lambda: photogram.snoop(block),
+        "clean": lambda: photogram.clean(block),
+        "variance_components": lambda: photogram.variance_components(block),
+        "first_values": lambda: photogram.first_values(
+            block.replace(photo_positions=unknown, photo_attitudes=unknown)
+        ),
+        "check": lambda: photogram.check(block),
+        "plan": lambda: photogram.plan({"a": simulation.truth}),
+        "adjusted camera": lambda: adjust(load("self_calibration").measured()).cameras[0],
+        "snooped collection": lambda: collection.snooping.snoop_collection(
+            collection.simulate(outlier_share=0.01, seed=1).collection
+        ),
+        "project of GIANT": lambda: photogram.giant.read_project(
+            files("photogram") / "examples" / "galveston"
+        ),
+        "project": lambda: photogram.formats.read(files("photogram") / "examples" / "project"),
+    }[kind]()
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "snoop",
+        "clean",
+        "variance_components",
+        "first_values",
+        "check",
+        "plan",
+        "adjusted camera",
+        "snooped collection",
+        "project of GIANT",
+        "project",
+    ],
+)
+def test_all_results_are_short_and_pickled(kind):
+    thing = made(kind)
+    assert len(repr(thing)) < 7000
+    again = pickle.loads(pickle.dumps(thing))
+    assert type(again) is type(thing)
+    assert repr(again) == repr(thing)
+    if kind.startswith("snoop"):
+        assert again.report() == thing.report()
+        assert len(repr(thing).splitlines()) <= 22
+        assert "removed" in repr(thing)

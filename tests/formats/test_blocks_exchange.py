@@ -1,5 +1,7 @@
 """BlocksExchange XML: matrices and angles, pixels and millimetres, systems of coordinates."""
 
+import zipfile
+
 import numpy as np
 import pytest
 from block import check_adjustment, check_poses, same_blocks, sample, truth, with_control, with_noise
@@ -157,3 +159,18 @@ def test_entities_are_not_read(tmp_path):
 @pytest.mark.parametrize("file", FILES)
 def test_damaged_files_end_in_a_message(tmp_path, file):
     assert check_damaged(sample("blocksexchange", file), tmp_path, "blocks_exchange", 250, 3) > 60
+
+
+def test_packed_files_are_read_as_they_are(tmp_path):
+    source = sample("blocksexchange", "matrix_pixels_ydown_v2.1.xml")
+    packed = tmp_path / "block.xmlz"
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.write(source, "block.xml")
+        archive.writestr("readme.txt", "nothing")
+    same_blocks(formats.read(packed).block, formats.read(source).block, 0.0)
+    (tmp_path / "there").mkdir()
+    assert check_damaged(packed, tmp_path / "there", "blocks_exchange", 60, 8) > 20
+    with zipfile.ZipFile(packed, "a") as archive:
+        archive.writestr("other.xml", "<x/>")
+    with pytest.raises(InputError, match="an archive with 2 documents"):
+        formats.read(packed, "blocks_exchange")

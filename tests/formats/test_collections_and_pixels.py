@@ -62,6 +62,18 @@ def test_tables_of_pixels_are_the_truth(tmp_path, file, origin):
         formats.read(table)
 
 
+def test_a_table_of_pixels_says_what_is_not_used(tmp_path):
+    lines = sample("pixels", "images.csv").read_text().splitlines()
+    first = next(row for row, line in enumerate(lines) if not line.startswith("#"))
+    marked = [f"{line},{'no' if row == 3 else ''}" for row, line in enumerate(lines[first + 1 :])]
+    path = tmp_path / "images.csv"
+    path.write_text("\n".join([f"{lines[first]},use", *marked]) + "\n")
+    (tmp_path / "camera.csv").write_text("camera,width,height,f\nA,4000,3000,3600\n")
+    project = formats.read(path, None, Wishes(cameras=tmp_path / "camera.csv"))
+    assert len(project.block.image_xy) == len(marked) - 1
+    assert any("1 images are not used" in str(each) for each in project.messages)
+
+
 def test_pixels_and_control_alone_make_a_block(run, tmp_path):
     written(formats.read(EXAMPLE), tmp_path / "table", "pixels")
     words = [
@@ -114,4 +126,4 @@ def test_damaged_tables_of_pixels_end_in_a_message(tmp_path):
 
 
 def test_damaged_giant_projects_end_in_a_message(tmp_path):
-    assert check_damaged(GALVESTON, tmp_path, "giant", 100, 3) > 10
+    assert check_damaged(GALVESTON, tmp_path, "giant", 500, 3) > 50

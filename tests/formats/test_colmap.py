@@ -146,7 +146,7 @@ def test_control_by_names_carries_a_model_in_a_frame_of_its_own(run, tmp_path):
 
 
 def test_rotations_of_the_sidecar_are_those_of_the_cameras_axes():
-    from photogram.formats.colmap.writing import _centre_and_rotation
+    from photogram.formats.colmap.sidecar import _centre_and_rotation
 
     result = adjust(formats.read(EXAMPLE).block)
     covariances = _centre_and_rotation(result)
@@ -246,6 +246,19 @@ def test_a_camera_that_colmap_does_not_have_is_refused(tmp_path):
         formats.to_files(other, "colmap")
 
 
+def test_rigs_that_cameras_do_not_tell_are_written_as_photos(tmp_path):
+    project = formats.read(sample("colmap", "rig_binary"))
+    block = project.block
+    one = block.replace(photo_cameras=[0] * len(block.photo_ids))
+    lost = " ".join(formats.cannot_hold(project.replace(block=one), "colmap"))
+    assert "rigs whose sensors are not told by their cameras" in lost
+    assert "rigs" not in " ".join(formats.cannot_hold(project, "colmap"))
+    other = formats.read(written(project.replace(block=one), tmp_path, "colmap")).block
+    assert not other.mounts
+    rows = [other.photo_ids.index(name) for name in block.photo_ids]
+    np.testing.assert_allclose(other.photo_positions[rows], block.photo_positions, rtol=0, atol=1e-12)
+
+
 # Against the package
 
 
@@ -274,6 +287,80 @@ def test_the_package_reads_what_is_written(pycolmap, tmp_path, target):
         matrix = Attitudes.of("omega_phi_kappa", project.block.photo_attitudes[[row]]).matrices[0]
         np.testing.assert_allclose(image.cam_from_world().rotation.matrix(), flip @ matrix.T, atol=1e-12)
     assert theirs.compute_num_observations() == len(project.block.image_xy)
+
+
+@pytest.mark.parametrize("dress", ["rig_text", "rig_binary"])
+def test_the_package_reads_rigs_that_are_written(pycolmap, tmp_path, dress):
+    project = formats.read(sample("colmap", dress))
+    theirs = pycolmap.Reconstruction(str(written(project, tmp_path, "colmap")))
+    assert [len(rig.non_ref_sensors) for rig in theirs.rigs.values()] == [1]
+    for image in theirs.images.values():
+        row = project.block.photo_ids.index(image.name)
+        np.testing.assert_allclose(image.projection_center(), project.block.photo_positions[row], atol=1e-10)
+
+
+def cost_of(model):
+    """Return the sum of squared residuals of a model of the package, pixels."""
+    return sum(
+        float(np.sum((image.project_point(model.points3D[own.point3D_id].xyz) - own.xy) ** 2))
+        for image in model.images.values()
+        for own in image.points2D
+        if own.has_point3D()
+    )
+
+
+@pytest.mark.parametrize("calibrated", [False, True])
+def test_one_command_finds_the_cost_of_the_package_and_all_covariances(pycolmap, run, tmp_path, calibrated):
+    pycolmap.set_random_seed(5)
+    options = pycolmap.SyntheticDatasetOptions()
+    options.num_rigs, options.num_cameras_per_rig, options.num_frames_per_rig = 2, 1, 7
+    options.num_points3D = 120
+    model = pycolmap.synthesize_dataset(options)
+    noise = pycolmap.SyntheticNoiseOptions()
+    noise.point2D_stddev, noise.point3D_stddev = 0.6, 0.01
+    pycolmap.synthesize_noise(noise, model)
+    (tmp_path / "model").mkdir()
+    model.write_binary(str(tmp_path / "model"))
+    more = ("--self-calibrate", "all") if calibrated else ()
+    done = run("adjust", "model", "--datum", "inner", "--sd", "images=0.6", *more, "--json", "result.json")
+    assert done.exit_code in (0, 4), done.output
+    chosen = pycolmap.BundleAdjustmentOptions()
+    chosen.refine_focal_length = chosen.refine_principal_point = chosen.refine_extra_params = calibrated
+    pycolmap.bundle_adjustment(model, chosen)
+    again = pycolmap.Reconstruction(str(tmp_path / "model-adjusted" / "adjusted-colmap"))
+    np.testing.assert_allclose(cost_of(again), cost_of(model), rtol=1e-3)
+    assert cost_of(again) < cost_of(model) * (1 + 1e-6)
+    place = tmp_path / "model-adjusted" / "adjusted-colmap"
+    counts = {"photo": len(again.images), "point": len(again.points3D), "camera": len(again.cameras)}
+    for kind, count in counts.items():
+        content = (place / f"{kind}_covariances.bin").read_bytes()
+        assert struct.unpack_from("<Q", content) == (count,)
+    photos = np.frombuffer(
+        (place / "photo_covariances.bin").read_bytes(), [("id", "<u4"), ("c", "<f8", 21)], counts["photo"], 8
+    )
+    points = np.frombuffer(
+        (place / "point_covariances.bin").read_bytes(), [("id", "<u8"), ("c", "<f8", 6)], counts["point"], 8
+    )
+    for table, diagonal in ((photos, [0, 2, 5, 9, 14, 20]), (points, [0, 2, 5])):
+        assert np.isfinite(table["c"]).all()
+        assert (table["c"][:, diagonal] > 0).all()
+    assert set(photos["id"].tolist()) == set(again.images)
+    assert set(points["id"].tolist()) == set(again.points3D)
+    quality = np.frombuffer(
+        (place / "observation_quality.bin").read_bytes(),
+        [("image", "<u4"), ("feature", "<u4"), ("values", "<f4", 6)],
+        offset=8,
+    )
+    assert len(quality) == sum(len(image.points2D) for image in again.images.values())
+    for number, feature, values in quality.tolist()[::17]:
+        image = again.images[number]
+        own = image.points2D[feature]
+        residual = own.xy - image.project_point(again.points3D[own.point3D_id].xyz)
+        np.testing.assert_allclose(values[:2], residual, atol=1e-4)
+        assert (np.array(values[2:4]) > 0).all()
+        np.testing.assert_allclose(values[4:], residual / (0.6 * np.sqrt(values[2:4])), rtol=1e-3, atol=1e-3)
+    deviations = json.loads((tmp_path / "result.json").read_text())["cameras"]
+    assert len(deviations) == counts["camera"]
 
 
 def test_a_model_of_the_package_adjusts_to_the_cost_of_its_own_adjustment(pycolmap, tmp_path):

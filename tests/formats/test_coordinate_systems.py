@@ -124,3 +124,20 @@ def test_a_system_that_there_is_not_is_refused_with_the_table(tmp_path):
     change(place / "project.toml", "[adjust]", '[control]\ncrs = "EPSG:1"\n[adjust]')
     with pytest.raises(InputError, match=r"control\.csv.*'EPSG:1' is no coordinate reference system"):
         formats.read(place)
+
+
+def test_one_height_of_the_geoid_may_stand_behind_a_system():
+    frame = Frame("topocentric", "EPSG:4979", (47.38, 8.54, 450.0))
+    covariances = np.tile(np.diag([1e-4, 4e-4, 9e-4]), (2, 1, 1))
+    above_sea = np.array([[466000.0, 5247000.0, 400.0], [466500.0, 5247300.0, 420.0]])
+    ellipsoidal = above_sea + np.array([0.0, 0.0, 46.5])
+    expected, turned, _ = crs.to_frame("EPSG:32632", ellipsoidal, covariances, frame)
+    found, other, remarks = crs.to_frame("EPSG:32632+geoid=46.5", above_sea, covariances, frame)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(other, turned, rtol=1e-9, atol=1e-15)
+    assert "heights are raised by 46.5 m from the geoid to the ellipsoid" in remarks
+    assert not any("nothing of heights" in each for each in remarks)
+    back, _ = crs.from_frame("EPSG:32632+geoid=46.5", found, covariances, frame)
+    np.testing.assert_allclose(back, above_sea, rtol=0, atol=1e-7)
+    with pytest.raises(InputError, match="no coordinate reference system"):
+        crs.geocentric("EPSG:32632+geoid=x", above_sea)

@@ -13,7 +13,7 @@ import pytest
 from test_plain_project import EXAMPLE, change
 from test_results_in_a_system import FRAME, UTM
 
-from photogram import InputError, Spheroid, adjust, formats, simulate
+from photogram import InputError, Spheroid, adjust, formats, read_result, simulate
 from photogram.formats.maps.layers import chosen_crs, map_layers
 from photogram.formats.maps.ply import point_cloud
 from photogram.formats.maps.styles import LAYERS, style
@@ -310,3 +310,16 @@ def test_commands_draw_maps_and_clouds(run):
     assert done.exit_code == 1
     assert ".gpkg or .geojson" in done.output
     assert not Path("example-adjusted").exists()
+
+
+def test_collections_have_clouds_too(run):
+    done = run(
+        "collection", "--example", "--ply", "ring.ply", "--ply-origin", "1", "2", "3", "--parquet", "data"
+    )
+    assert done.exit_code == 0, done.output
+    lines, found = vertices(Path("ring.ply").read_bytes())
+    result = read_result("data")
+    used = result.used_points
+    np.testing.assert_array_equal(found["z"], result.point_positions[used, 2] - 3.0)
+    np.testing.assert_allclose(found["sd_x"], result.point_sd[used, 0], rtol=1e-6)
+    assert "comment origin 1.0 2.0 3.0 was taken away" in lines

@@ -159,3 +159,28 @@ def test_the_largest_of_several_models_is_taken(tmp_path):
 @pytest.mark.parametrize("seed", range(3))
 def test_damaged_models_end_in_a_message(tmp_path, seed):
     assert check_damaged(only(tmp_path / "model"), tmp_path / "damaged", "opensfm", 170, seed) > 20
+
+
+def test_control_is_written_with_its_measurements(tmp_path):
+    pytest.importorskip("pyproj", reason="pyproj is not installed")
+    project = formats.read(sample("project"))
+    assert "gcp_list.txt beside it" in " ".join(formats.cannot_hold(project, "opensfm"))
+    place = written(project, tmp_path, "opensfm")
+    lines = (place / "gcp_list.txt").read_text().splitlines()
+    assert lines[0] == "WGS84"
+    other = formats.read(place)
+    count = len(other.block.image_xy)
+    sd = {"control": (0.02, 0.02, 0.03)}
+    found = additions.with_control(other, place / "gcp_list.txt", sd, None).block
+    # Its measurements are those of the tracks.
+    assert len(found.image_xy) == count
+    control = {each.point: each for each in found.observations if each.KIND == "control"}
+    known = truth()["points"]
+    assert set(control) == {name for name, each in known.items() if each["role"] in ("control", "check")}
+    for name, each in control.items():
+        np.testing.assert_allclose(each.observed, known[name]["position"], rtol=0, atol=2e-8)
+    first = lines[1].split()
+    moved = [*first[:3], repr(float(first[3]) + 1.0), *first[4:]]
+    (tmp_path / "gcp_list.txt").write_text("\n".join([lines[0], " ".join(moved), *lines[2:]]) + "\n")
+    with pytest.raises(InputError, match="has two images on the photo"):
+        additions.with_control(other, place / "gcp_list.txt", sd, None)

@@ -312,6 +312,14 @@ def test_two_files_of_one_table_and_a_missing_one(example):
         formats.read(example)
 
 
+def test_a_table_under_another_name_is_remarked_on(example):
+    assert not any("other names" in str(each) for each in formats.read(example).messages)
+    (example / "gnss.csv").rename(example / "gnns.csv")
+    (example / "wishes.csv").write_text("a,b\n")
+    (remark,) = [str(each) for each in formats.read(example).messages if "other names" in str(each)]
+    assert remark.endswith("not read: gnns.csv (did you mean gnss?), wishes.csv")
+
+
 def test_a_point_that_is_known_twice_must_be_the_same(example):
     (example / "points.csv").write_text("point,x,y,z\nsouth-1,1,2,3\n")
     with pytest.raises(InputError, match="south-1 has another x in the table points"):
@@ -339,6 +347,15 @@ def test_tables_of_parquet_are_read_as_those_of_text(example):
     other = formats.read(example)
     assert other.block.point_ids == plain.block.point_ids
     np.testing.assert_array_equal(other.block.image_xy, plain.block.image_xy)
+    # Names of digits are whole numbers in many tables; each group of rows has a dictionary of its own.
+    of_name = {name: 100 + row for row, name in enumerate(dict.fromkeys(columns["point"]))}
+    digits = [of_name[name] for name in columns["point"]]
+    numbered = pyarrow.table({**columns, "point": pyarrow.array(digits, pyarrow.int32())})
+    parquet.write_table(numbered, example / "images.parquet", row_group_size=7)
+    (example / "control.csv").unlink(), (example / "distances.csv").unlink()
+    found = formats.read(example).block
+    np.testing.assert_array_equal(found.image_xy, plain.block.image_xy)
+    assert [found.point_ids[row] for row in found.image_points] == list(map(str, digits))
     columns["point"] = [*columns["point"][:-1], None]
     parquet.write_table(pyarrow.table(columns), example / "images.parquet")
     with pytest.raises(InputError, match="column point: is empty"):

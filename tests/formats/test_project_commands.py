@@ -73,6 +73,30 @@ def test_what_no_format_knows_is_refused_with_the_formats(run, tmp_path):
     assert run("adjust").exit_code == 2
 
 
+def test_a_folder_with_one_file_of_a_format_is_read(run, tmp_path):
+    run("new", "own")
+    assert run("convert", "own", "there", "--to", "blocks_exchange").exit_code == 0
+    (tmp_path / "there" / "notes.txt").write_text("of no format")
+    done = run("info", "there")
+    assert done.exit_code == 0
+    assert "block.xml: BlocksExchange" in done.output
+    assert run("convert", "own", "there", "--to", "agisoft").exit_code == 0
+    done = run("info", "there")
+    assert done.exit_code == 1
+    for word in ("--format blocks_exchange, block.xml", "--format agisoft, cameras.xml"):
+        assert word in done.stderr.replace("\n", " ")
+    done = run("info", "there", "--format", "agisoft")
+    assert done.exit_code == 0
+    assert "cameras.xml: Agisoft" in done.output
+
+
+def test_a_file_of_a_folder_is_told_apart_from_the_folder(run):
+    assert run("convert", "--example", "sparse").exit_code == 0
+    done = run("info", "sparse/images.bin")
+    assert done.exit_code == 1
+    assert "its folder is a COLMAP model: give that" in done.stderr.replace("\n", " ")
+
+
 def test_without_control_the_datum_is_asked_for(run, tmp_path):
     run("new", "own")
     for name in ("control", "gnss", "distances"):

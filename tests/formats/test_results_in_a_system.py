@@ -11,6 +11,7 @@ from test_plain_project import EXAMPLE, change
 from photogram import Attitudes, InputError, Spheroid, adjust, formats, simulate
 from photogram.formats.planes import bend, plane_remarks
 from photogram.formats.project import Frame
+from photogram.giant import Project, write_project
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 crs = pytest.importorskip("photogram.formats.crs")
@@ -171,11 +172,11 @@ def test_a_block_in_a_plane_is_told_by_how_much_it_bends(run, tmp_path):
 
 def test_numbers_that_look_like_a_map_are_told_without_a_name(tmp_path):
     place = shutil.copytree(EXAMPLE, tmp_path / "plane")
-    assert plane_remarks(formats.read(place)) == []
+    local = formats.read(place)
+    assert plane_remarks(local.block, place, local.starts) == []
     shift_tables(place, [465000.0, 5247000.0, 0.0])
-    remarks = plane_remarks(formats.read(place))
+    remarks = [each for each in formats.read(place).messages if "look like those of a map" in each.text]
     assert len(remarks) == 1
-    assert "look like those of a map" in remarks[0].text
 
 
 def shift_tables(place, shift):
@@ -205,3 +206,14 @@ def test_control_of_a_map_without_a_name_is_told_too(run, tmp_path):
     (place / "control.csv").unlink()
     done = run("info", place, "--control", tmp_path / "control.csv", "--sd", "control=0.02")
     assert "coordinates look like those of a map" in " ".join(done.output.split())
+
+
+def test_giant_projects_in_a_plane_are_told_too(run):
+    common = {"strips": 2, "photos_per_strip": 3, "points_per_photo": 20, "seed": 3}
+    block = simulate(origin=(465000.0, 5247000.0, 300.0), **common).block
+    write_project(Project.from_block(block), "plane")
+    assert run("giant", "plane").exit_code == 0
+    assert "coordinates look like those of a map" in Path("plane-adjusted/report.txt").read_text()
+    write_project(Project.from_block(simulate(**common).block), "local")
+    assert run("giant", "local").exit_code == 0
+    assert "of a map" not in Path("local-adjusted/report.txt").read_text()

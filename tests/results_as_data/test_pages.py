@@ -54,3 +54,44 @@ def test_a_folder_that_is_the_input_is_refused(run):
     done = run("adjust", "quarry", "--parquet", "quarry/images.csv")
     assert done.exit_code == 1
     assert "is not a directory" in done.output
+    for place in ("quarry", "./quarry/"):
+        done = run("adjust", "quarry", "--parquet", place)
+        assert done.exit_code == 1
+        assert "the results would be written over the input" in " ".join(done.output.split())
+    assert not list(Path("quarry").glob("*.parquet"))
+
+
+def test_a_result_is_a_project_to_go_on_with(run):
+    assert run("adjust", EXAMPLE, "--parquet", "data", "--loss", "huber", "--quiet").exit_code == 0
+    told = run("info", "data")
+    assert told.exit_code == 0, told.output
+    assert "result as data (Parquet)" in told.output
+    done = run("adjust", "data", "--parquet", "again", "--map", "map.gpkg", "--quiet")
+    assert done.exit_code == 0, done.output
+    one, two = read_result("data"), read_result("again")
+    assert (two.loss, two.unit_variance) == (one.loss, one.unit_variance)
+    assert len(two.iterations) < len(one.iterations)
+    # A robust loss converges linearly: both ended within a small part of a standard deviation.
+    assert differences(one, two).values.size < 1e-3
+    assert Path("map.gpkg").exists()
+    assert run("convert", "data", "plain", "--to", "plain").exit_code == 0
+    assert formats.read(Path("plain")).block.photo_ids == one.block.photo_ids
+
+
+def test_a_free_result_goes_on_in_its_datum(run):
+    project = Path("free")
+    shutil.copytree(EXAMPLE, project)
+    for name in ("control", "gnss", "distances"):
+        (project / f"{name}.csv").unlink()
+    assert run("adjust", project, "--datum", "inner", "--parquet", "data", "--quiet").exit_code == 0
+    assert run("adjust", "data", "--parquet", "again", "--quiet").exit_code == 0
+    one, two = read_result("data"), read_result("again")
+    assert two.datum.kind == one.datum.kind == "inner constraints"
+    assert differences(one, two).deviations.size < 1e-3
+
+
+def test_results_of_collections_are_no_projects(run):
+    assert run("collection", "--example", "--parquet", "data", "--quiet").exit_code == 0
+    done = run("info", "data")
+    assert done.exit_code == 1
+    assert "holds the result of a collection" in " ".join(done.output.split())

@@ -7,6 +7,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from fuzz.networks import random_network
 from photogram import (
     Camera,
     InnerConstraints,
@@ -21,6 +22,7 @@ from photogram import (
 from photogram import collection as collections
 from photogram.network.observations import Distance, OnLevel, Position
 from photogram.network.unknowns import Level, LeverArm, Shift
+from photogram.results.saved import seal
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 
@@ -141,6 +143,16 @@ def test_it_says_the_same(pair):
     for name in ("photo", "point", "image", "control", "station"):
         one, two = (getattr(each, f"{name}_table")() for each in (result, again))
         assert one.equals(two)
+
+
+@pytest.mark.parametrize("number", range(0, 42, 3))
+def test_random_networks_of_every_kind_come_back(number, tmp_path):
+    network = random_network(5, number)
+    result = adjust(network.block, datum=network.datum)
+    result.to_parquet(tmp_path)
+    again = read_result(tmp_path)
+    compare(result, again)
+    assert again.report() == result.report()
 
 
 def test_unknowns_in_common_are_one_object_again():
@@ -282,6 +294,30 @@ def test_damaged_summaries_are_refused(folder, change, message):
     path = folder / "summary.json"
     document = json.loads(path.read_text())
     change(document)
+    document["sha256"] = seal(document)
     path.write_text(json.dumps(document))
     with pytest.raises(InputError, match=rf"summary\.json: .*{message}"):
         read_result(folder)
+
+
+@pytest.mark.parametrize("name", ["summary.json", "photos.parquet", "images.parquet", "state.parquet"])
+def test_damage_anywhere_is_refused_or_does_no_harm(folder, name):
+    random = np.random.default_rng(8)
+    path = folder / name
+    whole = path.read_bytes()
+    report = read_result(folder).report()
+    for kind in range(60):
+        damaged = bytearray(whole)
+        place = int(random.integers(len(damaged)))
+        if kind % 3 == 0:
+            del damaged[place:]
+        elif kind % 3 == 1:
+            damaged[place] ^= int(random.integers(1, 256))
+        else:
+            del damaged[place : place + int(random.integers(1, 20))]
+        path.write_bytes(damaged)
+        try:
+            again = read_result(folder)
+        except InputError:
+            continue
+        assert again.report() == report

@@ -23,6 +23,7 @@ from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
+from photogram.show.brief import Brief
 from photogram.show.ways import report_of
 from photogram.statistics.components import WORTH_CHANGING
 from photogram.statistics.limits import global_test
@@ -35,8 +36,8 @@ STANDS = 0.05
 """Components that change by less are the same."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cleaned:
+@dataclass(frozen=True, eq=False, repr=False)
+class Cleaned(Brief):
     """A network without gross errors, with weights that its residuals bear out.
 
     Attributes

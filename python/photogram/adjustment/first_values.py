@@ -19,6 +19,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.observations import Distance
+from photogram.show.brief import Brief
 
 __all__ = ["FirstValues", "first_values"]
 
@@ -36,8 +37,8 @@ SOURCES = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class FirstValues:
+@dataclass(frozen=True, eq=False, repr=False)
+class FirstValues(Brief):
     """First values of a block of P photos, n points and m images.
 
     Attributes

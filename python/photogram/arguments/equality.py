@@ -18,7 +18,7 @@ class Valued:
     look at: names, kinds and sizes.
     """
 
-    BESIDE: ClassVar[frozenset[str]] = frozenset()
+    _BESIDE: ClassVar[frozenset[str]] = frozenset()
     """Fields that do not count: how long something took, and by which way."""
 
     def __eq__(self, other: object) -> bool:
@@ -41,7 +41,7 @@ class Valued:
         return hash(tuple(found))
 
     def _compared(self) -> list[str]:
-        return [each.name for each in fields(self) if each.name not in self.BESIDE]  # type: ignore[arg-type]
+        return [each.name for each in fields(self) if each.name not in self._BESIDE]  # type: ignore[arg-type]
 
 
 def alike(a: object, b: object) -> bool:

@@ -22,7 +22,7 @@ from photogram.checks.adjusting import Adjuster
 from photogram.checks.control import control
 from photogram.checks.control_sets import Explained, doubtful, explain, free_model
 from photogram.checks.conventions import conventions, further
-from photogram.checks.editing import BESIDE, HOPELESS, Edited, blunder_section, edit, without_photos
+from photogram.checks.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit, without_photos
 from photogram.checks.findings import Check, Finding, Level, Section
 from photogram.checks.gross import Suspects, disproved, gross, without
 from photogram.checks.heights import two_ray_heights
@@ -236,7 +236,7 @@ def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | Wrong | 
         explained = None if model is None else explain(model)
         if explained is not None:
             return "control-set", explained
-    kinds = ("control", "station", f"{BESIDE}{Position.KIND}")
+    kinds = ("control", "station", f"{_BESIDE}{Position.KIND}")
     weighted = ((block.photo_position_sd > 0) & np.isfinite(block.photo_position_sd)).any()
     observed = weighted or any(isinstance(each, Position) for each in block.observations)
     if observed and doubtful(adjusted.tried(block), *kinds):

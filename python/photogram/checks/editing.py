@@ -33,7 +33,7 @@ from photogram.results.kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC
 
-__all__ = ["BESIDE", "Edited", "edit"]
+__all__ = ["_BESIDE", "Edited", "edit"]
 
 ROUNDS = 20
 """Adjustments at the most."""
@@ -60,7 +60,7 @@ SURE = 1e-4
 SHOWN = 20
 RETURNS = 10
 """Images that are tried anew when all blunders are out, at the most."""
-BESIDE = "beside images: "
+_BESIDE = "beside images: "
 """Before the names of further kinds of observations."""
 
 
@@ -349,7 +349,7 @@ def tests(result: Result) -> dict[str, Floats]:
         "image": np.nan_to_num(images),
         "control": _prior_tests(result.point_differences, block.point_sd, result.point_redundancy),
         "station": _prior_tests(result.photo_residuals, result.photo_given_sd, result.photo_redundancy),
-        **{f"{BESIDE}{name}": each for name, each in others.items()},
+        **{f"{_BESIDE}{name}": each for name, each in others.items()},
     }
 
 
@@ -416,7 +416,7 @@ def _without(result: Result, suspects: list[_Suspect]) -> Block:
 
 
 def _kind(result: Result, suspect: _Suspect) -> ObservedKind:
-    return result.kinds[suspect.kind.removeprefix(BESIDE)]
+    return result.kinds[suspect.kind.removeprefix(_BESIDE)]
 
 
 def _finding(result: Result, suspect: _Suspect, spread: float) -> Finding:

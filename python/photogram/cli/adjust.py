@@ -12,7 +12,7 @@ import typer
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Writes, with_job
-from photogram.cli.maps import CloudFile, Crs, MapFile, check_maps, drawn_maps
+from photogram.cli.maps import CloudFile, CloudOrigin, Crs, MapFile, check_maps, drawn_maps, point_clouds
 from photogram.cli.options import (
     JsonFile,
     Ordering,
@@ -89,6 +89,7 @@ def adjust(
     crs: Crs = None,
     map: MapFile = None,  # noqa: A002  # as the option is called
     ply: CloudFile = None,
+    ply_origin: CloudOrigin = None,
     added: Additions = NOTHING,
     datum: Annotated[
         DatumName | None,
@@ -133,10 +134,10 @@ def adjust(
         from photogram.formats.additions import self_calibrated
         from photogram.show.ways import page_of
 
-        check_maps(map)
         pictures = Pictures(job, plots, plot_format, target)
         project = read_project(job, path, added)
         project = project.replace(path=job.shown(project.path), messages=tuple(job.told(project.messages)))
+        check_maps(map)  # now that all inputs are known, which it must not be
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
         sections = described(project)
@@ -174,7 +175,8 @@ def adjust(
             {target / name: content for name, content in files.items()} | pictures.of(result) | page,
             {} if json is None else {json: result.to_json()},
             as_data(result, parquet),
-            drawn_maps(result, map, ply, crs, _sizes(project), quiet=quiet),
+            drawn_maps(result, map, crs, _sizes(project), quiet=quiet),
+            point_clouds(result, ply, ply_origin, crs),
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )

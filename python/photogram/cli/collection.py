@@ -21,6 +21,7 @@ from photogram.cli.components import (
 from photogram.cli.console import print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
+from photogram.cli.maps import CloudFile, CloudOrigin, point_clouds
 from photogram.cli.options import (
     JsonFile,
     Ordering,
@@ -99,6 +100,8 @@ def collection(
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
     parquet: ParquetFolder = None,
+    ply: CloudFile = None,
+    ply_origin: CloudOrigin = None,
     loss: Annotated[
         Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")
     ] = Loss.SQUARES,
@@ -205,6 +208,7 @@ def collection(
         job.finish(
             written,
             as_data(result, parquet),
+            point_clouds(result, ply, ply_origin),
             summary=lambda: print_sections(whole, "the report"),
             code=(estimates or told).verdict.exit_code(strict=strict),
         )

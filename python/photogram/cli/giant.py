@@ -22,7 +22,7 @@ from photogram.cli.components import (
 from photogram.cli.console import SHOWN, errors, print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.maps import CloudFile, MapFile, check_maps, drawn_maps
+from photogram.cli.maps import CloudFile, CloudOrigin, MapFile, check_maps, drawn_maps, point_clouds
 from photogram.cli.options import (
     JsonFile,
     Ordering,
@@ -93,6 +93,7 @@ def giant(
     parquet: ParquetFolder = None,
     map: MapFile = None,  # noqa: A002  # as the option is called
     ply: CloudFile = None,
+    ply_origin: CloudOrigin = None,
     listing: Annotated[
         Path | None,
         Writes.FILE,
@@ -170,6 +171,7 @@ def giant(
     """
     with job:
         from photogram.errors import AdjustmentError
+        from photogram.formats.planes import plane_remarks
         from photogram.giant import Limits, read_project
         from photogram.results.report import summary
         from photogram.show.ways import page_of
@@ -189,6 +191,7 @@ def giant(
         block = _refracted(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
+        project = replace(project, messages=[*project.messages, *plane_remarks(block, directory)])
         project.messages[:] = job.told(project.messages)
         if snoop and (as_published or project.common.intersection_only):
             refused = "not with --as-published or an intersection"
@@ -227,7 +230,8 @@ def giant(
             written,
             documents,
             as_data(result, parquet),
-            drawn_maps(result, map, ply, None, quiet=quiet),
+            drawn_maps(result, map, None, quiet=quiet),
+            point_clouds(result, ply, ply_origin),
             summary=lambda: print_sections(
                 [
                     *with_weights(log.sections() if log else [], made),

@@ -240,9 +240,8 @@ class Job:
             _check_name(path)
             if path.exists() and not path.is_dir():
                 raise InputError("is not a directory", file=path)
-            if any(
-                path.exists() and project.exists() and path.samefile(project) for project in self._projects
-            ):
+            sources = [each for each in (*self._projects, *self._files) if each.is_dir()]
+            if path.exists() and any(path.samefile(each) for each in sources):
                 raise InputError("the results would be written over the input", file=path)
         inputs = self._inputs()
         check_outputs(self._outputs, inputs, self._directories)

@@ -14,8 +14,9 @@ from photogram.cli.job import Writes
 
 if TYPE_CHECKING:
     from photogram import Result
+    from photogram.results.network import AdjustedNetwork
 
-__all__ = ["CloudFile", "Crs", "MapFile", "check_maps", "drawn_maps"]
+__all__ = ["CloudFile", "CloudOrigin", "Crs", "MapFile", "check_maps", "drawn_maps", "point_clouds"]
 
 Crs = Annotated[
     str | None,
@@ -47,6 +48,15 @@ CloudFile = Annotated[
         show_default=False,
     ),
 ]
+CloudOrigin = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option(
+        "--ply-origin",
+        metavar="X Y Z",
+        help="Taken away from the coordinates of --ply, for viewers that want small ones; a comment says it.",
+        show_default=False,
+    ),
+]
 
 
 def check_maps(chart: Path | None) -> None:
@@ -64,25 +74,35 @@ def check_maps(chart: Path | None) -> None:
 def drawn_maps(
     result: Result,
     chart: Path | None,
-    cloud: Path | None,
     crs: str | None,
     sizes: Sequence[tuple[float, float] | None] = (),
     *,
     quiet: bool = False,
 ) -> dict[Path, bytes]:
-    """Return the files of `--map FILE` and `--ply FILE`; none without them."""
-    files: dict[Path, bytes] = {}
-    if chart is not None:
-        from photogram.formats.maps import map_files
+    """Return the files of `--map FILE`; none without it."""
+    if chart is None:
+        return {}
+    from photogram.formats.maps import map_files
 
-        made, remarks = map_files(result, chart, crs, sizes=sizes)
-        files |= made
-        if not quiet:
-            for each in remarks:
-                print_remark(each)
-    if cloud is not None:
-        from photogram.formats.maps import point_cloud
-        from photogram.formats.placing import placed
-
-        files[cloud] = point_cloud(result, None if crs is None else placed(result, crs))
+    files, remarks = map_files(result, chart, crs, sizes=sizes)
+    if not quiet:
+        for each in remarks:
+            print_remark(each)
     return files
+
+
+def point_clouds(
+    result: AdjustedNetwork,
+    cloud: Path | None,
+    origin: tuple[float, float, float] | None,
+    crs: str | None = None,
+) -> dict[Path, bytes]:
+    """Return the file of `--ply FILE`; none without it."""
+    if cloud is None:
+        return {}
+    from photogram import Result
+    from photogram.formats.maps import point_cloud
+    from photogram.formats.placing import placed
+
+    found = placed(result, crs) if crs is not None and isinstance(result, Result) else None
+    return {cloud: point_cloud(result, found, origin=origin or (0.0, 0.0, 0.0))}

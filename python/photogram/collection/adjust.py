@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Ordering, Progress, core_threads, teller
-from photogram.adjustment.ends import hidden, rounded, too_coarse
+from photogram.adjustment.ends import hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
 from photogram.collection.core import CollectionOptions, collection_network
-from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
+from photogram.collection.failures import named
+from photogram.errors import InputError
 from photogram.messages import Message, listed
 
 __all__ = ["adjust", "adjusted"]
@@ -111,7 +112,7 @@ def adjusted(
         told = None if progress is None else teller(progress)
         solution = network.adjust(threads=core_threads(threads), progress=told, start=start)
     except _photocore.CollectionError as error:
-        raise _named(*error.args) from None
+        raise named(*error.args) from None
     return AdjustedCollection.taken_over(
         solution,
         collection=collection,
@@ -128,7 +129,7 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
     """Collect remarks that did not stop the adjustment, the gravest first."""
     messages = []
     if solution.undetermined is not None:
-        error = _named(*solution.undetermined)
+        error = named(*solution.undetermined)
         messages.append(Message(f"there are no covariances: {error}"))
     messages += rounded(solution.redundancy_excess)
     if (solution.photo_images == 0).any():
@@ -157,23 +158,3 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
 
 def _numbers(which: NDArray[np.bool_]) -> str:
     return listed([str(index) for index in np.flatnonzero(which)])
-
-
-def _named(
-    kind: str, message: str, combinations: list[_photocore.CombinationRow], points: list[int]
-) -> AdjustmentError:
-    """Put a failure of the core into words; photos and points have no names but their numbers, from 0."""
-    if kind == "undetermined points":
-        names = [str(point) for point in points]
-        return RankError(f"their rays do not determine {len(names)} points: {listed(names)}", [], names)
-    if kind == "undetermined photos":
-        names = [str(photo) for photo in sorted({photo for each in combinations for photo in each[0]})]
-        text = (
-            f"the observations leave {len(combinations)} combinations of unknowns undetermined, moving photos"
-        )
-        return RankError(f"{text} {listed(names)}", names, [])
-    if kind == "coarse":
-        return too_coarse([str(photo) for photo in combinations[0][0]], [str(point) for point in points])
-    if kind == "memory":
-        return OutOfMemoryError(message)
-    return AdjustmentError(message)

@@ -9,15 +9,21 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
-from photogram.collection.core import CollectionOptions
+from photogram.collection.core import CollectionOptions, collection_network
+from photogram.collection.failures import named
 from photogram.collection.suspects import collection_trial
+from photogram.results.covariance import Covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.reliability import Reliability, reliability_of
+from photogram.results.selection import Adjusted
 
 if TYPE_CHECKING:
     from photogram import _photocore
 
 __all__ = ["AdjustedCollection"]
+
+POSE = 6
+"""Parameters of a photo that are no camera's."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -107,8 +113,7 @@ class AdjustedCollection(AdjustedNetwork):
     ) -> Reliability:
         """Return which gross errors of every observation are found, and what others do (docs/blunders.md).
 
-        It takes a factorisation and a selected inverse at the adjusted values. A collection has no
-        covariances on demand: influences on chosen unknowns cannot be asked for.
+        It takes a factorisation and a selected inverse at the adjusted values.
 
         Parameters
         ----------
@@ -126,7 +131,21 @@ class AdjustedCollection(AdjustedNetwork):
         """
         options = replace(self.options, covariance=True, loss=None)
         trial = collection_trial(self.collection, options, self.state)
-        return reliability_of(trial, None, level=level, power=power, unit_weight=unit_weight)
+        return reliability_of(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
+
+    def covariances(self) -> Covariances:
+        """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`.
+
+        Kinds are `photo` (all parameters), `pose` and `camera` (its first six, the others) and `point`.
+        Photos and points are called by their numbers: `("photo", 3)`, `("point", [7, 8])`.
+        """
+        network = collection_network(self.collection, self.options)
+        return Covariances(
+            _selectable(self),
+            lambda: network.covariances(self.state, threads=0, progress=None),
+            lambda error: named(*error.args),
+            self.covariance_scale,
+        )
 
     def adjusted(self) -> Collection:
         """Return the collection at its adjusted values; points that were left out stay as they were."""
@@ -134,6 +153,34 @@ class AdjustedCollection(AdjustedNetwork):
             self.used_points[:, np.newaxis], self.point_positions, self.collection.point_positions
         )
         return self.collection.replace(photo_parameters=self.photo_parameters, point_positions=positions)
+
+
+def _selectable(result: AdjustedCollection) -> Adjusted:
+    """Return the adjusted values of a collection by kinds and numbers."""
+    names = result.collection.parameters
+    photos, points = (
+        [str(each) for each in range(len(of))] for of in (result.photo_images, result.point_rays)
+    )
+    values, sd = result.photo_parameters, result.photo_sd
+    return Adjusted(
+        network="collection",
+        ids={"photo": photos, "pose": photos, "camera": photos, "point": points},
+        components={
+            "photo": [names] * len(photos),
+            "pose": [names[:POSE]] * len(photos),
+            "camera": [names[POSE:]] * len(photos),
+            "point": [("X", "Y", "Z")] * len(points),
+        },
+        values={
+            "photo": values,
+            "pose": values[:, :POSE],
+            "camera": values[:, POSE:],
+            "point": result.point_positions,
+        },
+        sd={"photo": sd, "pose": sd[:, :POSE], "camera": sd[:, POSE:], "point": result.point_sd},
+        parts={"photo": ("photo", "camera"), "pose": ("photo",)},
+        numbered=True,
+    )
 
 
 CollectionSolution = AdjustedCollection

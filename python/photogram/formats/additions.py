@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.control_lists import ControlList, read_control_list
-from photogram.formats.images import from_corner
+from photogram.formats.images import from_corner, to_corner
 from photogram.formats.intersection import intersected
 from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
@@ -27,6 +27,8 @@ from photogram.network.attitudes import Attitudes
 
 __all__ = ["deviations", "self_calibrated", "with_control", "with_images", "with_sd"]
 
+SAME = 1e-3
+"""Pixels that two measurements of a point on a photo may be apart to be one."""
 SIMILAR = 10.0
 """How much better control must fit a model after a similarity for the model to be carried over."""
 
@@ -173,8 +175,33 @@ def _known_photos(project: Project, given: ControlList) -> ColumnTable:
         given.messages.append(
             Message(f"measurements on other photos are left out: {listed(lost, 3)}", table.path)
         )
+    known = _some_rows(table, rows)
+    return replace(known, cells={**known.cells, "photo": [names[row] for row in rows]})
+
+
+def _new_images(project: Project, table: ColumnTable) -> ColumnTable:
+    """Return the measurements that the project does not have already, at the same place in the photo."""
+    block = project.block
+    known = {
+        (block.photo_ids[photo], block.point_ids[point]): row
+        for row, (photo, point) in enumerate(
+            zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
+        )
+    }
+    pairs = list(zip(table.texts("photo"), table.texts("point"), strict=True))
+    if not any(pair in known for pair in pairs):
+        return table
+    there, given = to_corner(project), corner_of(table, None)
+    rows = [
+        row
+        for row, pair in enumerate(pairs)
+        if pair not in known or np.abs(there[known[pair]] - given[row]).max() > SAME
+    ]
+    return _some_rows(table, rows)
+
+
+def _some_rows(table: ColumnTable, rows: Sequence[int]) -> ColumnTable:
     cells = {column: [table.cells[column][row] for row in rows] for column in table.columns}
-    cells["photo"] = [names[row] for row in rows]
     return replace(table, cells=cells, count=len(rows), records=[table.records[row] for row in rows])
 
 
@@ -211,7 +238,8 @@ def with_control(
         table = listed_control.control
         settings = replace(settings, crs={"control": crs or listed_control.crs})
         tables = Tables(settings, listed_control.messages)
-        project = _with_table(project, path, _known_photos(project, listed_control), None)
+        images = _new_images(project, _known_photos(project, listed_control))
+        project = _with_table(project, path, images, None)
     transform = Transform(settings, tables.messages)
     given = read_control(tables, table, transform)
     block = project.block
@@ -246,7 +274,9 @@ def with_control(
         ),
         messages=(*messages, *carried.messages[len(project.messages) :]),
     )
-    planes = [each for each in plane_remarks(found) if each not in found.messages]
+    planes = [
+        each for each in plane_remarks(found.block, found.path, found.starts) if each not in found.messages
+    ]
     return found.replace(messages=(*found.messages, *planes))
 
 

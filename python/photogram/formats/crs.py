@@ -32,12 +32,15 @@ __all__ = [
     "to_frame",
     "to_system",
     "turn_to_frame",
+    "without_geoid",
 ]
 
 GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
 ROUND = 1e-4
 """Degrees to which a chosen origin is rounded; its height to a metre."""
 _ENU = re.compile(r"\s*ENU:\s*([-+.\d]+)\s*,\s*([-+.\d]+)\s*(?:,\s*([-+.\d]+)\s*)?", re.IGNORECASE)
+_GEOID = re.compile(r"\+geoid=([-+]?\d+(?:\.\d*)?)\s*$", re.IGNORECASE)
+"""Behind a system: the height of the geoid above the ellipsoid, one for all."""
 STEP = 1.0
 """Metres, for the directions of the axes of a system at a point."""
 
@@ -47,7 +50,7 @@ def _system(crs: str) -> pyproj.CRS:
     import pyproj
 
     try:
-        return pyproj.CRS.from_user_input(crs)
+        return pyproj.CRS.from_user_input(without_geoid(crs))
     except pyproj.exceptions.CRSError as error:
         raise InputError(f"{crs!r} is no coordinate reference system that PROJ knows: {error}") from None
 
@@ -72,9 +75,8 @@ def _hint(source: str, target: str) -> str:
     if not (_system(source).is_compound or _system(target).is_compound):
         return ""
     return (
-        "; heights above sea level need the grid of a geoid: give ellipsoidal heights and the horizontal"
-        " system"
-        " alone, or install the grid (projsync)"
+        "; heights above sea level need the grid of a geoid: install it (projsync), give ellipsoidal heights"
+        " and the horizontal system alone, or that with the height of the geoid: EPSG:25832+geoid=46.5"
     )
 
 
@@ -110,8 +112,19 @@ def geocentric(crs: str, xyz: Floats) -> Floats:
     system = _system(crs)
     if len(system.axis_info) == 2:
         # Heights pass through a system of two dimensions; the ellipsoidal one that belongs to it says so.
-        crs = _with_heights(crs)
-    return _transformed(crs, GEOCENTRIC, xyz)
+        return _transformed(_with_heights(crs), GEOCENTRIC, xyz + _geoid(crs))
+    return _transformed(crs, GEOCENTRIC, xyz + _geoid(crs))
+
+
+def _geoid(crs: str) -> Floats:
+    """Return (3,) what carries heights above the geoid, whose height is written behind a system, up."""
+    match = _GEOID.search(crs)
+    return np.array([0.0, 0.0, 0.0 if match is None else float(match[1])])
+
+
+def without_geoid(crs: str) -> str:
+    """Return a system without the height of the geoid behind it, as other programs know it."""
+    return _GEOID.sub("", crs)
 
 
 @cache
@@ -237,7 +250,7 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
         found: Floats = (earth - _geocentric_of(local)) @ east_north_up(local).T
     else:
         target = _with_heights(crs) if len(_system(crs).axis_info) == 2 else crs
-        found = _transformed(GEOCENTRIC, target, earth)
+        found = _transformed(GEOCENTRIC, target, earth) - _geoid(crs)
     turns: Floats = _axes(crs, found, earth) @ own.transpose(0, 2, 1)
     return found, turns
 
@@ -324,7 +337,9 @@ def _remarks(crs: str) -> list[str]:
         return []
     system = _system(crs)
     remarks = []
-    if len(system.axis_info) == 2:
+    if _GEOID.search(crs):
+        remarks.append(f"heights are raised by {_geoid(crs)[2]:g} m from the geoid to the ellipsoid")
+    elif len(system.axis_info) == 2:
         remarks.append(f"{crs} says nothing of heights: they are taken as ellipsoidal")
     if system.datum is not None and "dynamic" in system.datum.type_name.lower():
         remarks.append(f"{crs} is of a datum that moves: the epoch is not regarded")

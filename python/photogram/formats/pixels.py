@@ -122,6 +122,10 @@ def read(path: Path, wishes: Wishes) -> Project:
     for row, camera in enumerate(cameras.cameras):
         own = which == row
         xy[own] = from_corner(camera, cameras.sizes[row], corner[own])
+    keep = table.flags("use")
+    if not keep.all():
+        messages.append(Message(f"{np.count_nonzero(~keep)} images are not used", path))
+    sd = _sd(table, wishes)
     count = len(photos.names)
     return assembled(
         path=path,
@@ -135,10 +139,10 @@ def read(path: Path, wishes: Wishes) -> Project:
         matrices=np.full((count, 3, 3), np.nan),
         point_ids=points.names,
         starts=np.full((len(points.names), 3), np.nan),
-        image_photos=photos.rows,
-        image_points=points.rows,
-        image_xy=xy,
-        image_sd=_sd(table, wishes),
+        image_photos=photos.rows[keep],
+        image_points=points.rows[keep],
+        image_xy=xy[keep],
+        image_sd=None if sd is None else sd[keep],
         lacks=["no poses and no control: a free network, oriented first (--control FILE)"],
         messages=messages,
     )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.project import Project
 from photogram.messages import Message
+from photogram.network.block import Block
 from photogram.network.refraction import METRES_PER_UNIT
 
 __all__ = ["Bend", "bend", "plane_remarks"]
@@ -67,12 +68,22 @@ def bend(xyz: Floats, crs: str = "") -> Bend:
     return Bend(extent, extent**2 / (2 * RADIUS), scale)
 
 
-def plane_remarks(project: Project) -> list[Message]:
-    """Say by how much the plane bends where a project is adjusted in one, or looks as if it were."""
-    frame, block = project.frame, project.block
-    if frame.kind != "cartesian":
+def plane_remarks(block: Block, path: Path, starts: Floats | None = None) -> list[Message]:
+    """Say by how much the plane bends where a block is adjusted in one, or looks as if it were.
+
+    Parameters
+    ----------
+    block
+        The block, in its frame.
+    path
+        Where it was read.
+    starts
+        (n, 3) where its points are about, if that is known; NaN where not.
+    """
+    frame = block.frame
+    if frame.kind != "cartesian" or block.geographic:
         return []
-    known = np.vstack([block.photo_positions, project.positions()])
+    known = np.vstack([block.photo_positions, block.point_positions, *([] if starts is None else [starts])])
     known = known[np.isfinite(known).all(axis=1)] * METRES_PER_UNIT.get(block.linear_unit, 1.0)
     if len(known) < 2:
         return []
@@ -85,7 +96,7 @@ def plane_remarks(project: Project) -> list[Message]:
             Message(
                 f"the plane of {frame.crs} is adjusted as if it were cartesian: {bend(known, frame.crs)};"
                 " with [control] crs in place of [frame] crs the frame is a cartesian one",
-                project.path,
+                path,
             )
         ]
     like_a_map = (np.abs(np.median(known[:, :2], axis=0)) > LIKE_A_PLANE).all()
@@ -96,6 +107,6 @@ def plane_remarks(project: Project) -> list[Message]:
             "coordinates look like those of a map, and are adjusted as if they were cartesian:"
             f" {bend(known)}, and the scale of the projection is not that of heights; where [control] crs or"
             " --control-crs names the system, a cartesian frame is chosen",
-            project.path,
+            path,
         )
     ]

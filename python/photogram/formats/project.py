@@ -22,6 +22,7 @@ from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
 from photogram.network.rigs import Mount
+from photogram.show.brief import Brief
 
 __all__ = ["DatumName", "Frame", "Options", "Project", "Size", "assembled"]
 
@@ -42,8 +43,8 @@ class Options:
     unit_variance: Literal["free", "constrained", "unity"] = "free"
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Project:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Project(Brief):
     """A block with what files say of it beyond.
 
     Attributes

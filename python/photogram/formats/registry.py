@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -33,9 +33,12 @@ FORMATS: dict[str, Format] = {
         "bingo",
         "dbat",
         "giant",
+        "results",
     )
 }
 """By name, in the order in which help lists them."""
+MOST = 200
+"""Files of a folder that are looked at where the folder itself has no format."""
 
 
 def recognised(path: Path) -> Format:
@@ -46,17 +49,43 @@ def recognised(path: Path) -> Format:
     InputError
         Nothing lies there, it has no format that is known, or may be of several.
     """
+    return _located(path)[0]
+
+
+def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
+    """Return the format of what lies at a path, and where: in a folder its only file that has any."""
+    among = list(FORMATS.values()) if file_format is None else [_named(file_format)]
     with reading(path):
         path.stat()
-        found = [each for each in FORMATS.values() if each.recognises(path)]
+        found = [(each, path) for each in among if each.recognises(path)]
+        if not found and path.is_dir():
+            files = [each for each in sorted(path.iterdir())[:MOST] if each.is_file()]
+            found = [(each, file) for file in files for each in among if each.recognises(file)]
     if len(found) == 1:
         return found[0]
+    if file_format is not None:
+        # The reader says best what is missing.
+        return among[0], path
     if found:
-        names = ", ".join(f"{each.title} (--format {each.name})" for each in found)
-        raise InputError(f"may be read as {names}: say which", file=path)
+        raise InputError(f"may be read as {_told(found, path)}: say which", file=path)
     what = "folder holds" if path.is_dir() else "file is"
     titles = listed([f"{each.title} ({each.name})" for each in FORMATS.values()], len(FORMATS))
-    raise InputError(f"the {what} none of the formats that are known: {titles}", file=path)
+    raise InputError(f"the {what} none of the formats that are known: {titles}{_beside(path)}", file=path)
+
+
+def _told(found: Sequence[tuple[Format, Path]], path: Path) -> str:
+    return ", ".join(
+        f"{each.title} (--format {each.name}{'' if where == path else f', {where.name}'})"
+        for each, where in found
+    )
+
+
+def _beside(path: Path) -> str:
+    """Return what is to be said where a file is one of several of a project."""
+    if path.is_dir():
+        return ""
+    found = [each.title for each in FORMATS.values() if each.recognises(path.parent)]
+    return f"; its folder is a {found[0]}: give that" if len(found) == 1 else ""
 
 
 def read(path: Path, file_format: str | None = None, wishes: Wishes | None = None) -> Project:
@@ -65,7 +94,7 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     Parameters
     ----------
     path
-        A file or a folder.
+        A file or a folder; also a folder with one file that has a format.
     file_format
         The name of its format; None: found out.
     wishes
@@ -77,11 +106,13 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
         The path cannot be read or holds something else; names file, record and what stands there.
     """
     path = Path(path)
-    chosen = recognised(path) if file_format is None else _named(file_format)
+    chosen, path = _located(path, file_format)
     with turned(f"reading {path}"):
         try:
             project = chosen.read(path, wishes or Wishes())
-            return project.replace(messages=(*project.messages, *plane_remarks(project)))
+            return project.replace(
+                messages=(*project.messages, *plane_remarks(project.block, path, project.starts))
+            )
         except InputError as error:
             # What refuses arrays or systems of coordinates does not know where they came from.
             raise (error if error.file else InputError(error.message, file=path)) from None

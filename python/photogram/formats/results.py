@@ -1,23 +1,29 @@
-"""Results that were written as data, read again."""
+"""Results that were written as data: read again as results, or as projects to go on with."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.saved import KIND as COLLECTION
 from photogram.collection.saved import read_collection_result
 from photogram.errors import InputError
+from photogram.formats.format import Format, Wishes
+from photogram.formats.project import DatumName, Options, Project
 from photogram.results.result import Result
 from photogram.results.saved import SUMMARY, read_summary
 from photogram.results.saved_block import KIND as BLOCK
 from photogram.results.saved_block import read_block_result
 
-__all__ = ["read_result"]
+__all__ = ["FORMAT", "TITLE", "read_result"]
+
+TITLE = "result as data (Parquet)"
 
 _READERS: Mapping[str, Callable[[Path, Mapping[str, Any]], Result | AdjustedCollection]] = {
     BLOCK: read_block_result,
@@ -51,4 +57,39 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     return _READERS[kind](folder, document)
 
 
-check_arguments(globals(), __all__)
+def _recognises(path: Path) -> bool:
+    return path.is_dir() and (path / SUMMARY).is_file() and (path / "state.parquet").is_file()
+
+
+def _project(path: Path, wishes: Wishes) -> Project:
+    """Read the block of a result, where its adjustment has ended, with the options that it had."""
+    del wishes
+    result = read_result(path)
+    if not isinstance(result, Result):
+        raise InputError("holds the result of a collection, which photogram.read_result reads", file=path)
+    datums: dict[str, DatumName] = {"inner constraints": "inner", "minimum constraints": "minimum"}
+    losses: dict[str, Literal["huber", "cauchy"]] = {"huber": "huber", "cauchy": "cauchy"}
+    variances: dict[str, Literal["free", "constrained", "unity"]] = {
+        "free": "free",
+        "unity": "unity",
+    }
+    count = len(result.block.cameras)
+    return Project(
+        block=result.restarted(),
+        path=path,
+        title=TITLE,
+        sizes=(None,) * count,
+        pixel_mm=(None,) * count,
+        starts=np.array(result.point_positions),
+        frame=result.block.frame,
+        options=Options(
+            datum=datums.get(result.datum.kind),
+            loss=None if result.loss is None else losses[result.loss[0]],
+            unit_variance=variances.get(result.unit_variance, "constrained"),
+        ),
+    )
+
+
+FORMAT = Format(name="results", title=TITLE, recognises=_recognises, read=_project)
+
+check_arguments(globals(), ["read_result"])

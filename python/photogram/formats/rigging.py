@@ -23,9 +23,9 @@ class Rig:
     name
         For reports.
     reference
-        The camera that is the frame.
+        The sensor that is the frame.
     sensors
-        The pose of each other camera.
+        The pose of each other sensor.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Rig:
 
 @dataclass(frozen=True)
 class FrameOf:
-    """Photos that were taken together: their indices by camera."""
+    """Photos that were taken together: their indices by the names of sensors."""
 
     name: str
     rig: Rig
@@ -44,10 +44,11 @@ class FrameOf:
 
 @dataclass(frozen=True)
 class Stand:
-    """A photo without images that stands for a frame."""
+    """A photo without images that stands for a frame; its camera is called so, or that of another photo."""
 
     name: str
     camera: str
+    like: int
     centre: Floats
     matrix: Floats
 
@@ -76,13 +77,15 @@ def mounted(
         else:
             camera, row = next(iter(frame.photos.items()))
             sensor = frame.rig.sensors[camera]
-            matrix = matrices[row] @ np.asarray(sensor.matrix).T
+            # Of a sensor that is not known the photo's own pose is near enough to begin with.
+            turn = np.eye(3) if sensor.matrix is None else np.asarray(sensor.matrix)
+            matrix = matrices[row] @ turn.T
             name = f"frame {frame.name}"
             while name in taken:
                 name += "'"
             taken.add(name)
-            centre = centres[row] - matrix @ np.asarray(sensor.value)
-            stands.append(Stand(name, frame.rig.reference, centre, matrix))
+            centre = centres[row] - matrix @ sensor.position
+            stands.append(Stand(name, frame.rig.reference, row, centre, matrix))
         mounts += [
             Mount(photos[row], name, frame.rig.sensors[camera])
             for camera, row in frame.photos.items()

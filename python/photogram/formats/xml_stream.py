@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import xml.parsers.expat
+import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -20,6 +23,8 @@ __all__ = ["Element", "read_stream", "root_of"]
 
 PIECE = 1 << 16
 DEEPEST = 200
+_PACKED_BADLY = (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError)
+"""What archives that are damaged, or packed in other ways, end in."""
 
 
 @dataclass
@@ -99,15 +104,33 @@ class Element:
         return np.array([self._number(word) for word in words])
 
 
+@contextmanager
+def _opened(path: Path) -> Iterator[IO[bytes]]:
+    """Open a file, or the document in a zip archive: `doc.xml`, or the only one."""
+    if not zipfile.is_zipfile(path):
+        with path.open("rb") as file:
+            yield file
+        return
+    with zipfile.ZipFile(path) as archive:
+        names = [name for name in archive.namelist() if name.lower().endswith(".xml")]
+        name = "doc.xml" if "doc.xml" in names else names[0] if len(names) == 1 else None
+        if name is None:
+            raise InputError(
+                f"is an archive with {len(names)} documents: one, or doc.xml, is read", file=path
+            )
+        with archive.open(name) as packed:
+            yield packed
+
+
 def root_of(path: Path) -> tuple[str, Mapping[str, str]]:
     """Return name and attributes of the root element of a file; nothing for what is no XML."""
     found: list[tuple[str, Mapping[str, str]]] = []
     parser = xml.parsers.expat.ParserCreate()
     parser.StartElementHandler = lambda name, attributes: found.append((name, attributes))
     try:
-        with path.open("rb") as file:
+        with _opened(path) as file:
             parser.Parse(file.read(PIECE), False)
-    except (OSError, xml.parsers.expat.ExpatError):
+    except (OSError, InputError, xml.parsers.expat.ExpatError, *_PACKED_BADLY):
         pass
     return found[0] if found else ("", {})
 
@@ -159,10 +182,12 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler, parser.EntityDeclHandler = text, declares
     try:
-        with reading(path), path.open("rb") as file:
+        with reading(path), _opened(path) as file:
             while piece := file.read(PIECE):
                 parser.Parse(piece, False)
             parser.Parse(b"", True)
+    except _PACKED_BADLY as error:
+        raise InputError(f"cannot be unpacked: {error}", file=path) from None
     except xml.parsers.expat.ExpatError as error:
         what = xml.parsers.expat.ErrorString(error.code)
         raise InputError(

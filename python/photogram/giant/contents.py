@@ -15,12 +15,13 @@ from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import GroundPoint, ground_records
 from photogram.giant.images import ImageFrame, image_records
 from photogram.messages import Message
+from photogram.show.brief import Brief, Rows, few
 
 __all__ = ["Contents"]
 
 
-@dataclass
-class Contents:
+@dataclass(repr=False)
+class Contents(Brief):
     """The content of the five files.
 
     Attributes
@@ -40,6 +41,18 @@ class Contents:
     ground: list[GroundPoint]
     messages: list[Message] = field(default_factory=list)
     directory: Path | None = None
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return what the project is in a few lines: titles, and how many of everything there are."""
+        rows = [
+            ("cameras", f"{len(self.cameras):,}"),
+            ("frames", few([each.name for each in self.frames])),
+            ("images", f"{sum(len(each.points) for each in self.images):,} on {len(self.images):,} frames"),
+            ("ground", f"{len(self.ground):,} points"),
+            ("messages", f"{len(self.messages):,}"),
+            ("directory", str(self.directory) if self.directory else "none"),
+        ]
+        return f"GIANT project: {self.title.strip()}", rows
 
     @property
     def title(self) -> str:

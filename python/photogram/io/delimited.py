@@ -11,7 +11,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -27,7 +27,7 @@ from photogram.io.places import Place
 from photogram.io.rows import LONGEST_RECORD
 from photogram.messages import listed, quoted
 
-__all__ = ["ColumnTable", "Names", "read_columns", "read_rows"]
+__all__ = ["FALSE", "TRUE", "ColumnTable", "Names", "read_columns", "read_rows"]
 
 DELIMITERS = ("\t", ";", ",", "|")
 """In this order; blanks where a header has none of them."""
@@ -35,7 +35,7 @@ LARGE = 1 << 20
 """Bytes from which a table is worth the parser of pandas."""
 COMMENT = "#"
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
-_TRUE, _FALSE = frozenset({"true", "yes", "1", "t", "y"}), frozenset({"false", "no", "0", "f", "n"})
+TRUE, FALSE = frozenset({"true", "yes", "1", "t", "y"}), frozenset({"false", "no", "0", "f", "n"})
 
 
 @dataclass(frozen=True)
@@ -117,6 +117,8 @@ class ColumnTable:
         found = self.ready.get(column)
         if not isinstance(found, Names):
             found = _factorised(self.cells[column])
+        if _all_apart(found.names):
+            return found
         for name in found.names:
             if not name or name.lower() == "nan":
                 row = int(np.flatnonzero(found.rows == found.names.index(name))[0])
@@ -207,9 +209,9 @@ class ColumnTable:
         if column in self.columns:
             for row, cell in enumerate(self.texts(column)):
                 word = cell.lower()
-                if word and word not in _TRUE | _FALSE:
+                if word and word not in TRUE | FALSE:
                     raise self.error(row, f"column {column}: {quoted(cell)} is neither true nor false")
-                values[row] = word in _TRUE if word else default
+                values[row] = word in TRUE if word else default
         return values
 
 
@@ -240,7 +242,7 @@ def read_columns(
         the header.
     """
     if path.suffix == ".parquet":
-        return _parquet(path, spelling)
+        return _parquet(path, spelling, numbers)
     text = _text(path)
     head, delimiter = _head(path, text, known, spelling)
     columns = tuple(spelling(cell.strip().lower()) for cell in _split(head, delimiter))
@@ -303,8 +305,7 @@ def _text(path: Path) -> str:
 def _head(path: Path, text: str, known: Collection[str], spelling: Callable[[str], str]) -> tuple[Place, str]:
     """Find the header: the first line, or the last comment before it where only that names known columns."""
     comment: Place | None = None
-    for record, line in enumerate(io.StringIO(text), 1):
-        line = line.rstrip("\n")
+    for record, line in enumerate(_lines(text), 1):
         if line.lstrip().startswith(COMMENT):
             comment = Place(path, record, line.lstrip()[1:])
             continue
@@ -320,6 +321,16 @@ def _head(path: Path, text: str, known: Collection[str], spelling: Callable[[str
     if comment is not None and _knows(comment, known, spelling):
         return comment, _delimiter(comment)
     raise Place(path).error("holds no table")
+
+
+def _lines(text: str) -> Iterator[str]:
+    """Yield the lines of a text, without a copy of what nobody asks for."""
+    start = 0
+    while (end := text.find("\n", start)) >= 0:
+        yield text[start:end]
+        start = end + 1
+    if start < len(text):
+        yield text[start:]
 
 
 def _knows(place: Place, known: Collection[str], spelling: Callable[[str], str]) -> bool:
@@ -433,8 +444,20 @@ def _by_pandas(
     return ColumnTable(path, head, tuple(columns), count, {}, records, delimiter, ready)
 
 
+def _all_apart(names: Sequence[str]) -> bool:
+    """Whether names are surely all right: without blanks, and different when case is put aside."""
+    text = "\n".join(names).casefold()
+    words = text.split()
+    if len(words) < len(names) or text.count("\n") >= len(names):
+        return False
+    different = set(words)
+    return len(different) == len(names) == len(words) and "nan" not in different
+
+
 def _merged(codes: Indices, texts: list[str]) -> Names:
     """Return names of which those that were alike but for blanks at their ends are one."""
+    if len(set(texts)) == len(texts):
+        return Names(texts, codes)
     found = _factorised(texts)
     return Names(found.names, found.rows[codes])
 
@@ -445,7 +468,7 @@ def _factorised(cells: Sequence[str]) -> Names:
     return Names(list(places), rows)
 
 
-def _parquet(path: Path, spelling: Callable[[str], str]) -> ColumnTable:
+def _parquet(path: Path, spelling: Callable[[str], str], numbers: Collection[str]) -> ColumnTable:
     import pyarrow
     import pyarrow.compute
     import pyarrow.parquet
@@ -462,8 +485,13 @@ def _parquet(path: Path, spelling: Callable[[str], str]) -> ColumnTable:
         if columns.count(name) > 1:
             raise head.error(f"the column {quoted(name)} is there twice")
         kind = column.type
+        if pyarrow.types.is_integer(kind) and name not in numbers:
+            # Names that are digits all of them.
+            column, kind = column.cast(pyarrow.string()), pyarrow.string()
+        if pyarrow.types.is_large_string(kind):
+            column, kind = column.cast(pyarrow.string()), pyarrow.string()
         if pyarrow.types.is_dictionary(kind) or pyarrow.types.is_string(kind):
-            whole = column.combine_chunks()
+            whole = column.unify_dictionaries().combine_chunks()
             coded = whole if pyarrow.types.is_dictionary(kind) else pyarrow.compute.dictionary_encode(whole)
             texts = [str(text).strip() for text in coded.dictionary.to_pylist()]
             codes = coded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)

@@ -125,7 +125,13 @@ def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Call
     def write(file: BinaryIO) -> None:
         # Of numbers of measurements hardly two are alike: a dictionary of them takes ten times as long.
         parquet.write_table(
-            table, file, compression="zstd", compression_level=LEVEL, row_group_size=ROWS, use_dictionary=few
+            table,
+            file,
+            compression="zstd",
+            compression_level=LEVEL,
+            row_group_size=ROWS,
+            use_dictionary=few,
+            write_page_checksum=True,
         )
 
     return write
@@ -145,7 +151,7 @@ def read_sheet(path: Path) -> Sheet:
     import pyarrow
 
     try:
-        table = parquet.read_table(path)
+        table = parquet.read_table(path, page_checksum_verification=True)
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"cannot be read as Parquet: {error}", file=path) from None
     columns = {name: _values(path, name, table.column(name)) for name in table.column_names}

@@ -146,7 +146,7 @@ def _limits(plan: Plan, seen: tuple[int, int, int], outlines: Floats | None = No
     shown = shown[np.isfinite(shown).all(axis=1)]
     if len(shown) and (np.ptp(shown, axis=0) < LARGER * (high - low).max()).all():
         low, high = np.minimum(low, shown.min(axis=0)), np.maximum(high, shown.max(axis=0))
-    margin = 0.04 * max(float((high - low).max()), 1e-9)
+    margin = 0.05 * max(float((high - low).max()), 1e-9)
     return np.array([low - margin, high + margin])
 
 

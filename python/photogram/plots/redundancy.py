@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.plots.cells import cells
+from photogram.plots.cells import Cells, cells
 from photogram.plots.network import thinned, view_of_plan
 from photogram.plots.panels import Where, handed_out, note, panels
 from photogram.plots.pictured import Images, Pictured, pictured
@@ -17,7 +17,6 @@ from photogram.show.style import INK, ORDERED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.cm import ScalarMappable
 
 __all__ = ["redundancy"]
 
@@ -26,7 +25,11 @@ SINGLE = 600
 CELLS = 16
 """Along the longer side of the frame."""
 POINTS = 6000
-"""Points of the network that are drawn at most."""
+"""Points of the network that are drawn one by one at most; of more, the means of cells."""
+CELLS_OF_PLAN = 60
+"""Along the longer side of the network."""
+PHOTOS = 1000
+"""That are marked at most."""
 
 
 def redundancy(result: object, ax: Where = None) -> Any:
@@ -61,65 +64,78 @@ def redundancy(result: object, ax: Where = None) -> Any:
     if not np.isfinite(values).any():
         raise InputError("there are no redundancy numbers: adjust with covariance=True")
     with panels(ax, 1, 2, 10.5, 4.9) as found:
-        mappable = _over_frame(found[0], images, values)
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import Normalize
+
+        _over_frame(found[0], images, values)
         _over_network(found[1], drawn, values)
         figure = found[1].get_figure()
         assert figure is not None
-        figure.colorbar(mappable, ax=found[1], label="redundancy number, 0 to 1", aspect=30, shrink=0.85)
+        colours = ScalarMappable(Normalize(0.0, 1.0), ORDERED)
+        figure.colorbar(colours, ax=found[1], label="redundancy number, 0 to 1", aspect=30, shrink=0.85)
     return handed_out(found)
 
 
-def _over_frame(axes: Axes, images: Images, values: Floats) -> ScalarMappable:
+def _over_frame(axes: Axes, images: Images, values: Floats) -> None:
     grid = cells(images.xy, CELLS)
     frame(axes, images, grid.edges)
     axes.set_title(f"Over the frame: mean {np.nanmean(values):.2f}, least {np.nanmin(values):.2f}")
     if len(values) <= SINGLE:
-        return axes.scatter(
+        axes.scatter(
             images.xy[:, 0], images.xy[:, 1], c=values, s=14.0, cmap=ORDERED, vmin=0.0, vmax=1.0, linewidths=0
         )
-    table = grid.means(values).reshape(grid.rows, grid.columns)
-    (left, low), (right, high) = grid.edges
-    note(
-        axes, [f"means of cells with {grid.counts[grid.counts > 0].min():,} to {grid.counts.max():,} images"]
-    )
-    return axes.pcolormesh(
-        np.linspace(left, right, grid.columns + 1),
-        np.linspace(low, high, grid.rows + 1),
-        np.ma.masked_invalid(table),
-        cmap=ORDERED,
-        vmin=0.0,
-        vmax=1.0,
-    )
+    else:
+        note(axes, [_mesh(axes, grid, values, "images")])
 
 
 def _over_network(axes: Axes, drawn: Pictured, values: Floats) -> None:
-    """Draw points in the colour of the least checked of their images."""
+    """Draw points in the colour of the least checked of their images, of many the means of cells."""
     plan, images = drawn.plan, drawn.images
     least = np.full(len(plan.points), np.inf)
     np.minimum.at(least, images.points, values)
     rows = np.flatnonzero(np.isfinite(least) & np.isfinite(plan.points).all(axis=1))
     seen = view_of_plan(axes, plan)
-    chosen, said = thinned("points", rows, POINTS)
-    # The least on top: they are what a reader looks for.
-    chosen = chosen[np.argsort(-least[chosen], kind="stable")]
-    axes.scatter(
-        plan.points[chosen, seen[0]],
-        plan.points[chosen, seen[1]],
-        c=least[chosen],
-        s=float(np.clip(9000.0 / len(chosen), 3.0, 20.0)),
-        cmap=ORDERED,
-        vmin=0.0,
-        vmax=1.0,
-        linewidths=0,
-        rasterized=len(chosen) > 1500,
-    )
+    places = plan.points[rows][:, list(seen[:2])]
+    limits = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    inside = ((places >= limits[0]) & (places <= limits[1])).all(axis=1)
+    rows, places = rows[inside], places[inside]
+    axes.set_title("Over the network: the least of the images of a point")
+    if len(rows) > POINTS:
+        note(axes, [_mesh(axes, cells(places, CELLS_OF_PLAN), least[rows], "points")])
+    else:
+        # The least on top: they are what a reader looks for.
+        order = np.argsort(-least[rows], kind="stable")
+        axes.scatter(
+            places[order, 0],
+            places[order, 1],
+            c=least[rows][order],
+            s=float(np.clip(9000.0 / max(len(rows), 1), 3.0, 20.0)),
+            cmap=ORDERED,
+            vmin=0.0,
+            vmax=1.0,
+            linewidths=0,
+            rasterized=len(rows) > 1500,
+        )
+    photos, _ = thinned("photos", np.arange(len(plan.photos)), PHOTOS)
     axes.plot(
-        *plan.photos[:: max(1, len(plan.photos) // 1000)][:, list(seen[:2])].T,
+        *plan.photos[photos][:, list(seen[:2])].T,
         "+",
         color=INK,
         markersize=3.0,
         markeredgewidth=0.5,
         alpha=0.5,
     )
-    axes.set_title("Over the network: the least of the images of a point")
-    note(axes, [said])
+
+
+def _mesh(axes: Axes, grid: Cells, values: Floats, what: str) -> str:
+    """Draw the means of cells, and return what they are."""
+    (left, low), (right, high) = grid.edges
+    axes.pcolormesh(
+        np.linspace(left, right, grid.columns + 1),
+        np.linspace(low, high, grid.rows + 1),
+        np.ma.masked_invalid(grid.means(values).reshape(grid.rows, grid.columns)),
+        cmap=ORDERED,
+        vmin=0.0,
+        vmax=1.0,
+    )
+    return f"means of cells with {grid.counts[grid.counts > 0].min():,} to {grid.counts.max():,} {what}"

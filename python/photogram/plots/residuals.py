@@ -28,6 +28,8 @@ CAMERAS = 6
 """That have a panel at most: those with the most images."""
 FEWEST = 8
 """Images of a cell whose mean is drawn."""
+ROOM = 0.06
+"""Around the frame, of its longer side."""
 LONGEST = 2.5
 """Vectors that are longer than so many times the scale's are cut short."""
 LEVEL = 0.01
@@ -64,13 +66,15 @@ def residuals(result: object, ax: Where = None) -> Any:
     columns = min(3, len(cameras))
     rows = -(-len(cameras) // columns)
     width = 6.4 if columns == 1 else 4.2 * columns
-    across, up = np.ptp(images.xy, axis=0) if len(images.xy) else (1.0, 1.0)
-    high = rows * (float(np.clip(up / max(across, 1e-12), 0.3, 1.5)) * (width / columns - 0.9) + 2.0)
+    extent = np.ptp(images.xy, axis=0) if len(images.xy) else np.ones(2)
+    across, up = np.maximum(extent + 2 * ROOM * extent.max(), 1e-12)
+    many = np.bincount(images.cameras[np.isin(images.cameras, cameras)]).max(initial=0) > SINGLE
+    # Title, scale and labels; where means are drawn, also what they are.
+    beside = 1.95 if many else 1.25
+    high = rows * (float(np.clip(up / across, 0.3, 1.5)) * (width / columns - 0.75) + beside)
     with panels(ax, rows, columns, width, high) as found:
         for axes, camera in zip(found, cameras, strict=False):
-            _field(axes, images, camera)
-        if left_out:
-            note(found[len(cameras) - 1], ["", "", "", left_out])
+            _field(axes, images, camera, left_out if camera == cameras[-1] else "")
         for unused in found[len(cameras) :]:
             unused.set_visible(False)
     return handed_out(found[: len(cameras)])
@@ -88,7 +92,7 @@ def largest_cameras(images: Images, most: int = CAMERAS) -> tuple[list[int], str
 def frame(axes: Axes, images: Images, edges: Floats) -> None:
     """Give axes the frame of a camera: equal scales, room around it, y as the camera counts it."""
     low, high = edges
-    margin = 0.06 * float((high - low).max())
+    margin = ROOM * float((high - low).max())
     axes.set_aspect("equal", anchor="NW")
     axes.set_xlim(low[0] - margin, high[0] + margin)
     up = (low[1] - margin, high[1] + margin)
@@ -97,7 +101,8 @@ def frame(axes: Axes, images: Images, edges: Floats) -> None:
     axes.set_ylabel(f"y, {images.unit}")
 
 
-def _field(axes: Axes, images: Images, camera: int) -> None:
+def _field(axes: Axes, images: Images, camera: int, left_out: str) -> None:
+    """Draw the residuals of a camera, and say what was left out."""
     own = images.cameras == camera
     xy, vectors = images.xy[own], images.residuals[own]
     factor, unit = images.shown_as
@@ -139,7 +144,7 @@ def _field(axes: Axes, images: Images, camera: int) -> None:
     rms = np.sqrt((vectors**2).mean(axis=0)) * factor
     name = images.names[camera]
     scale_bars(axes, bars, f"{name}: {len(xy):,} images, rms {rms[0]:.3g}, {rms[1]:.3g} {unit}")
-    note(axes, [*remark, f"vectors that are longer and cut short: {cut}" if cut else ""])
+    note(axes, [*remark, f"vectors that are longer and cut short: {cut}" if cut else "", left_out])
 
 
 def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, Any, list[str]]:
@@ -154,7 +159,7 @@ def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, Any, list[str]
     beyond = square > critical_chi_square(LEVEL / len(filled), 2)
     colours = np.where(beyond, MARKED, INK)
     per_cell = _between(grid.counts[filled])
-    said = [f"means of cells with {per_cell} images; those with less than {FEWEST} are left out"]
+    said = [f"means of cells with {per_cell} images,", f"those with less than {FEWEST} are left out"]
     if beyond.any():
         said.append(f"{int(beyond.sum())} of {len(filled)} are larger than chance gives (coloured)")
     return grid.middles[filled], means[filled], colours, said

@@ -12,6 +12,7 @@ from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.show.brief import Brief
 
 if TYPE_CHECKING:
     from photogram import _photocore
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["AdjustedCamera", "adjusted_cameras", "units"]
 
 
-@dataclass(frozen=True, eq=False)
-class AdjustedCamera:
+@dataclass(frozen=True, eq=False, repr=False)
+class AdjustedCamera(Brief):
     """A camera after the adjustment, with k parameters. Arrays cannot be written.
 
     Attributes

@@ -1,20 +1,22 @@
-"""Covariances of anything in an adjusted block with anything else, and of functions of them."""
+"""Covariances of anything in an adjusted network with anything else, and of functions of them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.results.datum import refused
 from photogram.results.selection import Adjusted, Selected, Selection
 
-__all__ = ["Covariances", "Propagated"]
+__all__ = ["Covariances", "Failure", "Propagated"]
+
+T = TypeVar("T")
+Failure = _photocore.BlockError | _photocore.CollectionError
 
 STEP = 0.01
 """Of differences, in standard deviations."""
@@ -52,24 +54,26 @@ class Propagated:
 
 
 class Covariances:
-    """The covariances of an adjusted block, in its datum: it keeps a factor of the normal equations.
+    """The covariances of an adjusted network, in its datum: it keeps a factor of the normal equations.
 
     A selection is a kind with a name, `("point", "P12")`, several names, `("photo", ["1", "2"])`, or None for
     all that took part, `("camera", None)`; or a list of these. Kinds are `photo` (position, omega, phi,
     kappa), `step` (of a photo: its position, and the rotation about its own axes, which is never singular),
-    `point`, `camera` and `unknown` (of observations in common). Rows and columns stand in this order.
+    `point`, `camera` and `unknown` (of observations in common). In a collection, whose photos and points are
+    called by their numbers, they are `photo` (all its parameters), `pose` and `camera` (its first six, and
+    the others) and `point`. Rows and columns stand in this order.
     Units are those of the result: the linear unit, radians, the units of cameras.
     """
 
     def __init__(
-        self, adjusted: Adjusted, network: _photocore.BlockNetwork, state: _photocore.BlockState, scale: float
+        self,
+        adjusted: Adjusted,
+        factored: Callable[[], _photocore.BlockCovariances],
+        refused: Callable[[Failure], Exception],
+        scale: float,
     ) -> None:
-        self._adjusted, self._scale = adjusted, scale
-        self._network, self._state = network, state
-        try:
-            self._core = network.covariances(state, threads=0, progress=None)
-        except _photocore.BlockError as error:
-            raise refused(adjusted.block, network, state, error) from None
+        self._adjusted, self._refused, self._scale = adjusted, refused, scale
+        self._core = self._asked(factored)
 
     def labels(self, selection: Selection) -> list[tuple[str, str, str]]:
         """Return what the rows of a selection are: kind, name, component.
@@ -204,11 +208,11 @@ class Covariances:
             partials = _partials(function, selected, _evaluated(function, selected, selected.values))
         return selected.labels, self._asked(lambda: trial.influences(self._core, partials, selected.rows))
 
-    def _asked(self, ask: Callable[[], Floats]) -> Floats:
+    def _asked(self, ask: Callable[[], T]) -> T:
         try:
             return ask()
-        except _photocore.BlockError as error:
-            raise refused(self._adjusted.block, self._network, self._state, error) from None
+        except (_photocore.BlockError, _photocore.CollectionError) as error:
+            raise self._refused(error) from None
 
 
 def _evaluated(function: Callable[..., Any], selected: Selected, values: Floats) -> Floats:

@@ -13,6 +13,7 @@ from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
 from photogram.messages import Message, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 from photogram.network.datum import DatumRow, InnerConstraints
+from photogram.results.covariance import Failure
 
 if TYPE_CHECKING:
     from photogram._photocore import BlockNetwork, BlockSolution
@@ -198,7 +199,7 @@ def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None
 
 
 def refused(
-    block: Block, network: BlockNetwork, state: _photocore.BlockState | None, error: _photocore.BlockError
+    block: Block, network: BlockNetwork, state: _photocore.BlockState | None, error: Failure
 ) -> AdjustmentError | InputError:
     """Return what the core has refused, with the names concerned."""
     kind, message, _, points, *_ = error.args

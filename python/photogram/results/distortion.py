@@ -34,8 +34,8 @@ __all__ = [
 ]
 
 DISTANCES = ("c", "f", "fx")
-INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy"})
-"""Principal distance and principal point; all other parameters are terms of the lens."""
+INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy", "beta"})
+"""Principal distance and point, and the beta of `eucm`, which is never 0; others are terms of the lens."""
 
 RADIAL = re.compile(r"[KkA]\d")
 """Names of radial terms."""

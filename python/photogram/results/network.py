@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from os import PathLike
@@ -20,9 +20,11 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.io.writing import write_whole
 from photogram.messages import Message
+from photogram.results.covariance import Covariances, Propagated
 from photogram.results.iteration import Iteration
 from photogram.results.reliability import Reliability
 from photogram.results.reliability_summary import ReliabilitySummary, reliability_summary
+from photogram.results.selection import Selection
 from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown, files_of
 from photogram.statistics.reliability import standardized
@@ -146,7 +148,7 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
 
-    BESIDE: ClassVar[frozenset[str]] = frozenset(
+    _BESIDE: ClassVar[frozenset[str]] = frozenset(
         {"seconds", "operations", "predictions", "formations", "state"}
     )
 
@@ -338,6 +340,37 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         """
         folder = Path(directory)
         write_whole({folder / name: content for name, content in files_of(self).items()})
+
+    @abstractmethod
+    def covariances(self) -> Covariances:
+        """Return an object that answers for covariances of anything with anything, from one factor.
+
+        The normal equations are formed and factored once, at the adjusted values; the object keeps the
+        factor, as long as you keep the object.
+
+        Raises
+        ------
+        AdjustmentError
+            Unknowns are not determined.
+        OutOfMemoryError
+            The factor would take more memory than there is.
+        KeyboardInterrupt
+            Ctrl-C.
+        """
+
+    def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
+        """Return the joint covariance matrix of a selection, or that of one with another.
+
+        For several questions ask one object: :meth:`covariances`, which says what a selection is and what
+        errors there are.
+        """
+        return self.covariances().covariance(a, b)
+
+    def propagate(
+        self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
+    ) -> Propagated:
+        """Return a function of adjusted unknowns with its covariance; see `Covariances.propagate`."""
+        return self.covariances().propagate(function, unknowns, bias=bias)
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""

@@ -106,7 +106,7 @@ class Reliability:
     trial
         The network as it stands.
     covariances
-        What answers for its covariances; None where there are none.
+        What answers for its covariances.
     level, power
         Of the test of one observation or group (alpha0 and beta0).
     known
@@ -116,7 +116,7 @@ class Reliability:
     def __init__(
         self,
         trial: NetworkTrial,
-        covariances: Callable[[], Covariances] | None,
+        covariances: Callable[[], Covariances],
         *,
         level: float,
         power: float,
@@ -243,9 +243,9 @@ class Reliability:
         Raises
         ------
         InputError
-            A selection that is not there; a network without covariances on demand.
+            A selection that is not there.
         """
-        covariances = self._asked()
+        covariances = self._covariances()
         labels, found = covariances.influences(self._trial.core, selection, None)
         return labels, np.asarray(found * (self.detectable / self.sd))
 
@@ -254,13 +254,8 @@ class Reliability:
 
         `function` and `unknowns` are those of :meth:`photogram.Result.propagate`.
         """
-        _, found = self._asked().influences(self._trial.core, unknowns, function)
+        _, found = self._covariances().influences(self._trial.core, unknowns, function)
         return np.asarray(found * (self.detectable / self.sd))
-
-    def _asked(self) -> Covariances:
-        if self._covariances is None:
-            raise InputError("this network has no covariances on demand")
-        return self._covariances()
 
     def most_moved(self, count: int = SEARCHED) -> list[Moved]:
         """Return the unknowns that undetected errors move most, the gravest first.
@@ -393,7 +388,7 @@ class Reliability:
 
 def reliability_of(
     trial: NetworkTrial,
-    covariances: Callable[[], Covariances] | None,
+    covariances: Callable[[], Covariances],
     *,
     level: float,
     power: float,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
-from photogram.results.covariance import Covariances, Propagated
+from photogram.results.covariance import Covariances
 from photogram.results.datum import (
     ResultDatum,
     datum_messages,
@@ -29,7 +29,7 @@ from photogram.results.datum import (
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.reliability import Reliability, reliability_of
-from photogram.results.selection import Adjusted, Selection, photo_components, point_components
+from photogram.results.selection import Adjusted, photo_components, point_components
 from photogram.results.suspects import network_trial
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
@@ -183,34 +183,14 @@ class Result(AdjustedNetwork):
         return self.block.image_unit
 
     def covariances(self) -> Covariances:
-        """Return an object that answers for covariances of anything with anything, from one factor.
-
-        The normal equations are formed and factored once, at the adjusted values; the object keeps the
-        factor, as long as you keep the object.
-
-        Raises
-        ------
-        OutOfMemoryError
-            The factor would take more memory than there is.
-        KeyboardInterrupt
-            Ctrl-C.
-        """
-        network = block_network(self.block, self.options)
-        return Covariances(adjusted(self), network, self.state, self.covariance_scale)
-
-    def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
-        """Return the joint covariance matrix of a selection, or that of one with another.
-
-        For several questions ask one object: :meth:`covariances`, which says what a selection is and what
-        errors there are.
-        """
-        return self.covariances().covariance(a, b)
-
-    def propagate(
-        self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False
-    ) -> Propagated:
-        """Return a function of adjusted unknowns with its covariance; see `Covariances.propagate`."""
-        return self.covariances().propagate(function, unknowns, bias=bias)
+        """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`."""
+        network, state = block_network(self.block, self.options), self.state
+        return Covariances(
+            adjusted(self),
+            lambda: network.covariances(state, threads=0, progress=None),
+            lambda error: refused(self.block, network, state, error),
+            self.covariance_scale,
+        )
 
     def reliability(
         self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
@@ -431,7 +411,7 @@ def adjusted(result: Result) -> Adjusted:
     # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
     cameras, unknowns = result.cameras, result.unknowns
     return Adjusted(
-        block=block,
+        network="block",
         ids={
             "photo": block.photo_ids,
             "step": block.photo_ids,

@@ -6,6 +6,7 @@ everything else stands in `summary.json`. Classes of results declare their colum
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,6 +37,7 @@ __all__ = [
     "read_saved",
     "read_summary",
     "rows_of",
+    "seal",
     "written",
 ]
 
@@ -279,6 +281,7 @@ def written(
         "tables": list(sheets),
         "kept": kept,
     }
+    document["sha256"] = seal(document)
     files: dict[str, Content] = {
         f"{table}.parquet": parquet_content(columns, about) for table, columns in sheets.items()
     }
@@ -328,7 +331,15 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
         raise InputError(
             f"is of the format {document['format']}, which this version does not read", file=path
         )
+    if document.get("sha256") != seal(document):
+        raise InputError("was changed after it was written: its checksum is another one", file=path)
     return document
+
+
+def seal(document: Mapping[str, Any]) -> str:
+    """Return the checksum of a summary."""
+    content = {name: each for name, each in document.items() if name != "sha256"}
+    return hashlib.sha256(orjson.dumps(content)).hexdigest()
 
 
 def rows_of(names: Any, known: Sequence[str], path: Path) -> np.ndarray:

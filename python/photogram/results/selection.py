@@ -1,9 +1,11 @@
-"""Things of an adjusted block that have covariances, by their kinds and names."""
+"""Things of an adjusted network that have covariances, by their kinds and names."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from numbers import Integral
+from typing import Any
 
 import numpy as np
 
@@ -12,15 +14,16 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 
-__all__ = ["Adjusted", "Item", "Selected", "Selection", "photo_components", "point_components"]
+__all__ = ["Adjusted", "Item", "Selected", "Selection", "Wanted", "photo_components", "point_components"]
 
-Item = tuple[str, str | Sequence[str] | None]
-"""A kind (`photo`, `step`, `point`, `camera`, `unknown`), and a name, names, or None for all of the kind."""
+Wanted = str | int | Sequence[str] | Sequence[int] | None
+"""A name, names, or None for all; the photos and points of collections are called by their numbers."""
+
+Item = tuple[str, Wanted]
+"""A kind (of blocks `photo`, `step`, `point`, `camera`, `unknown`) and what of it."""
 
 Selection = Item | Sequence[Item]
 """One or several of these."""
-
-KINDS = ("photo", "step", "point", "camera", "unknown")
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +33,7 @@ class Selected:
     Attributes
     ----------
     rows
-        Kind and index of each, as the core knows them.
+        Kind and index of each part, as the core knows them.
     labels
         What each unknown is: kind, name, component.
     values, sd
@@ -57,13 +60,27 @@ class Selected:
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """Adjusted values and standard deviations of a block, by kind; names and values one for each thing."""
+    """Adjusted values and standard deviations of a network, by kind; names and values one for each thing.
 
-    block: Block
-    ids: dict[str, list[str]]
-    components: dict[str, list[tuple[str, ...]]]
+    Attributes
+    ----------
+    network
+        What it is called: a block, or a collection.
+    ids, components, values, sd
+        By kind, for each thing: its name, the names of its unknowns, their values and standard deviations.
+    parts
+        By kind, what the core calls the parts of such a thing; those without are called as they are.
+    numbered
+        Whether things are called by their numbers.
+    """
+
+    network: str
+    ids: Mapping[str, Sequence[str]]
+    components: Mapping[str, Sequence[tuple[str, ...]]]
     values: Mapping[str, Sequence[Floats] | Floats]
     sd: Mapping[str, Sequence[Floats] | Floats]
+    parts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    numbered: bool = False
 
     def selected(self, selection: Selection) -> Selected:
         """Return what a selection names.
@@ -80,20 +97,20 @@ class Adjusted:
         deviations: list[Floats] = []
         shapes: list[tuple[int, ...]] = []
         for item in items:
-            if not (isinstance(item, tuple) and len(item) == 2) or item[0] not in KINDS:
+            if not (isinstance(item, tuple) and len(item) == 2) or item[0] not in self.ids:
                 raise InputError(
-                    f"{shown(item)} is no kind ({', '.join(KINDS)}) with a name, several, or None for all"
+                    f"{shown(item)} is no kind ({', '.join(self.ids)}) with a name, several, or None for all"
                 )
             kind, wanted = str(item[0]), item[1]
             chosen = self._indices(kind, wanted)
-            rows += [(kind, index) for index in chosen]
+            rows += [(part, index) for index in chosen for part in self.parts.get(kind, (kind,))]
             for index in chosen:
                 components = self.components[kind][index]
                 labels += [(kind, self.ids[kind][index], component) for component in components]
                 values.append(np.asarray(self.values[kind][index], dtype=float))
                 deviations.append(np.asarray(self.sd[kind][index], dtype=float))
             widths = {len(self.components[kind][index]) for index in chosen}
-            if isinstance(wanted, str):
+            if self._is_one(wanted):
                 shapes.append((len(self.components[kind][chosen[0]]),))
             elif len(widths) <= 1:
                 shapes.append((len(chosen), *widths) if widths else (0,))
@@ -102,15 +119,24 @@ class Adjusted:
         together = [np.concatenate(part) if part else np.empty(0) for part in (values, deviations)]
         return Selected(rows, labels, together[0], together[1], shapes)
 
-    def _indices(self, kind: str, wanted: str | Sequence[str] | None) -> list[int]:
+    def _is_one(self, wanted: Wanted) -> bool:
+        return isinstance(wanted, str) or (
+            self.numbered and isinstance(wanted, Integral) and not isinstance(wanted, bool)
+        )
+
+    def _indices(self, kind: str, wanted: Wanted) -> list[int]:
         ids = self.ids[kind]
         if wanted is None:
             used = ~np.isnan([each[0] if len(each) else 0.0 for each in self.values[kind]])
             return np.flatnonzero(used).tolist()
         index = {name: i for i, name in enumerate(ids)}
-        asked = [wanted] if isinstance(wanted, str) else names(f"names of the kind {kind}", wanted)
+        several: Any = [wanted] if self._is_one(wanted) else wanted
+        asked = names(f"names of the kind {kind}", several)
         if missing := [name for name in asked if name not in index]:
-            raise InputError(f"the block has no {kind.replace('step', 'photo')} {missing[0]!r}")
+            what = kind.replace("step", "photo")
+            raise InputError(
+                f"the {self.network} has no {what} {missing[0] if self.numbered else repr(missing[0])}"
+            )
         return [index[name] for name in asked]
 
 

@@ -10,6 +10,7 @@ import orjson
 
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
+from photogram.show.brief import Brief, Rows, few
 from photogram.show.sections import Section, composed, headline, verdict_section
 from photogram.show.ways import Judged, html_of
 from photogram.statistics.limits import global_test
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["Snooped"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Snooped(Judged):
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Snooped(Brief, Judged):
     """A network after data snooping.
 
     Attributes
@@ -44,6 +45,16 @@ class Snooped(Judged):
     outcome: Outcome
     suspects: Suspects
     settings: Settings
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return what was taken out of what, in a few lines."""
+        title, rows = self.result.brief()
+        own = [
+            ("verdict", self.verdict.headline),
+            ("tests", f"{self.outcome.tests:,}"),
+            ("removed", few([entry.name for entry in self.removed])),
+        ]
+        return f"{title}, without gross errors", [*own, *(row for row in rows if row[0] != "verdict")]
 
     @property
     def log(self) -> list[Removal]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import html
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Sized
+from dataclasses import fields
 
-__all__ = ["Brief", "Rows", "few"]
+__all__ = ["Brief", "Rows", "few", "told"]
 
 Rows = list[tuple[str, str]]
 """What is told, and the telling, each in a line."""
@@ -19,12 +19,13 @@ NAMED = 6
 """Names that are listed of many."""
 
 
-class Brief(ABC):
-    """A thing that tells in a few lines what it is."""
+class Brief:
+    """A thing that tells in a few lines what it is: a data class, declared with `repr=False`."""
 
-    @abstractmethod
     def brief(self) -> tuple[str, Rows]:
-        """Return what it is in a line, and what else is to be told, most important first."""
+        """Return what it is in a line, and what else is to be told, most important first: its fields."""
+        named = [each.name for each in fields(self)]  # type: ignore[arg-type]
+        return type(self).__name__, [(name, told(getattr(self, name))) for name in named]
 
     def _lines(self) -> tuple[str, Rows]:
         title, rows = self.brief()
@@ -53,3 +54,20 @@ def few(names: Sequence[str]) -> str:
     """Return how many names there are, and the first and last of them."""
     shown = list(names) if len(names) <= NAMED else [*names[: NAMED - 1], f"... {names[-1]}"]
     return f"{len(names):,}" + (f": {', '.join(shown)}" if shown else "")
+
+
+def told(value: object) -> str:
+    """Return a value in a line: numbers and words as they are, of others what they are and how many."""
+    if isinstance(value, Brief):
+        return value.brief()[0]
+    if value is None or isinstance(value, bool | int | float | str):
+        return str(value)
+    if isinstance(value, Mapping):
+        return few([str(key) for key in value])
+    if hasattr(value, "shape"):
+        return f"array {value.shape}"
+    if isinstance(value, Sequence) and all(isinstance(each, str) for each in value):
+        return few(list(value))
+    if isinstance(value, Sized):
+        return f"{len(value):,}"
+    return type(value).__name__

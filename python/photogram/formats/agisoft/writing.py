@@ -12,6 +12,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.images import to_corner
 from photogram.formats.lenses import lens_of
+from photogram.formats.lost import lost_observations
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
 from photogram.network.cameras import Camera
@@ -40,15 +41,7 @@ def cannot_hold(project: Project) -> list[str]:
     partly = _known(project) & ~marked
     if partly.any():
         found.append(f"{np.count_nonzero(partly)} control points that are not known in all coordinates")
-    if any(isinstance(each, Control) for each in block.observations):
-        found.append("correlations between coordinates of control")
-    others = sum(not isinstance(each, Position | Control) for each in block.observations)
-    if others:
-        found.append(f"{others} observations beside images, control and GNSS")
-    if any(isinstance(each, Position) for each in block.observations):
-        found.append("correlations of GNSS, lever arms, shifts and drifts")
-    if block.mounts:
-        found.append("rigs: photos have their poses")
+    found += lost_observations(block, "correlations")
     if project.frame.kind in ("topocentric", "geocentric"):
         found.append("digits: geocentric positions are good to 1e-9 m, degrees of references to 1e-9 m")
     return found

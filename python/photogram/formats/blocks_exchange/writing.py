@@ -12,6 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.blocks_exchange.reading import CENTER
 from photogram.formats.images import sizes_of, to_corner
 from photogram.formats.lenses import lens_of
+from photogram.formats.lost import lost_observations
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera
@@ -31,16 +32,7 @@ def cannot_hold(project: Project) -> list[str]:
         found.append(
             "standard deviations of control that differ in x and y: their root mean square stands for both"
         )
-    if any(isinstance(each, Control) for each in block.observations):
-        found.append("correlations between coordinates of control")
-    others = sum(not isinstance(each, Position | Control) for each in block.observations)
-    if others:
-        found.append(f"{others} observations beside images, control and GNSS")
-    if any(isinstance(each, Position) for each in block.observations):
-        found.append("standard deviations of GNSS, lever arms, shifts and drifts")
-    if block.mounts:
-        found.append("rigs: photos have their poses")
-    return found
+    return found + lost_observations(block, "standard deviations")
 
 
 def write(project: Project) -> Mapping[str, bytes]:

@@ -12,6 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.colmap.binary import read_binary
 from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Images, Model, Pose
 from photogram.formats.colmap.text import read_text
+from photogram.formats.colours import Colours
 from photogram.formats.format import Wishes
 from photogram.formats.names import NAMES, renamed
 from photogram.formats.project import Project, Size, assembled
@@ -72,6 +73,7 @@ def _project(model: Model, path: Path) -> Project:
     mounts, stands = mounted(frames, images.names, centres, matrices)
     camera_names = [each.name for each in cameras]
     rows, points = _observed(model, messages)
+    point_ids = list(map(str, model.points.numbers.tolist()))
     return assembled(
         path=path,
         title=TITLE,
@@ -84,7 +86,7 @@ def _project(model: Model, path: Path) -> Project:
         ],
         centres=np.vstack([centres, *(each.centre[np.newaxis] for each in stands)]),
         matrices=np.concatenate([matrices, *(each.matrix[np.newaxis] for each in stands)]),
-        point_ids=[str(number) for number in model.points.numbers.tolist()],
+        point_ids=point_ids,
         starts=model.points.positions,
         image_photos=np.repeat(np.arange(len(images.names)), images.counts)[rows],
         image_points=points,
@@ -96,12 +98,7 @@ def _project(model: Model, path: Path) -> Project:
         messages=messages,
         details={
             "image numbers": dict(zip(images.names, images.numbers.tolist(), strict=True)),
-            "colours": {
-                str(number): colour
-                for number, colour in zip(
-                    model.points.numbers.tolist(), model.points.colours.tolist(), strict=True
-                )
-            },
+            "colours": Colours(point_ids, model.points.colours),
         },
     )
 

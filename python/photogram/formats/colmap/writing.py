@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.colmap.binary import binary_files
 from photogram.formats.colmap.content import (
@@ -31,16 +29,15 @@ from photogram.formats.lenses import lens_of
 from photogram.formats.names import names_file, numbered
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
-from photogram.io.json import to_json
 from photogram.io.places import Place
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera as HouseCamera
-from photogram.results.result import Result
+from photogram.network.rigs import Mount
 
-__all__ = ["cannot_hold", "covariance_files", "write", "write_as_text"]
+__all__ = ["FLIP", "Made", "cannot_hold", "made", "write", "write_as_text"]
 
 _NAMES = dict(MODELS)
-_FLIP = np.diag([1.0, -1.0, -1.0])
+FLIP = np.diag([1.0, -1.0, -1.0])
 
 
 def cannot_hold(project: Project) -> list[str]:
@@ -60,9 +57,24 @@ def cannot_hold(project: Project) -> list[str]:
     lost = int(np.count_nonzero(~np.isfinite(complete_positions(project)).all(axis=1)))
     if lost:
         found.append(f"{lost} points without a position: their images are features without a point")
-    if any(each.deviations.any() for each in known_cameras(block)[0]):
+    cameras, which = known_cameras(block)
+    if any(each.deviations.any() for each in cameras):
         found.append("which parameters of cameras are unknown")
+    if not _told_by_cameras(block.mounts, dict(zip(block.photo_ids, which, strict=True))):
+        found.append("rigs whose sensors are not told by their cameras: photos have their poses")
     return found
+
+
+def _told_by_cameras(mounts: Sequence[Mount], cameras: Mapping[str, int]) -> bool:
+    """Return whether each camera is one sensor of one rig, or a rig of its own, as COLMAP wants it."""
+    sensors: dict[int, tuple[int, int]] = {}
+    for mount in mounts:
+        own = cameras[mount.frame], id(mount.sensor)
+        if sensors.setdefault(cameras[mount.photo], own) != own:
+            return False
+    mounted = {mount.photo for mount in mounts}
+    alone = {camera for photo, camera in cameras.items() if photo not in mounted}
+    return not alone & set(sensors)
 
 
 def _unposed(project: Project) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
@@ -79,27 +91,29 @@ def write(project: Project) -> Mapping[str, bytes]:
     InputError
         Cameras of other models than those of COLMAP, pictures of unknown size, geographic coordinates.
     """
-    made = _made(project)
-    return {**binary_files(made.model), **names_file(made.points)}
+    found = made(project)
+    return {**binary_files(found.model), **names_file(found.points)}
 
 
 def write_as_text(project: Project) -> Mapping[str, bytes]:
     """Return the text files of a project; see :func:`write`."""
-    made = _made(project)
-    return {**text_files(made.model), **names_file(made.points)}
+    found = made(project)
+    return {**text_files(found.model), **names_file(found.points)}
 
 
 @dataclass(frozen=True)
-class _Made:
-    """A model with the numbers that photos, points and cameras have in it."""
+class Made:
+    """A model with the numbers that photos, points and cameras have in it, and its images in their order."""
 
     model: Model
     photos: dict[str, int]
     points: dict[str, int]
     cameras: dict[str, int]
+    rows: Indices
 
 
-def _made(project: Project) -> _Made:
+def made(project: Project) -> Made:
+    """Return the model of a project; see :func:`write`."""
     block = project.block
     if block.geographic:
         raise InputError("a COLMAP model is cartesian: geographic coordinates have no place there")
@@ -113,12 +127,12 @@ def _made(project: Project) -> _Made:
     placed = np.flatnonzero(np.isfinite(positions).all(axis=1))
     points = numbered([block.point_ids[row] for row in placed], project.details.get("point numbers"))
     matrices = attitude_matrices(block)[posed]
-    rotations = _FLIP @ matrices.transpose(0, 2, 1)
+    rotations = FLIP @ matrices.transpose(0, 2, 1)
     translations = -np.einsum("nij,nj->ni", rotations, block.photo_positions[posed])
     quaternions = Attitudes(matrices).values("quaternion_to_vision")
     camera_numbers = np.array([numbers[cameras[photo_cameras[row]].name] for row in posed], dtype=np.int64)
     ids = np.array([photos[block.photo_ids[row]] for row in posed], dtype=np.int64)
-    images = _images(project, posed, ids, camera_numbers, quaternions, translations, placed, points)
+    images, rows = _images(project, posed, ids, camera_numbers, quaternions, translations, placed, points)
     colours = project.details.get("colours", {})
     poses = {
         block.photo_ids[row]: Pose(tuple(q), tuple(t))
@@ -146,7 +160,7 @@ def _made(project: Project) -> _Made:
         rigs,
         frames,
     )
-    return _Made(model, photos, points, numbers)
+    return Made(model, photos, points, numbers, rows)
 
 
 def _camera(camera: HouseCamera, size: Size, number: int) -> Camera:
@@ -173,7 +187,7 @@ def _images(
     translations: Floats,
     placed: np.ndarray[tuple[int], np.dtype[np.int64]],
     points: Mapping[str, int],
-) -> Images:
+) -> tuple[Images, Indices]:
     block = project.block
     number = np.full(len(block.point_ids), NO_POINT, dtype=np.int64)
     number[placed] = [points[block.point_ids[row]] for row in placed]
@@ -182,7 +196,7 @@ def _images(
     rank[posed[by_id]] = np.arange(len(posed))
     rows = np.flatnonzero(rank[block.image_photos] >= 0)
     rows = rows[np.argsort(rank[block.image_photos[rows]], kind="stable")]
-    return Images(
+    images = Images(
         ids[by_id],
         cameras[by_id],
         quaternions[by_id],
@@ -193,6 +207,7 @@ def _images(
         number[block.image_points[rows]],
         [],
     )
+    return images, rows
 
 
 def _rigs(
@@ -205,9 +220,8 @@ def _rigs(
     """Return rigs and frames: those of mounts, and of each other camera and photo one of its own."""
     sensors: dict[int, dict[int, Pose]] = {}
     members: dict[str, list[str]] = {name: [name] for name in poses}
-    for mount in project.block.mounts:
-        if mount.photo not in poses or mount.frame not in poses:
-            continue
+    mounts = [each for each in project.block.mounts if each.photo in poses and each.frame in poses]
+    for mount in mounts if _told_by_cameras(mounts, cameras) else []:
         own = sensors.setdefault(cameras[mount.frame], {})
         own.setdefault(cameras[mount.photo], _sensor_pose(mount.sensor.position, mount.sensor.attitude))
         members[mount.frame].append(mount.photo)
@@ -220,6 +234,7 @@ def _rigs(
             Place(),
         )
         for number in numbers
+        if all(number not in own for own in sensors.values())
     ]
     frames = [
         Frame(
@@ -236,82 +251,6 @@ def _rigs(
 
 def _sensor_pose(position: Floats, axes: Floats) -> Pose:
     """Return sensor from rig: R = F A' F and t = -R (F c)."""
-    turn = _FLIP @ axes.T @ _FLIP
+    turn = FLIP @ axes.T @ FLIP
     quaternion = Attitudes(turn[np.newaxis]).values("quaternion")[0]
-    return Pose(tuple(quaternion.tolist()), tuple((-turn @ _FLIP @ position).tolist()))
-
-
-def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
-    """Return the covariances of a result in the order of the model's files: docs/formats.md."""
-    made = _made(project)
-    block = result.block
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
-    photos = sorted(made.photos.items(), key=lambda each: each[1])
-    order = [rows[name] for name, _ in photos]
-    covariances = _centre_and_rotation(result)[order]
-    points = {name: row for row, name in enumerate(block.point_ids)}
-    used = result.used_points
-    own = sorted(((number, points[name]) for name, number in made.points.items() if used[points[name]]))
-    point_rows = [row for _, row in own]
-    table = np.empty(len(order), [("id", "<u4"), ("c", "<f8", 21)])
-    table["id"], table["c"] = [number for _, number in photos], _lower(covariances)
-    point_table = np.empty(len(own), [("id", "<u8"), ("c", "<f8", 6)])
-    point_table["id"], point_table["c"] = (
-        [number for number, _ in own],
-        _lower(result.point_covariances[point_rows]),
-    )
-    about = {
-        "format": 1,
-        "what": "covariances: cofactors times the variance of unit weight",
-        "variance_of_unit_weight": result.covariance_scale,
-        "frame": str(project.frame),
-        "unit": block.linear_unit,
-        "datum": str(result.datum),
-        "photo": ["C_x", "C_y", "C_z", "r_x", "r_y", "r_z"],
-        "photo_rotation": "R_true = exp([r]x) R, R world to camera; r in the camera's axes, radians",
-        "point": ["X", "Y", "Z"],
-        "camera": "the parameters of cameras.bin; held ones have zeros",
-        "layout": "u64 n; n x {id, lower triangle by rows as f64}; little endian, no padding",
-        "files": ["photo_covariances.bin", "camera_covariances.bin", "point_covariances.bin"],
-    }
-    return {
-        "covariances.json": to_json(about),
-        "photo_covariances.bin": struct.pack("<Q", len(table)) + table.tobytes(),
-        "camera_covariances.bin": _camera_covariances(made, result),
-        "point_covariances.bin": struct.pack("<Q", len(point_table)) + point_table.tobytes(),
-    }
-
-
-def _camera_covariances(made: _Made, result: Result) -> bytes:
-    found = []
-    own = {each.name: each.covariance for each in result.cameras}
-    for camera in made.model.cameras:
-        name = next(name for name, number in made.cameras.items() if number == camera.number)
-        count = len(camera.parameters)
-        matrix = own.get(name)
-        if matrix is None or matrix.shape != (count, count):
-            matrix = np.zeros((count, count))
-        found.append(
-            struct.pack("<II", camera.number, count) + _lower(matrix[np.newaxis])[0].astype("<f8").tobytes()
-        )
-    return struct.pack("<Q", len(found)) + b"".join(found)
-
-
-def _lower(matrices: Floats) -> Floats:
-    rows, columns = np.tril_indices(matrices.shape[1])
-    found: Floats = matrices[:, rows, columns]
-    return found
-
-
-def _centre_and_rotation(result: Result) -> Floats:
-    """Return (P, 6, 6) covariances of centres and of rotations in the axes of the cameras.
-
-    A Exp(rho) is F A' before: r = -F rho.
-    """
-    kind = "omega_phi_kappa_photo_to_ground" if result.block.photo_to_ground else "omega_phi_kappa"
-    rates = _photocore.attitudes_from_numbers(kind, result.photo_attitudes, _photocore.nadir_boresight(0))[1]
-    jacobian = np.zeros((len(rates), 6, 6))
-    jacobian[:, :3, :3] = np.eye(3)
-    jacobian[:, 3:, 3:] = -_FLIP @ rates
-    found: Floats = jacobian @ result.photo_covariances @ jacobian.transpose(0, 2, 1)
-    return found
+    return Pose(tuple(quaternion.tolist()), tuple((-turn @ FLIP @ position).tolist()))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.crs import amid, enu_origin, has_place
+from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
 from photogram.formats.placing import Placed, frame_of, placed
 from photogram.results.ellipses import CONFIDENCE, ellipses, fitting_scale
 from photogram.results.findings import axes
@@ -145,7 +145,7 @@ def map_layers(
             *_suspicious(found),
         ),
     ]
-    system = None if not found.crs or enu_origin(found.crs) is not None else found.crs
+    system = None if not found.crs or enu_origin(found.crs) is not None else without_geoid(found.crs)
     layers = []
     for name, description, geometries, columns in parts:
         scaled = name in ("point_ellipses", "control_residuals", "check_residuals")
@@ -190,11 +190,11 @@ def _footprints(found: Placed, sizes: Sequence[tuple[float, float] | None]) -> _
     outlines = shown.positions()
     known: Bools = np.asarray(np.isfinite(outlines).all(axis=2))
     rows = np.flatnonzero(known.sum(axis=1) >= 4)
-    rings = [
-        found.carried(outline[there]) for outline, there in zip(outlines[rows], known[rows], strict=True)
-    ]
+    places = found.carried(outlines[rows][known[rows]])
+    of_rings = np.repeat(np.arange(len(rows)), known[rows].sum(axis=1))
+    rings = shapely.linearrings(places, indices=of_rings) if len(rows) else []  # it closes what is open
     unit = block.linear_unit
-    return [shapely.Polygon(ring) for ring in rings], {
+    return shapely.polygons(rings), {
         "photo": np.array(block.photo_ids, dtype=object)[rows],
         f"{unit}_per_{block.image_unit}": shown.size[rows],
         "cut": shown.cut[rows],

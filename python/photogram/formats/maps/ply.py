@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.placing import Placed
 from photogram.network.rays import local_axes
 from photogram.results.ellipses import metric_covariances
+from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 
 __all__ = ["point_cloud"]
@@ -24,7 +25,10 @@ _TYPES = {"<f8": "double", "<f4": "float", "<u2": "ushort"}
 
 
 def point_cloud(
-    result: Result, found: Placed | None = None, *, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    result: AdjustedNetwork,
+    found: Placed | None = None,
+    *,
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> bytes:
     """Return the adjusted points as PLY (binary, little endian).
 
@@ -35,7 +39,7 @@ def point_cloud(
     Parameters
     ----------
     result
-        The result of a block.
+        The result of a block or a collection.
     found
         The same in a coordinate reference system in metres. None: the axes of the block, of a geographic one
         east, north and up amid its stations.
@@ -49,13 +53,7 @@ def point_cloud(
         A system in degrees.
     """
     if found is None:
-        rows = np.flatnonzero(result.used_points)
-        places = local_axes(result.block).positions(result.point_positions[rows])
-        if not result.block.geographic:
-            places = result.point_positions[rows]
-        covariances, what = metric_covariances(result)[rows], str(result.block.frame)
-        if result.block.geographic:
-            what = "east, north, up amid the stations"
+        rows, places, covariances, what = _own(result)
     elif found.units[0] == "deg":
         raise InputError(f"point clouds are in metres, and {found.crs} has degrees")
     else:
@@ -66,7 +64,20 @@ def point_cloud(
         vertices[f"sd_{name}"] = np.sqrt(covariances[:, axis, axis])
     vertices["sd_max"] = _largest(covariances)
     vertices["rays"] = np.minimum(result.point_rays[rows], 65535)
-    return _header(len(rows), what, result.block.linear_unit, origin) + vertices.tobytes()
+    unit = result.block.linear_unit if isinstance(result, Result) else ""
+    return _header(len(rows), what, unit, origin) + vertices.tobytes()
+
+
+def _own(result: AdjustedNetwork) -> tuple[Indices, Floats, Floats, str]:
+    """Return the points that took part, in metric axes, with covariances and the name of the axes."""
+    rows = np.flatnonzero(result.used_points)
+    places, covariances = result.point_positions[rows], result.point_covariances[rows]
+    if not isinstance(result, Result):
+        return rows, places, covariances, "that of the collection"
+    if result.block.geographic:
+        local = local_axes(result.block).positions(places)
+        return rows, local, metric_covariances(result)[rows], "east, north, up amid the stations"
+    return rows, places, covariances, str(result.block.frame)
 
 
 def _largest(covariances: Floats) -> Floats:
@@ -81,7 +92,7 @@ def _header(count: int, what: str, unit: str, origin: tuple[float, float, float]
     lines = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment frame {printed}; unit {unit}",
+        f"comment frame {printed}; unit {unit or 'not known'}",
         f"comment origin {' '.join(repr(float(each)) for each in origin)} was taken away",
         f"element vertex {count}",
         *(f"property {_TYPES[_VERTEX[name].str]} {name}" for name in _VERTEX.names or ()),

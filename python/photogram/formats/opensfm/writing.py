@@ -1,4 +1,4 @@
-"""From a project to `reconstruction.json` and `tracks.csv`."""
+"""From a project to `reconstruction.json`, `tracks.csv` and `gcp_list.txt`."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from photogram.formats.project import Project, Size
 from photogram.io.json import to_json
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
-from photogram.network.observations import Position
+from photogram.network.observations import Control, Position
 
 __all__ = ["cannot_hold", "write"]
 
+CONTROL = "gcp_list.txt"
 VERSION = "OPENSFM_TRACKS_VERSION_v2"
 
 
@@ -29,7 +30,11 @@ def cannot_hold(project: Project) -> list[str]:
     block = project.block
     found = ["standard deviations of images, poses, cameras and control"]
     if np.isfinite(block.point_sd).any() or project.checks:
-        found.append("what control is: its points are points as others")
+        found.append(
+            f"which control points are checked: {CONTROL} beside it is a list for --control"
+            if _placed_frame(project)
+            else "what control is: its points are points as others"
+        )
     others = [each for each in block.observations if not isinstance(each, Position)]
     if others:
         found.append(f"{len(others)} observations beside images and GPS")
@@ -43,7 +48,7 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the two files.
+    """Return the two files, and the list of control of a block that has a place on the earth.
 
     Raises
     ------
@@ -86,11 +91,49 @@ def write(project: Project) -> Mapping[str, bytes]:
             for row in np.flatnonzero(placed).tolist()
         },
     }
-    if project.frame.kind == "topocentric" and project.frame.origin is not None:
+    if project.frame.origin is not None and _placed_frame(project):
         model["reference_lla"] = dict(
             zip(("latitude", "longitude", "altitude"), project.frame.origin, strict=True)
         )
-    return {MODEL: to_json([model]), TRACKS: _tracks(project, sizes, which, set(rows.tolist()))}
+    files = {MODEL: to_json([model]), TRACKS: _tracks(project, sizes, which, set(rows.tolist()))}
+    control = _control(project)
+    return {**files, **({CONTROL: control} if control else {})}
+
+
+def _placed_frame(project: Project) -> bool:
+    """Return whether the frame has a place on the earth."""
+    return project.frame.kind == "topocentric" and project.frame.origin is not None
+
+
+def _control(project: Project) -> bytes:
+    """Return the list of control with its measurements; none of a block without a place on the earth.
+
+    Points of which some coordinates are not known have no place in it.
+    """
+    block = project.block
+    positions = block.point_positions.copy()
+    places = {name: row for row, name in enumerate(block.point_ids)}
+    for each in block.observations:
+        if isinstance(each, Control):
+            positions[places[each.point]] = each.observed
+    own = np.flatnonzero(np.isfinite(positions).all(axis=1))
+    if not len(own) or not _placed_frame(project):
+        return b""
+    from photogram.formats.crs import GEOGRAPHIC, from_frame
+
+    found = positions.copy()
+    found[own], _ = from_frame(GEOGRAPHIC, positions[own], np.zeros((len(own), 3, 3)), project.frame)
+    known = set(own.tolist())
+    lines = ["WGS84"]
+    # Pixels count from the middle of the first one there, and names end at blanks.
+    pixels = (to_corner(project) - 0.5).tolist()
+    for photo, point, pixel in zip(
+        block.image_photos.tolist(), block.image_points.tolist(), pixels, strict=True
+    ):
+        if point in known:
+            names = ("_".join(name.split()) for name in (block.photo_ids[photo], block.point_ids[point]))
+            lines.append(" ".join([*map(repr, [*found[point].tolist(), *pixel]), *names]))
+    return ("\n".join(lines) + "\n").encode() if len(lines) > 1 else b""
 
 
 def _camera(camera: Camera, size: Size) -> dict[str, Any]:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import cast, get_args
 
 from photogram import _photocore
 from photogram.errors import InputError
+from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
-from photogram.network.cameras import Camera
+from photogram.network.cameras import Camera, Weights
 
 __all__ = ["Cameras", "read_cameras", "spread_over_photos"]
 
@@ -61,7 +63,7 @@ def read_cameras(tables: Tables) -> Cameras:
         pixel = table.numbers("pixel_mm")[row]
         found.pixel_mm.append(None if math.isnan(pixel) else float(pixel))
         found.for_each.append(each)
-    return found
+    return replace(found, cameras=read_covariances(tables).cameras(found.cameras))
 
 
 def _size(table: ColumnTable, row: int) -> Size | None:
@@ -120,7 +122,15 @@ def _camera(tables: Tables, table: ColumnTable, row: int, size: Size | None) -> 
         },
         name=table.texts("camera")[row],
         unit="px" if image == "px" else "mm",
+        weights=_weights(table, row),
     )
+
+
+def _weights(table: ColumnTable, row: int) -> Weights:
+    word = table.texts("weights", "corrected")[row].lower()
+    if word not in get_args(Weights):
+        raise table.error(row, f"column weights: {quoted(word)} is none of {', '.join(get_args(Weights))}")
+    return cast("Weights", word)
 
 
 def _spread(own: dict[str, str], values: dict[str, float]) -> dict[str, float]:

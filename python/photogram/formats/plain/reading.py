@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,17 +14,18 @@ from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.images import from_corner
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
+from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.observed import read_observations
-from photogram.formats.plain.settings import Settings, read_settings
+from photogram.formats.plain.rigs import read_frames, read_rigs
+from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.tables import ANGLES, AXES, Tables, covariances_of, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, assembled
-from photogram.formats.rigging import FrameOf, Rig, mounted
+from photogram.formats.rigging import mounted
 from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, listed, quoted
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Attitude, Control, Observation
-from photogram.network.unknowns import Sensor
 
 __all__ = ["SETTINGS", "read", "read_control"]
 
@@ -46,7 +46,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     """
     settings = read_settings(path / SETTINGS if path.is_dir() else path)
     settings = replace(settings, sd={**settings.sd, **wishes.sd})
-    tables = Tables(settings, [])
+    tables = Tables(settings, unread_tables(settings))
     if "images" not in settings.tables:
         raise InputError("has no table of images (images.csv)", file=settings.path)
     transform = Transform(settings, tables.messages)
@@ -57,17 +57,27 @@ def read(path: Path, wishes: Wishes) -> Project:
     photos = _photos(tables, transform, cameras)
     images = _images(tables, photos)
     points = _points(tables, transform, images, given)
+    rigs = read_rigs(tables, [each.name for each in cameras.cameras])
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
     xy, sd = _coordinates(settings, images, cameras, np.asarray(photo_cameras))
     mounts, stands = mounted(
-        _frames(tables, photos, cameras, photo_cameras), photos.names, photos.centres, photos.matrices
+        read_frames(tables, rigs, photos.names, photos.taken), photos.names, photos.centres, photos.matrices
     )
     places = {name: row for row, name in enumerate(photos.names)}
     observations: list[Observation] = read_observations(
-        tables, transform, places, photos.times.tolist(), {name: row for row, name in enumerate(points.names)}
+        tables,
+        transform,
+        places,
+        photos.times.tolist(),
+        {name: row for row, name in enumerate(points.names)},
+        rigs,
     )
-    camera_names = [each.name for each in cameras.cameras]
+    unknowns = [unknown for each in observations for unknown in each.unknowns if unknown is not None]
+    observations += read_covariances(tables).priors([*unknowns, *(each.sensor for each in mounts)])
     extra = len(stands)
+    owners = {each.name: row for row, each in enumerate(cameras.cameras)} | dict(
+        zip(photos.taken, photo_cameras, strict=True)
+    )
     return assembled(
         path=settings.path,
         title="plain project",
@@ -76,7 +86,10 @@ def read(path: Path, wishes: Wishes) -> Project:
         sizes=cameras.sizes,
         pixel_mm=cameras.pixel_mm,
         photo_ids=[*photos.names, *(each.name for each in stands)],
-        photo_cameras=[*photo_cameras, *(camera_names.index(each.camera) for each in stands)],
+        photo_cameras=[
+            *photo_cameras,
+            *(owners.get(each.camera, photo_cameras[each.like]) for each in stands),
+        ],
         centres=np.vstack([photos.centres, *(each.centre[np.newaxis] for each in stands)]),
         matrices=np.concatenate([photos.matrices, *(each.matrix[np.newaxis] for each in stands)]),
         photo_position_sd=np.vstack([photos.position_sd, np.full((extra, 3), np.inf)]),
@@ -110,6 +123,7 @@ def _with_cameras(tables: Tables, path: Path) -> Tables:
 class _Photos:
     names: list[str]
     cameras: list[int]
+    taken: list[str]
     centres: Floats
     matrices: Floats
     position_sd: Floats
@@ -150,6 +164,7 @@ def _photos(tables: Tables, transform: Transform, cameras: Cameras) -> _Photos:
     return _Photos(
         [texts[row] for row in kept],
         [which[row] for row in kept],
+        [cameras.cameras[which[row]].name for row in kept],
         centres[kept],
         matrices[kept],
         sd[kept],
@@ -437,65 +452,3 @@ def _points(tables: Tables, transform: Transform, images: _Images, control: _Giv
         observed = control.observed
         starts[rows] = np.where(np.isnan(control.positions), starts[rows], control.positions)
     return _Points(names, starts, positions, sd, observed)
-
-
-def _frames(tables: Tables, photos: _Photos, cameras: Cameras, photo_cameras: Sequence[int]) -> list[FrameOf]:
-    """Read rigs and frames."""
-    table = tables.read("frames")
-    rigs = _rigs(tables, cameras)
-    if table is None:
-        return []
-    places = {name: row for row, name in enumerate(photos.names)}
-    rows = indices_of(table, "photo", places, "photo").tolist()
-    names, own = table.texts("frame"), table.texts("rig")
-    found: dict[str, tuple[Rig, dict[str, int]]] = {}
-    for row, photo in enumerate(rows):
-        if own[row] not in rigs:
-            raise table.error(row, f"column rig: there is no rig {quoted(own[row])}")
-        rig = rigs[own[row]]
-        camera = cameras.cameras[photo_cameras[photo]].name
-        if camera != rig.reference and camera not in rig.sensors:
-            raise table.error(row, f"the rig {rig.name} has no camera {camera}, which took the photo")
-        _, members = found.setdefault(names[row], (rig, {}))
-        if found[names[row]][0] is not rig or camera in members:
-            raise table.error(
-                row, f"the frame {names[row]} has two rigs, or two photos of the camera {camera}"
-            )
-        members[camera] = photo
-    return [FrameOf(name, rig, members) for name, (rig, members) in found.items()]
-
-
-def _rigs(tables: Tables, cameras: Cameras) -> Mapping[str, Rig]:
-    table = tables.read("rigs")
-    if table is None:
-        return {}
-    known = {each.name for each in cameras.cameras}
-    values = np.stack([table.numbers(axis, 0.0) for axis in AXES], axis=1)
-    matrices = tables.matrices(table)
-    position_sd = np.stack([table.numbers(name, math.inf, infinite=True) for name in _SD], axis=1)
-    turns = [f"sd_rotation_{axis}" for axis in AXES]
-    rotation_sd = np.stack(
-        [table.numbers(name, math.inf, infinite=True, read=tables.angle) for name in turns], axis=1
-    )
-    found: dict[str, tuple[str, dict[str, Sensor]]] = {}
-    for row, (rig, camera) in enumerate(zip(table.texts("rig"), table.texts("camera"), strict=True)):
-        if camera not in known:
-            raise table.error(row, f"column camera: there is no camera {quoted(camera)}")
-        matrix = np.eye(3) if np.isnan(matrices[row]).any() else matrices[row]
-        if rig not in found:
-            if values[row].any() or np.abs(matrix - np.eye(3)).max() > DIFFER:
-                raise table.error(
-                    row, f"the first camera of the rig {rig} is its reference: its pose is zero"
-                )
-            found[rig] = camera, {}
-            continue
-        reference, sensors = found[rig]
-        if camera == reference or camera in sensors:
-            raise table.error(row, f"the rig {rig} has the camera {camera} twice")
-        try:
-            sensors[camera] = Sensor(
-                f"{rig}/{camera}", values[row], matrix, np.concatenate([position_sd[row], rotation_sd[row]])
-            )
-        except InputError as error:
-            raise table.error(row, error.message) from None
-    return {name: Rig(name, reference, sensors) for name, (reference, sensors) in found.items()}

@@ -15,8 +15,9 @@ from photogram.errors import InputError
 from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
+from photogram.messages import Message, listed
 
-__all__ = ["TABLES", "Settings", "bare_settings", "read_settings"]
+__all__ = ["TABLES", "Settings", "bare_settings", "read_settings", "unread_tables"]
 
 VERSION = 1
 TABLES = (
@@ -26,14 +27,26 @@ TABLES = (
     "points",
     "control",
     "distances",
+    "instruments",
     "height_differences",
     "coordinate_differences",
+    "levels",
+    "level_points",
+    "planes",
+    "plane_points",
+    "lines",
+    "line_points",
+    "plumb_lines",
+    "plumb_line_points",
     "gnss",
     "gnss_groups",
     "attitudes",
     "attitude_groups",
+    "relative_poses",
     "rigs",
     "frames",
+    "bases",
+    "covariances",
 )
 """In the order in which they are read and written."""
 WITH_CRS = ("control", "gnss", "points", "photos")
@@ -47,7 +60,14 @@ WITH_SD = (
     "distances",
     "height_differences",
     "coordinate_differences",
+    "level_points",
+    "plane_points",
+    "line_points",
+    "plumb_line_points",
+    "bases",
 )
+WITH_THREE = ("control", "points", "gnss", "photos", "attitudes", "coordinate_differences")
+"""Of these those that may have three; images may have two, all others have one."""
 ENDINGS = (".csv", ".tsv", ".txt", ".parquet")
 
 _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
@@ -300,7 +320,7 @@ class _File:
 
     def deviations(self, table: str) -> tuple[float, ...]:
         """Return standard deviations of a table."""
-        counts = (1, 2) if table == "images" else (1,) if table.endswith("ances") else (1, 3)
+        counts = (1, 2) if table == "images" else (1, 3) if table in WITH_THREE else (1,)
         found = self.numbers("sd", table, counts)
         if not all(each >= 0 for each in found):
             self.fail(table, f"{list(found)} is no standard deviation")
@@ -310,6 +330,22 @@ class _File:
 def _nearest(word: str, known: Any) -> str:
     close = difflib.get_close_matches(word, list(known), 1, 0.5)
     return f"; did you mean {close[0]}?" if close else f", but {', '.join(known)}"
+
+
+def unread_tables(settings: Settings) -> list[Message]:
+    """Return a remark on tables beside the settings that no table is called, with the nearest names."""
+    used = {path.resolve() for path in settings.tables.values()}
+    others = [
+        path
+        for path in sorted(settings.path.parent.iterdir())
+        if path.suffix in ENDINGS and path.suffix != ".txt" and path.resolve() not in used
+    ]
+    if not others:
+        return []
+    close = {path.name: difflib.get_close_matches(path.stem.lower(), TABLES, 1, 0.75) for path in others}
+    meant = [f"{name} (did you mean {each[0]}?)" for name, each in close.items() if each]
+    rest = [name for name, each in close.items() if not each]
+    return [Message(f"tables of other names are not read: {listed([*meant, *rest])}", settings.path)]
 
 
 def _tables(file: _File) -> dict[str, Path]:

@@ -16,9 +16,23 @@ from photogram.io.delimited import ColumnTable, read_columns
 from photogram.messages import Message, listed, quoted
 from photogram.network.attitudes import Attitudes, Representation
 
-__all__ = ["ANGLES", "AXES", "COLUMNS", "Tables", "covariances_of", "indices_of", "matrices_of"]
+__all__ = [
+    "ANGLES",
+    "AXES",
+    "COLUMNS",
+    "POSE",
+    "ROTATIONS",
+    "Tables",
+    "covariance_columns",
+    "covariances_of",
+    "indices_of",
+    "matrices_of",
+]
 
 AXES = ("x", "y", "z")
+ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
+POSE = (*AXES, *ROTATIONS)
+"""Components of poses: small rotations are about the axes of the photo."""
 ANGLES: Mapping[str, tuple[str, ...]] = {
     "omega_phi_kappa": ("omega", "phi", "kappa"),
     "phi_omega_kappa": ("phi", "omega", "kappa"),
@@ -31,9 +45,21 @@ ANGLES: Mapping[str, tuple[str, ...]] = {
 """Columns of each representation of attitudes."""
 _ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
 _SD_ANGLES = tuple(f"sd_{name}" for name in _ALL_ANGLES[:8] if not name.startswith(("q", "m")))
-_ROTATIONS = ("sd_rotation_x", "sd_rotation_y", "sd_rotation_z")
+_ROTATIONS = tuple(f"sd_{name}" for name in ROTATIONS)
 _SD = tuple(f"sd_{axis}" for axis in AXES)
-_COVARIANCES = ("cov_xy", "cov_xz", "cov_yz")
+_FLIP = np.diag([1.0, -1.0, -1.0])
+
+
+def covariance_columns(names: Sequence[str]) -> dict[str, tuple[int, int]]:
+    """Return the columns of covariances between components, and which ones: `cov_xy`, `cov_x_rotation_y`."""
+    return {
+        f"cov_{names[i]}{names[j]}" if len(names[i] + names[j]) == 2 else f"cov_{names[i]}_{names[j]}": (i, j)
+        for j in range(len(names))
+        for i in range(j)
+    }
+
+
+_COVARIANCES = tuple(covariance_columns(AXES))
 
 
 def _parameters() -> tuple[str, ...]:
@@ -50,6 +76,7 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
         "width",
         "height",
         "pixel_mm",
+        "weights",
         "for_each",
         *_PARAMETERS,
         *(f"sd_{name}" for name in _PARAMETERS),
@@ -88,17 +115,54 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
     "gnss": ("photo", *AXES, "sd", *_SD, *_COVARIANCES, "group", "time"),
     "gnss_groups": (
         "group",
-        *(f"{kind}{axis}" for kind in ("lever_", "sd_lever_", "sd_shift_", "sd_drift_") for axis in AXES),
+        *(
+            f"{sd}{kind}_{axis}"
+            for kind in ("lever", "shift", "drift")
+            for sd in ("", "sd_")
+            for axis in AXES
+        ),
+        "lever",
         "shift",
         "drift",
     ),
-    "attitudes": ("photo", *_ALL_ANGLES, *_SD_ANGLES, *_ROTATIONS, "group"),
+    "attitudes": (
+        "photo",
+        *_ALL_ANGLES,
+        *_SD_ANGLES,
+        *_ROTATIONS,
+        *covariance_columns(ROTATIONS),
+        "group",
+    ),
     "attitude_groups": ("group", *_ALL_ANGLES, *_ROTATIONS),
-    "distances": ("from", "to", "distance", "sd"),
+    "distances": ("from", "to", "distance", "sd", "instrument"),
+    "instruments": ("instrument", "scale", "constant", "sd_scale", "sd_constant"),
     "height_differences": ("from", "to", "dz", "sd"),
-    "coordinate_differences": ("from", "to", "dx", "dy", "dz", "sd", "sd_dx", "sd_dy", "sd_dz"),
-    "rigs": ("rig", "camera", *AXES, *_ALL_ANGLES, *_SD, *_ROTATIONS),
-    "frames": ("frame", "rig", "photo"),
+    "coordinate_differences": (
+        *("from", "to", "dx", "dy", "dz", "sd", "sd_dx", "sd_dy", "sd_dz"),
+        *covariance_columns(("dx", "dy", "dz")),
+    ),
+    "levels": ("level", "z", "sd"),
+    "level_points": ("level", "point", "dz", "sd"),
+    "planes": (
+        *("plane", *AXES, "nx", "ny", "nz"),
+        *("sd_distance", "sd_rotation_x", "sd_rotation_y"),
+    ),
+    "plane_points": ("plane", "point", "distance", "sd"),
+    "lines": (
+        *("line", *AXES, "dx", "dy", "dz"),
+        *("sd_x", "sd_y", "sd_rotation_x", "sd_rotation_y"),
+    ),
+    "line_points": ("line", "point", "sd", "sd_x", "sd_y", "cov_xy"),
+    "plumb_lines": ("plumb_line", *AXES, "sd_x", "sd_y"),
+    "plumb_line_points": ("plumb_line", "point", "sd", "sd_x", "sd_y", "cov_xy"),
+    "relative_poses": (
+        *("from", "to", *AXES, *_ALL_ANGLES, *_SD, *_ROTATIONS),
+        *covariance_columns(POSE),
+    ),
+    "rigs": ("rig", "camera", "sensor", *AXES, *_ALL_ANGLES, *_SD, *_ROTATIONS),
+    "frames": ("frame", "rig", "photo", "sensor"),
+    "bases": ("rig", "from", "to", "distance", "sd"),
+    "covariances": ("kind", "name", "first", "second", "covariance"),
 }
 """Columns that a table may have."""
 REQUIRED: Mapping[str, tuple[str, ...]] = {
@@ -114,8 +178,20 @@ REQUIRED: Mapping[str, tuple[str, ...]] = {
     "distances": ("from", "to", "distance"),
     "height_differences": ("from", "to", "dz"),
     "coordinate_differences": ("from", "to", "dx", "dy", "dz"),
-    "rigs": ("rig", "camera"),
+    "instruments": ("instrument",),
+    "levels": ("level",),
+    "level_points": ("level", "point"),
+    "planes": ("plane",),
+    "plane_points": ("plane", "point"),
+    "lines": ("line",),
+    "line_points": ("line", "point"),
+    "plumb_lines": ("plumb_line",),
+    "plumb_line_points": ("plumb_line", "point"),
+    "relative_poses": ("from", "to", *AXES),
+    "rigs": ("rig",),
     "frames": ("frame", "rig", "photo"),
+    "bases": ("rig", "from", "to", "distance"),
+    "covariances": ("kind", "name", "first", "second", "covariance"),
 }
 SYNONYMS: Mapping[str, str] = {
     "label": "point",
@@ -142,8 +218,20 @@ _TEXTS = frozenset(
         "from",
         "to",
         "use",
+        "sensor",
+        "lever",
         "shift",
         "drift",
+        "instrument",
+        "level",
+        "plane",
+        "line",
+        "plumb_line",
+        "kind",
+        "name",
+        "first",
+        "second",
+        "weights",
     }
 )
 
@@ -188,11 +276,11 @@ class Tables:
         )
         table.require(*REQUIRED[name])
         if others := [each for each in table.columns if each and each not in known]:
-            self.messages.append(
-                Message(
-                    f"columns that the table {name} does not have are not read: {listed(others)}", table.path
-                )
+            remark = Message(
+                f"columns that the table {name} does not have are not read: {listed(others)}", table.path
             )
+            if remark not in self.messages:
+                self.messages.append(remark)
         return table
 
     def angle(self, text: str) -> float:
@@ -237,6 +325,33 @@ class Tables:
             self._check_rows(table, values, known)
             found[known] = matrices_of(self.settings, values[known])
         return found
+
+    @property
+    def radians(self) -> float:
+        """What a number of the unit of angles is in radians, for covariances."""
+        return {"gon": math.pi / 200, "rad": 1.0}.get(self.settings.angle, math.pi / 180)
+
+    @property
+    def flip(self) -> Floats:
+        """(3, 3) what carries vectors from the axes of photos, as the settings have them, to ours."""
+        return _FLIP if self.settings.photo == "y_down" else np.eye(3)
+
+    def turns(self, table: ColumnTable) -> Floats:
+        """Return (rows, 3, 3) the axes of one photo in those of another, as columns; NaN without."""
+        found: Floats = self.flip @ self.matrices(table)
+        return found
+
+    def vectors(self, table: ColumnTable, names: Sequence[str], default: float = math.nan) -> Floats:
+        """Return (rows, 3) vectors in the axes of photos."""
+        found: Floats = np.stack([table.numbers(name, default) for name in names], axis=1) @ self.flip
+        return found
+
+    def pose_covariances(self, table: ColumnTable, sd: Floats) -> Floats:
+        """Return (rows, 6, 6) covariances of poses, from standard deviations in our units and columns."""
+        found = covariances_of(sd, table, POSE, (1.0,) * 3 + (self.radians,) * 3)
+        signs = np.tile(np.diag(self.flip), 2)
+        turned: Floats = found * signs * signs[:, np.newaxis]
+        return turned
 
     def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
         """Refuse quaternions without length and matrices that are no rotations, with their rows."""
@@ -303,13 +418,32 @@ def _own(kind: str) -> Representation:
     return kind  # type: ignore[return-value]
 
 
-def covariances_of(sd: Floats, table: ColumnTable | None = None) -> Floats:
-    """Return (n, 3, 3) covariances from standard deviations and the columns cov_xy, cov_xz, cov_yz."""
-    found = np.zeros((len(sd), 3, 3))
-    found[:, range(3), range(3)] = np.asarray(sd) ** 2
+def covariances_of(
+    sd: Floats,
+    table: ColumnTable | None = None,
+    names: Sequence[str] = AXES,
+    units: Sequence[float] | None = None,
+) -> Floats:
+    """Return (n, k, k) covariances from standard deviations and the columns cov_xy ... of a table.
+
+    Parameters
+    ----------
+    sd
+        (n, k) in our units.
+    table
+        The table; None for one without such columns.
+    names
+        Of the components.
+    units
+        What a number of the table is in our unit of each component; None: the same.
+    """
+    count = len(names)
+    found = np.zeros((len(sd), count, count))
+    found[:, range(count), range(count)] = np.asarray(sd) ** 2
+    scales = (1.0,) * count if units is None else units
     if table is not None:
-        for name, (i, j) in zip(_COVARIANCES, ((0, 1), (0, 2), (1, 2)), strict=True):
-            found[:, i, j] = found[:, j, i] = table.numbers(name, 0.0)
+        for name, (i, j) in covariance_columns(names).items():
+            found[:, i, j] = found[:, j, i] = scales[i] * scales[j] * table.numbers(name, 0.0)
     return found
 
 

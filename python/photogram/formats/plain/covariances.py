@@ -1,0 +1,153 @@
+"""The table of covariances: what was determined together of a camera, a lever arm, a plane, a sensor ..."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.formats.plain.rows import check_given, made
+from photogram.formats.plain.tables import Tables
+from photogram.io.delimited import ColumnTable
+from photogram.messages import listed, quoted
+from photogram.network.cameras import Camera
+from photogram.network.observations import Observation, Prior
+from photogram.network.unknowns import Unknown
+
+__all__ = ["Covariances", "read_covariances"]
+
+CAMERA = "camera"
+
+
+@dataclass
+class _Matrix:
+    """The covariances of one thing: its rows, and numbers by pairs of components."""
+
+    rows: list[int] = field(default_factory=list)
+    values: dict[tuple[str, str], float] = field(default_factory=dict)
+
+    def over(self, components: Sequence[str], units: Mapping[str, float]) -> Floats:
+        """Return the matrix; what is not said is zero."""
+        found = np.zeros((len(components),) * 2)
+        for (first, second), value in self.values.items():
+            i, j = components.index(first), components.index(second)
+            found[i, j] = found[j, i] = units[first] * units[second] * value
+        return found
+
+
+@dataclass(frozen=True)
+class Covariances:
+    """The table, by kind and name of what it is of."""
+
+    tables: Tables
+    table: ColumnTable | None
+    matrices: Mapping[tuple[str, str], _Matrix]
+
+    def cameras(self, cameras: Sequence[Camera]) -> list[Camera]:
+        """Return cameras with their covariances.
+
+        Raises
+        ------
+        InputError
+            Cameras and parameters that are not there, matrices that are none.
+        """
+        own = {name: each for (kind, name), each in self.matrices.items() if kind == CAMERA}
+        if not own:
+            return list(cameras)
+        assert self.table is not None
+        known = {each.name for each in cameras}
+        for name, matrix in own.items():
+            if name not in known:
+                raise self.table.error(matrix.rows[0], f"column name: there is no camera {quoted(name)}")
+        return [self._camera(each, own[each.name]) if each.name in own else each for each in cameras]
+
+    def _camera(self, camera: Camera, matrix: _Matrix) -> Camera:
+        table = self.table
+        assert table is not None
+        by_word = {name.lower(): name for name in camera.names}
+        spelled = _Matrix(matrix.rows)
+        for row, ((first, second), value) in zip(matrix.rows, matrix.values.items(), strict=True):
+            for word in (first, second):
+                if word not in by_word:
+                    raise table.error(row, f"the camera {camera.name} has no parameter {quoted(word)}")
+            spelled.values[by_word[first], by_word[second]] = value
+        names = [name for name in camera.names if any(name in pair for pair in spelled.values)]
+        scale = 1e-3 if self.tables.settings.image == "um" else 1.0
+        # In files a principal distance is positive for the positive plane, in models negative.
+        units = {name: scale ** camera.powers[name] * (-1.0 if name == "c" else 1.0) for name in names}
+        found = spelled.over(names, units)
+        # What stands in no column of standard deviations is held, but for what is in the matrix.
+        sd = {
+            name: own
+            for name, own in zip(camera.names, camera.deviations.tolist(), strict=True)
+            if own or name not in names
+        }
+        return made(table, matrix.rows[0], lambda: camera.replace(sd=sd, covariance=(names, found)))
+
+    def priors(self, unknowns: Iterable[Unknown]) -> list[Observation]:
+        """Return what was determined of unknowns together as observations.
+
+        Raises
+        ------
+        InputError
+            Unknowns and components that are not there, matrices that are none.
+        """
+        known = {(each.KIND, each.name): each for each in unknowns}
+        found: list[Observation] = []
+        for (kind, name), matrix in self.matrices.items():
+            if kind == CAMERA:
+                continue
+            table = self.table
+            assert table is not None
+            if (kind, name) not in known:
+                there = listed(sorted(f"{own} {title}" for own, title in known), 8) or "none"
+                raise table.error(matrix.rows[0], f"there is no {kind} {quoted(name)}; there are {there}")
+            unknown = known[kind, name]
+            for row, pair in zip(matrix.rows, matrix.values, strict=True):
+                for word in pair:
+                    if word not in unknown.components:
+                        raise table.error(
+                            row, f"a {kind} has {', '.join(unknown.components)}, not {quoted(word)}"
+                        )
+            units = {
+                each: self.tables.radians if each.startswith("rotation") else 1.0
+                for each in unknown.components
+            }
+            covariance = matrix.over(unknown.components, units)
+            found.append(
+                made(
+                    table,
+                    matrix.rows[0],
+                    lambda unknown=unknown, covariance=covariance: Prior(unknown, covariance=covariance),  # type: ignore[misc]
+                )
+            )
+        return found
+
+
+def read_covariances(tables: Tables) -> Covariances:
+    """Read the table; it has nothing where it is not there.
+
+    Raises
+    ------
+    InputError
+        Empty cells, a pair of components that is there twice.
+    """
+    table = tables.read("covariances")
+    matrices: dict[tuple[str, str], _Matrix] = {}
+    if table is None:
+        return Covariances(tables, None, matrices)
+    values = table.numbers("covariance")
+    check_given(table, values[:, np.newaxis], ("covariance",))
+    kinds = [text.lower().replace("_", " ") for text in table.texts("kind")]
+    columns = (table.texts("name"), table.texts("first"), table.texts("second"))
+    for row, (kind, name, *pair) in enumerate(zip(kinds, *columns, strict=True)):
+        # Parameters of cameras are called as their columns are, components of others by words.
+        first, second = (word.lower() if kind == CAMERA else word.lower().replace("_", " ") for word in pair)
+        matrix = matrices.setdefault((kind, name), _Matrix())
+        if (first, second) in matrix.values or (second, first) in matrix.values:
+            raise table.error(row, f"the covariance of {first} and {second} is there twice")
+        matrix.rows.append(row)
+        matrix.values[first, second] = float(values[row])
+    return Covariances(tables, table, matrices)
